@@ -96,7 +96,7 @@ def write_run(folder: Path, plan: Plan = Plan()) -> Path:
     substeps = round(1.0 / (plan.control_hz * TICK_S))
     safe, loop = robot.actuators.safe_command, ControlLoop(robot, task, controller)
     loop.begin(goal_in_float64(simulation.goal))
-    command, heard_s, closed, trips, steps = safe, -np.inf, False, 0, 0
+    command, received_s, closed, trips, steps = safe, -np.inf, False, 0, 0
     given = float(simulation.goal.done[0])
     for tick in range(round(min(plan.duration_s, plan.gone_after_s) / TICK_S) + 1):
         time_s = tick * TICK_S
@@ -111,10 +111,10 @@ def write_run(folder: Path, plan: Plan = Plan()) -> Path:
         if tick % substeps == 0 and not plan.silence_s[0] <= time_s < plan.silence_s[1]:
             loop.goal = loop.goal.among(simulation.things)
             command = loop.step(simulation.measured, round(time_s * NS)).command[0]
-            heard_s, steps = time_s, steps + 1
+            received_s, steps = time_s, steps + 1
             late_ns = LATENCY_NS + int(jitter.gamma(2.0, 300_000))
             bag.command(command, UNSTAMPED_S if external else time_s, now_ns + late_ns)
-        was_closed, closed = closed, time_s - heard_s > WATCHDOG_S
+        was_closed, closed = closed, time_s - received_s > WATCHDOG_S
         trips += closed and not was_closed
         applied = safe if closed else command
         bag.joints("actuators/state", applied, time_s, now_ns + 4_000_000)

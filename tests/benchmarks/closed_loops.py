@@ -158,10 +158,10 @@ def _output(case: Case, seed: int, seconds: float, domain: int, record: Path) ->
             return "", "it did not end in time"
     ended = f"it ended with {done.returncode}, and last said: "
     said = done.stderr.strip().splitlines() or ["nothing"]
-    return done.stdout, ended + next((line for line in reversed(said) if _tells(line)), said[-1])
+    return done.stdout, ended + next((line for line in reversed(said) if _states(line)), said[-1])
 
 
-def _tells(line: str) -> bool:
+def _states(line: str) -> bool:
     """Whether a line may say what went wrong: those of a process that ended in good order do not."""
     return not line.startswith("[recorder] record")
 

@@ -97,7 +97,7 @@ def hardware(
     """Drive emulated devices to their goals, through driver and wire protocol, in real time, with the shipped policies.
 
     Each episode is `fulmar run --backend hardware --emulate` with a seed of its own. Success is that of `fulmar run`,
-    judged by where the emulated robot really is: within the tolerance throughout the closing seconds of the episode.
+    evaluated by where the emulated robot really is: within the tolerance throughout the closing seconds of the episode.
     With --out, a campaign that was broken off goes on where it was. The exit code is 1 where a device reaches its goal
     too rarely.
 

@@ -59,7 +59,7 @@ def make_ring(folder, **options):
     )
 
 
-def hear(ring, seconds, topic=TOPIC, text="word"):
+def receive(ring, seconds, topic=TOPIC, text="word"):
     """One word a second, and a tick after each."""
     for second in seconds:
         ring.write(topic, word(f"{text} {second}"), log_ns=START_NS + second * S)
@@ -68,7 +68,7 @@ def hear(ring, seconds, topic=TOPIC, text="word"):
 
 
 def test_without_a_fault_nothing_reaches_the_disk(ring, folder):
-    hear(ring, range(100))
+    receive(ring, range(100))
     ring.close()
     assert not folder.exists()
     assert ring.counts.messages == 0
@@ -76,9 +76,9 @@ def test_without_a_fault_nothing_reaches_the_disk(ring, folder):
 
 
 def test_a_fault_writes_what_came_before_and_after_it(ring, folder):
-    hear(ring, range(10))
-    hear(ring, [10], text="fault")
-    hear(ring, range(11, 20))
+    receive(ring, range(10))
+    receive(ring, [10], text="fault")
+    receive(ring, range(11, 20))
     ring.close()
     expected = ["word 7", "word 8", "word 9", "fault 10", "word 11", "word 12"]
     assert words_by_rosbags(folder) == words_by_mcap(folder) == expected
@@ -103,9 +103,9 @@ def test_what_a_fault_writes_keeps_when_it_was_sent(ring, folder):
 
 
 def test_a_fault_that_lasts_is_written_once_and_to_its_end(ring, folder):
-    hear(ring, range(5))
-    hear(ring, range(5, 9), text="fault")
-    hear(ring, range(9, 20))
+    receive(ring, range(5))
+    receive(ring, range(5, 9), text="fault")
+    receive(ring, range(9, 20))
     ring.close()
     expected = ["word 2", "word 3", "word 4", *(f"fault {n}" for n in range(5, 9)), "word 9", "word 10"]
     assert words_by_rosbags(folder) == expected
@@ -113,10 +113,10 @@ def test_a_fault_that_lasts_is_written_once_and_to_its_end(ring, folder):
 
 
 def test_each_fault_has_a_file_of_its_own_and_no_message_is_in_two(ring, folder):
-    hear(ring, [0], text="fault")
-    hear(ring, range(1, 30))
-    hear(ring, [30], text="fault")
-    hear(ring, range(31, 40))
+    receive(ring, [0], text="fault")
+    receive(ring, range(1, 30))
+    receive(ring, [30], text="fault")
+    receive(ring, range(31, 40))
     ring.close()
     assert len(bag_files(folder)) == 2
     words = words_by_mcap(folder)
@@ -127,17 +127,17 @@ def test_each_fault_has_a_file_of_its_own_and_no_message_is_in_two(ring, folder)
 
 
 def test_a_second_fault_soon_after_the_first_overlaps_nothing(ring, folder):
-    hear(ring, [0], text="fault")
-    hear(ring, range(1, 4))
-    hear(ring, [4], text="fault")
+    receive(ring, [0], text="fault")
+    receive(ring, range(1, 4))
+    receive(ring, [4], text="fault")
     ring.close()
     assert words_by_mcap(folder) == ["fault 0", "word 1", "word 2", "word 3", "fault 4"]
 
 
 def test_the_goal_is_written_however_old_it_is(ring, folder):
-    hear(ring, [0, 1], topic=GOAL, text="goal")
-    hear(ring, range(2, 100))
-    hear(ring, [100], text="fault")
+    receive(ring, [0, 1], topic=GOAL, text="goal")
+    receive(ring, range(2, 100))
+    receive(ring, [100], text="fault")
     ring.close()
     assert words_by_mcap(folder) == ["goal 1", "word 97", "word 98", "word 99", "fault 100"]
     with Reader(folder) as reader:
@@ -145,20 +145,20 @@ def test_the_goal_is_written_however_old_it_is(ring, folder):
 
 
 def test_the_goal_is_in_the_file_of_every_fault(ring, folder):
-    hear(ring, [0], topic=GOAL, text="goal")
-    hear(ring, [1], text="fault")
-    hear(ring, range(2, 30))
-    hear(ring, [30], text="fault")
+    receive(ring, [0], topic=GOAL, text="goal")
+    receive(ring, [1], text="fault")
+    receive(ring, range(2, 30))
+    receive(ring, [30], text="fault")
     ring.close()
     assert words_by_mcap(folder).count("goal 0") == 2
 
 
-def test_the_bag_tells_when_and_why_it_was_written(ring, folder):
-    hear(ring, range(3))
-    hear(ring, [3], text="fault")
+def test_the_bag_states_when_and_why_it_was_written(ring, folder):
+    receive(ring, range(3))
+    receive(ring, [3], text="fault")
     ring.close()
-    told = yaml.safe_load((folder / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
-    assert json.loads(told["custom_data"]["fulmar_faults"]) == [
+    reported = yaml.safe_load((folder / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
+    assert json.loads(reported["custom_data"]["fulmar_faults"]) == [
         {"time_ns": START_NS + 3 * S, "reason": "it broke"}
     ]
 
@@ -166,9 +166,9 @@ def test_the_bag_tells_when_and_why_it_was_written(ring, folder):
 def test_a_memory_that_is_too_small_keeps_the_newest_and_says_so(folder):
     ring = make_ring(folder, max_bytes=2 * len(word("word 0")))
     assert not ring.cut_short
-    hear(ring, range(3))
+    receive(ring, range(3))
     assert ring.cut_short
-    hear(ring, [3], text="fault")
+    receive(ring, [3], text="fault")
     ring.close()
     assert words_by_mcap(folder) == ["word 1", "word 2", "fault 3"]
 
@@ -186,14 +186,14 @@ def full_disk():
 
 
 def test_a_fault_on_a_full_disk_is_written_as_soon_as_there_is_room(ring, folder, full_disk):
-    hear(ring, range(10))
-    hear(ring, [10], text="fault")
-    hear(ring, range(11, 13))
+    receive(ring, range(10))
+    receive(ring, [10], text="fault")
+    receive(ring, range(11, 13))
     assert list(folder.iterdir()) == []
     assert (ring.counts.messages, ring.counts.on_disk) == (6, 0)
     full_disk()
-    hear(ring, range(13, 20))
-    hear(ring, [20], text="fault")
+    receive(ring, range(13, 20))
+    receive(ring, [20], text="fault")
     ring.close()
     first = ["word 7", "word 8", "word 9", "fault 10", "word 11", "word 12", "word 13"]
     assert words_by_mcap(folder) == [*first, "word 17", "word 18", "word 19", "fault 20"]
@@ -201,24 +201,24 @@ def test_a_fault_on_a_full_disk_is_written_as_soon_as_there_is_room(ring, folder
 
 
 def test_a_second_fault_on_a_full_disk_waits_for_room_too(ring, folder, tmp_path):
-    hear(ring, [0], text="fault")
-    hear(ring, range(1, 10))
+    receive(ring, [0], text="fault")
+    receive(ring, range(1, 10))
     blocked = folder / "bag_1.mcap.begun"
     blocked.touch()  # the next file cannot be created
     with pytest.raises(OSError, match="exists"):
-        hear(ring, [10], text="fault")
+        receive(ring, [10], text="fault")
     blocked.unlink()
-    hear(ring, [11])
+    receive(ring, [11])
     ring.close()
     assert words_by_mcap(folder)[-5:] == ["word 7", "word 8", "word 9", "fault 10", "word 11"]
 
 
 def test_a_fault_that_was_never_written_counts_as_lost(ring, folder, full_disk):
-    told = []
-    thread = BagThread(ring, on_error=told.append)
+    reported = []
+    thread = BagThread(ring, on_error=reported.append)
     thread.put(TOPIC, word("word 0"), START_NS)
     thread.put(TOPIC, word("fault 1"), START_NS + S)
     account = thread.stop()
     assert (account.received, account.recorded, account.lost) == (2, 0, 2)
     assert "cannot write a bag here" in account.problem
-    assert len(told) == 1
+    assert len(reported) == 1

@@ -104,7 +104,7 @@ def test_a_goal_point_is_a_goal_too(tmp_path):
     assert goal.targets.tolist() == [[1.0, 2.0, 0.0]]
 
 
-def test_a_goal_on_a_topic_that_the_task_does_not_hear_is_left_out_and_named(tmp_path):
+def test_a_goal_on_a_topic_that_the_task_does_not_receive_is_left_out_and_named(tmp_path):
     bag = BagWriter(tmp_path / "bag", run_info={"robot": "floating_platform", "task": "track_velocities"})
     for wire, targets in (("goal_velocity", (0.1, 0.0, 0.0)), ("goal_pose", (2.5, -1.5, 0.0))):
         message = goal_message(goal_at(targets), wire, 1)

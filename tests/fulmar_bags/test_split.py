@@ -54,14 +54,14 @@ def test_without_limits_there_is_one_file(tmp_path):
     assert len(bag_files(tmp_path / "bag")) == 1
 
 
-def test_metadata_tells_what_is_in_each_file_and_in_all(bag):
-    told = yaml.safe_load((bag / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
-    assert told["relative_file_paths"] == [path.name for path in bag_files(bag)]
-    assert sum(file["message_count"] for file in told["files"]) == told["message_count"] == 30
-    first, second, _ = (file["starting_time"]["nanoseconds_since_epoch"] for file in told["files"])
-    assert first == told["starting_time"]["nanoseconds_since_epoch"] == START_NS
-    assert second == START_NS + told["files"][0]["message_count"] * 100_000_000
-    assert told["duration"]["nanoseconds"] == 2_900_000_000
+def test_metadata_states_what_is_in_each_file_and_in_all(bag):
+    reported = yaml.safe_load((bag / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
+    assert reported["relative_file_paths"] == [path.name for path in bag_files(bag)]
+    assert sum(file["message_count"] for file in reported["files"]) == reported["message_count"] == 30
+    first, second, _ = (file["starting_time"]["nanoseconds_since_epoch"] for file in reported["files"])
+    assert first == reported["starting_time"]["nanoseconds_since_epoch"] == START_NS
+    assert second == START_NS + reported["files"][0]["message_count"] * 100_000_000
+    assert reported["duration"]["nanoseconds"] == 2_900_000_000
     with Reader(bag) as reader:
         assert (reader.message_count, reader.duration) == (30, 2_900_000_001)
 

@@ -227,30 +227,30 @@ def test_a_full_disk_keeps_what_it_took_and_takes_the_rest_later(tmp_path, small
     assert len(words_by_rosbags(tmp_path / "bag")) == 101
 
 
-def test_a_full_disk_is_told_once_and_the_thread_goes_on(tmp_path, small_disk):
-    told = []
+def test_a_full_disk_is_reported_once_and_the_thread_goes_on(tmp_path, small_disk):
+    reported = []
     bag = open_bag(tmp_path / "bag")
-    thread = BagThread(bag, on_error=told.append)
+    thread = BagThread(bag, on_error=reported.append)
     for number in range(100):
         thread.put(TOPIC, noise(number), START_NS)
     outcome = thread.stop()
     assert outcome.received == 100
     assert outcome.lost == 100
-    assert len(told) == 1
-    assert "too large" in told[0]
+    assert len(reported) == 1
+    assert "too large" in reported[0]
     assert_readable(tmp_path / "bag", 0)
 
 
 def test_a_full_queue_drops_and_counts(tmp_path):
-    told = []
-    thread = BagThread(open_bag(tmp_path / "bag"), on_error=told.append, max_queued=10)
+    reported = []
+    thread = BagThread(open_bag(tmp_path / "bag"), on_error=reported.append, max_queued=10)
     for number in range(5000):
         thread.put(TOPIC, word(f"word {number}"), START_NS + number)
     outcome = thread.stop()
     assert outcome.received == 5000
     assert 0 < outcome.lost < 5000
     assert outcome.recorded == len(words_by_rosbags(tmp_path / "bag"))
-    assert len(told) == 1
+    assert len(reported) == 1
 
 
 def test_recovery_rewrites_a_torn_bag_and_keeps_the_torn_file(tmp_path):
@@ -285,7 +285,7 @@ def test_recovery_of_a_whole_bag_changes_no_message(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("qos", "told"),
+    ("qos", "reported"),
     [
         ("[" * 50_000, "nested too deeply"),
         ("[1", "expected ','"),
@@ -293,7 +293,7 @@ def test_recovery_of_a_whole_bag_changes_no_message(tmp_path):
         ("5", "it is no list"),
     ],
 )
-def test_recovery_tells_of_a_quality_of_service_that_cannot_be_read(tmp_path, qos, told):
+def test_recovery_states_of_a_quality_of_service_that_cannot_be_read(tmp_path, qos, reported):
     path = tmp_path / "bag" / "bag_0.mcap"
     path.parent.mkdir()
     with path.open("wb") as stream:
@@ -305,7 +305,7 @@ def test_recovery_tells_of_a_quality_of_service_that_cannot_be_read(tmp_path, qo
         writer.finish()
     (damage,) = recover(tmp_path / "bag")
     assert damage.startswith(f"{path}: the QoS of /words cannot be read: ")
-    assert told in damage
+    assert reported in damage
     with Reader(tmp_path / "bag") as reader:
         assert reader.message_count == 1
 
@@ -321,6 +321,6 @@ def test_recovery_tells_of_a_quality_of_service_that_cannot_be_read(tmp_path, qo
         "- 1",
     ],
 )
-def test_metadata_that_cannot_be_read_tells_nothing(tmp_path, text):
+def test_metadata_that_cannot_be_read_states_nothing(tmp_path, text):
     (tmp_path / "metadata.yaml").write_text(text)
     assert read_information(tmp_path) == {}

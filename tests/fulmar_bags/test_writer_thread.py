@@ -81,9 +81,9 @@ def test_a_disk_that_stands_still_holds_nobody_up_and_loses_nothing(disk, tmp_pa
     assert words_by_rosbags(tmp_path / "bag") == [f"word {number}" for number in range(1001)]
 
 
-def test_what_finds_no_room_in_memory_is_dropped_counted_by_topic_and_told_once(disk):
-    told = []
-    thread = BagThread(disk, on_error=told.append, max_waiting=100 * len(word("word 10")))
+def test_what_finds_no_room_in_memory_is_dropped_counted_by_topic_and_reported_once(disk):
+    reported = []
+    thread = BagThread(disk, on_error=reported.append, max_waiting=100 * len(word("word 10")))
     disk.moves.clear()
     assert disk.waited_for.wait(20.0)
     offer(thread, 1000, first=10)
@@ -91,13 +91,13 @@ def test_what_finds_no_room_in_memory_is_dropped_counted_by_topic_and_told_once(
     account = thread.stop()
     assert account.dropped == {TOPIC: account.received - account.recorded}
     assert 850 < account.dropped[TOPIC] < 950
-    assert len(told) == 1
-    assert "further messages are dropped" in told[0]
+    assert len(reported) == 1
+    assert "further messages are dropped" in reported[0]
 
 
 def test_a_full_disk_is_declared_and_what_waited_is_written_when_there_is_room(disk, tmp_path):
-    told = []
-    thread = BagThread(disk, on_error=told.append)
+    reported = []
+    thread = BagThread(disk, on_error=reported.append)
     disk.full = True
     offer(thread, 100)
     wait_until(lambda: thread.account().problem)
@@ -106,20 +106,20 @@ def test_a_full_disk_is_declared_and_what_waited_is_written_when_there_is_room(d
     wait_until(lambda: thread.account().recorded == 100)
     wait_until(lambda: not thread.account().problem)
     assert thread.stop().lost == 0
-    assert len(told) == 1
-    assert "Make room" in told[0]
+    assert len(reported) == 1
+    assert "Make room" in reported[0]
     assert words_by_mcap(tmp_path / "bag") == [f"word {number}" for number in range(100)]
 
 
-def test_the_bag_tells_what_became_of_every_message(disk, tmp_path):
+def test_the_bag_states_what_became_of_every_message(disk, tmp_path):
     thread = BagThread(disk, on_error=lambda _: None, max_waiting=100)
     disk.moves.clear()
     assert disk.waited_for.wait(20.0)
     offer(thread, 50)
     disk.moves.set()
     account = thread.stop()
-    told = yaml.safe_load((tmp_path / "bag" / "metadata.yaml").read_text())
-    recording = json.loads(told["rosbag2_bagfile_information"]["custom_data"]["fulmar_recording"])
+    reported = yaml.safe_load((tmp_path / "bag" / "metadata.yaml").read_text())
+    recording = json.loads(reported["rosbag2_bagfile_information"]["custom_data"]["fulmar_recording"])
     assert recording == {"complete": True, "received": 50, "dropped": account.dropped}
 
 
@@ -139,8 +139,8 @@ def test_on_a_disk_of_256_kb_the_bag_stays_readable_and_goes_on_when_there_is_ro
     try:
         bag = BagWriter(disk / "bag", run_info=INFO)
         bag.add_topic(TOPIC, TYPE, "stream")
-        told = []
-        thread = BagThread(bag, on_error=told.append)
+        reported = []
+        thread = BagThread(bag, on_error=reported.append)
         ballast = disk / "ballast"
         thread.put(TOPIC, word("word 0"), START_NS)
         wait_until(lambda: thread.account().recorded == 1)
@@ -154,6 +154,6 @@ def test_on_a_disk_of_256_kb_the_bag_stays_readable_and_goes_on_when_there_is_ro
         account = thread.stop()
         assert account.lost == 0
         assert len(words_by_rosbags(disk / "bag")) == 101
-        assert any("the disk is full" in line for line in told)
+        assert any("the disk is full" in line for line in reported)
     finally:
         subprocess.run(["umount", "--lazy", str(disk)], check=True)

@@ -43,7 +43,7 @@ def test_the_mean_of_thirty_poses_is_a_thirtieth_too_fast_as_published():
     assert mean.motion()[0] == pytest.approx(0.2 * 30 / 29)
 
 
-def test_the_mean_tells_nothing_before_its_buffer_is_full():
+def test_the_mean_states_nothing_before_its_buffer_is_full():
     reported = estimate_by_mean(steady_drive(2.0), 8, 0.0)
     assert np.isnan(reported[8 * 28]).all()
     assert np.isfinite(reported[8 * 30]).all()

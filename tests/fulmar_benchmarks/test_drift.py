@@ -41,15 +41,15 @@ def folder(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def judged(folder):
+def evaluated(folder):
     result = run(FEW, "--output", str(folder), "--json")
     assert result.exit_code == 0, result.output
     return result
 
 
 @pytest.fixture(scope="module")
-def document(judged):
-    return json.loads(judged.stdout)
+def document(evaluated):
+    return json.loads(evaluated.stdout)
 
 
 def test_the_document_has_rows_of_controllers_of_figures(document, folder):
@@ -112,12 +112,12 @@ def test_the_report_stands_alone_and_its_plots_are_small(document, folder):
     assert not re.search(r'@import|url\((?!#)|src="http|href="http', text)
     for words in ("Go to pose under disturbances", "2 thrusters lost", "bound", "Square", "0–20 %"):
         assert words in text
-    pictures = {path.stem: path for path in (folder / "pictures").iterdir()}
-    assert set(pictures) == {"at_a_glance", "over_time", "conditions_over_time", "starts", "paths"}
-    for path in pictures.values():
+    plots = {path.stem: path for path in (folder / "pictures").iterdir()}  # word: folder of reports
+    assert set(plots) == {"at_a_glance", "over_time", "conditions_over_time", "starts", "paths"}
+    for path in plots.values():
         assert path.read_bytes().startswith(b"\x89PNG")
         assert path.stat().st_size < 500_000
-    assert text.count("<svg") == len(pictures)
+    assert text.count("<svg") == len(plots)
 
 
 def test_drops_are_shares_of_the_ideal_figure_whichever_way_is_better():

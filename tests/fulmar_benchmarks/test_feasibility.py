@@ -56,7 +56,7 @@ def test_of_two_lost_valves_those_that_leave_a_direction_or_a_way_to_turn_are_th
     assert (0, 4) in able
 
 
-def test_what_strands_a_robot_is_what_it_cannot_hold_a_pose_without():
+def test_a_robot_is_uncontrollable_without_what_it_cannot_hold_a_pose_without():
     assert set(uncontrollable_losses(PLATFORM, 2)) == {pair for pair in PAIRS if not can_hold(PLATFORM, pair)}
     assert uncontrollable_losses(PLATFORM, 1) == ()
     assert uncontrollable_losses(load_robot("turtlebot2"), 1) == ()

@@ -132,12 +132,12 @@ def test_the_page_shows_every_pair_and_every_task(written):
 def test_every_plot_has_a_caption_and_a_file_below_half_a_megabyte(written):
     text = written.read_text()
     page = Page(text)
-    pictures = sorted((written.parent / "pictures").glob("*.png"))
-    assert len(pictures) == page.tags.count("svg") == 1 + 5 * len(TASKS)
-    assert text.count('</figure><p class="faint">') == len(pictures)
-    for picture in pictures:
-        assert picture.read_bytes().startswith(b"\x89PNG")
-        assert picture.stat().st_size < 500_000
+    plots = sorted((written.parent / "pictures").glob("*.png"))  # word: folder of reports
+    assert len(plots) == page.tags.count("svg") == 1 + 5 * len(TASKS)
+    assert text.count('</figure><p class="faint">') == len(plots)
+    for plot in plots:
+        assert plot.read_bytes().startswith(b"\x89PNG")
+        assert plot.stat().st_size < 500_000
 
 
 def test_a_page_says_what_every_figure_means(written):
@@ -154,7 +154,7 @@ def test_a_task_that_nobody_did_has_no_plots(findings, tmp_path):
     document = document_of(entries, episodes={"batch": 1}, seed=1, scenario="nominal", command="", wall_s=0.1)
     page = write_report(CampaignResult(document, [pair], {pair: {}}), tmp_path)
     assert "no policy is shipped" in page.read_text()
-    assert len(list((tmp_path / "pictures").iterdir())) == 1
+    assert len(list((tmp_path / "pictures").iterdir())) == 1  # word: folder of reports
 
 
 @pytest.mark.parametrize("plot", ["draw_waypoint_paths", "draw_scenes_with_obstacles"])

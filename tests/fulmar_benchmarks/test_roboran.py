@@ -26,13 +26,13 @@ def folder(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def judged(folder):
+def evaluated(folder):
     return run(f"{FEW} --controllers policy,classical", "--out", str(folder), "--json")
 
 
-def test_the_document_is_one_json_object_with_an_entry_for_each_pair(judged, folder):
-    assert judged.exit_code == 0, judged.output
-    document = json.loads(judged.stdout)
+def test_the_document_is_one_json_object_with_an_entry_for_each_pair(evaluated, folder):
+    assert evaluated.exit_code == 0, evaluated.output
+    document = json.loads(evaluated.stdout)
     assert json.loads((folder / "roboran.json").read_text()) == document
     assert (document["benchmark"], document["format"], document["episodes"]) == ("roboran", 1, {"batch": 3})
     policy, classical = document["pairs"]
@@ -43,29 +43,29 @@ def test_the_document_is_one_json_object_with_an_entry_for_each_pair(judged, fol
         assert entry["same_at_64_worlds"] is True
         assert entry["thesis"]["success"] == 0.99
         assert set(entry["ways"]["batch"]["time_to_target_s"]) == {"mean", "median", "p95"}
-    assert {verdict["name"] for verdict in policy["verdicts"]} >= {"batch", "mujoco", "batch_minus_mujoco"}
+    assert {result["name"] for result in policy["verdicts"]} >= {"batch", "mujoco", "batch_minus_mujoco"}
     assert classical["verdicts"] == [], "nothing is asked of it"
     assert document["open"] == 1, "MuJoCo was left out"
 
 
-def test_every_key_is_written_down(judged):
+def test_every_key_is_written_down(evaluated):
     text = (Path(__file__).parents[2] / "docs" / "evaluation.md").read_text()
-    document = json.loads(judged.stdout)
+    document = json.loads(evaluated.stdout)
     keys = {*document, *document["pairs"][0], *document["pairs"][0]["verdicts"][0]}
     assert [key for key in sorted(keys) if f"`{key}`" not in text] == []
 
 
-def test_what_was_evaluated_before_is_taken_from_the_folder(judged, folder):
+def test_what_was_evaluated_before_is_taken_from_the_folder(evaluated, folder):
     again = run(f"{FEW} --controllers policy,classical", "--out", str(folder), "--json")
     timing = {"wall_s", "command"}
-    first, second = json.loads(judged.stdout), json.loads(again.stdout)
+    first, second = json.loads(evaluated.stdout), json.loads(again.stdout)
     assert {k: v for k, v in first.items() if k not in timing} == {
         k: v for k, v in second.items() if k not in timing
     }
     assert again.stderr.count("evaluated before") == 2
 
 
-def test_people_get_tables_with_what_is_missing_and_a_result(judged, folder, tmp_path):
+def test_people_get_tables_with_what_is_missing_and_a_result(evaluated, folder, tmp_path):
     result = run(f"{FEW} --policies {tmp_path} --controllers policy,classical", "--out", str(folder))
     assert result.exit_code == 0, result.output
     assert "Go to pose, floating platform: missing: no policy is shipped" in result.stdout
@@ -74,7 +74,7 @@ def test_people_get_tables_with_what_is_missing_and_a_result(judged, folder, tmp
     assert "0 of 1 pairs meet every requirement" in result.stdout
 
 
-def test_a_check_that_cannot_be_met_ends_with_one(judged, folder):
+def test_a_check_that_cannot_be_met_ends_with_one(evaluated, folder):
     assert run(f"{FEW} --check", "--out", str(folder)).exit_code == 1
 
 

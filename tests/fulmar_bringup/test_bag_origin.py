@@ -104,7 +104,7 @@ def test_run_information_is_the_plan_and_what_else_is_known():
     assert "supervised" not in info
 
 
-def test_the_recorder_is_told_what_differs_from_its_own_defaults():
+def test_the_recorder_is_reported_what_differs_from_its_own_defaults():
     plan = RunPlan(
         "floating_platform",
         "go_to_pose",

@@ -253,7 +253,7 @@ def test_on_hardware_whoever_sees_a_thing_publishes_it_and_of_an_emulated_device
         system_rows(replace(plan, emulated=True), wires_folder=tmp_path)
 
 
-def test_a_recorder_is_told_the_things_of_the_task():
+def test_a_recorder_is_reported_the_things_of_the_task():
     push = replace(PLAN, robot="turtlebot2", task="push_block")
     assert recorder_spec(push).parameters["things"] == ["block"]
     assert "things" not in recorder_spec(PLAN).parameters

@@ -333,7 +333,7 @@ def test_a_fallback_that_has_nothing_for_the_robot_is_refused(plan):
 
 
 @pytest.mark.parametrize(
-    ("robot", "goals", "told"),
+    ("robot", "goals", "reported"),
     [
         (
             "kingfisher",
@@ -352,11 +352,11 @@ def test_a_fallback_that_has_nothing_for_the_robot_is_refused(plan):
         ),
     ],
 )
-def test_velocities_that_no_controller_can_keep_are_refused(plan, tmp_path, robot, goals, told):
+def test_velocities_that_no_controller_can_keep_are_refused(plan, tmp_path, robot, goals, reported):
     path = tmp_path / "mine.yaml"
     path.write_text(f"kind: {'path' if 'path' in goals else 'velocities'}\ntitle: too much\n{goals}\n")
     asked = {"robot": robot, "task": "track_velocities", "controller": "classical", "control_hz": 10.0}
-    with pytest.raises(ConfigError, match=told):
+    with pytest.raises(ConfigError, match=reported):
         plan(**asked, goals=str(path))
 
 

@@ -12,23 +12,23 @@ from fulmar_bringup.supervisor import Report
 from fulmar_core.errors import RunFailed
 
 
-def test_a_node_that_is_not_heard_any_more_is_told_apart_from_one_that_never_was(monkeypatch):
+def test_a_node_that_is_not_received_any_more_is_reported_apart_from_one_that_never_was(monkeypatch):
     monkeypatch.setattr(readiness, "START_TIMEOUT_S", -1.0)
-    heard = Report(message="no goal yet", received_s=time.monotonic() - 12.0)
-    overseer = SimpleNamespace(plant=Report(), controller=heard)
+    received = Report(message="no goal yet", received_s=time.monotonic() - 12.0)
+    overseer = SimpleNamespace(plant=Report(), controller=received)
     group = SimpleNamespace(ended=lambda: None)
-    told = r"the plant said: nothing; the controller said: no goal yet, 12\.\d s ago\)"
-    with pytest.raises(RunFailed, match=told):
+    reported = r"the plant said: nothing; the controller said: no goal yet, 12\.\d s ago\)"
+    with pytest.raises(RunFailed, match=reported):
         readiness.while_starting(group, overseer)()
 
 
 def test_a_controller_that_refused_the_goal_says_why(monkeypatch):
     monkeypatch.setattr(readiness, "START_TIMEOUT_S", -1.0)
-    heard = Report(
+    received = Report(
         message="no goal yet", values={"goal_refused": "e-stop: pressed"}, received_s=time.monotonic()
     )
-    overseer = SimpleNamespace(plant=Report(), controller=heard)
+    overseer = SimpleNamespace(plant=Report(), controller=received)
     group = SimpleNamespace(ended=lambda: None)
-    told = r"the controller said: no goal yet \(it refused the goal: e-stop: pressed\), 0\.\d s ago"
-    with pytest.raises(RunFailed, match=told):
+    reported = r"the controller said: no goal yet \(it refused the goal: e-stop: pressed\), 0\.\d s ago"
+    with pytest.raises(RunFailed, match=reported):
         readiness.while_starting(group, overseer)()

@@ -79,13 +79,13 @@ def test_flipped_bits_end_in_figures_or_in_one_clear_line(tmp_path_factory, seed
 
 
 @pytest.mark.parametrize(
-    ("content", "told"),
+    ("content", "reported"),
     [(b"", "the file is empty"), (b"not a bag at all", "no MCAP file"), (b"\x89MCAP", "no MCAP file")],
 )
-def test_an_empty_file_and_one_of_another_kind_are_refused(tmp_path, content, told):
+def test_an_empty_file_and_one_of_another_kind_are_refused(tmp_path, content, reported):
     file = tmp_path / "bag_0.mcap"
     file.write_bytes(content)
-    with pytest.raises(BagError, match=told) as refused:
+    with pytest.raises(BagError, match=reported) as refused:
         open_bag(tmp_path)
     assert str(file) in str(refused.value)
     assert "Give a bag folder" not in str(refused.value)
@@ -120,17 +120,17 @@ def test_bytes_that_are_not_what_the_schema_says_are_counted_and_left_out(tmp_pa
     for index, data in enumerate(odometry.data):
         bag.write(odometry.name, data if index % 2 else garbage, log_ns=odometry.log_ns[index])
     bag.close()
-    told = (
+    reported = (
         f"{(len(odometry) + 1) // 2} of {len(odometry)} messages of {odometry.name} are no {odometry.type}."
     )
     found = answer("info", tmp_path / "bag")
-    assert found["damage"] == [told]
+    assert found["damage"] == [reported]
     assert found["topics"][0]["rate_hz"] == pytest.approx(2.5)
     assert ask("info", tmp_path / "bag").exit_code == 1
-    assert told in ask("plot", tmp_path / "bag", "--out", tmp_path / "p.png").stderr
+    assert reported in ask("plot", tmp_path / "bag", "--out", tmp_path / "p.png").stderr
 
 
-def test_where_no_message_is_what_the_schema_says_the_reason_is_told(tmp_path):
+def test_where_no_message_is_what_the_schema_says_the_reason_is_reported(tmp_path):
     bag = BagWriter(tmp_path / "bag", run_info={"robot": "floating_platform", "task": "go_to_pose"})
     bag.add_topic("/floating_platform/odom", ODOMETRY.type, "stream")
     for index in range(20):
@@ -179,7 +179,7 @@ def test_a_flipped_bit_in_the_run_record_is_named(tmp_path):
     assert "metadata.yaml differ" in line
 
 
-def test_records_that_are_nested_too_deeply_tell_nothing(tmp_path):
+def test_records_that_are_nested_too_deeply_state_nothing(tmp_path):
     BagWriter(tmp_path / "bag", run_info={"robot": "floating_platform"}).close()
     path = tmp_path / "bag" / "metadata.yaml"
     document = yaml.safe_load(path.read_text())
@@ -192,7 +192,7 @@ def test_records_that_are_nested_too_deeply_tell_nothing(tmp_path):
     assert bag.info["robot"] == "floating_platform"  # the file itself has it too
 
 
-def test_a_torn_bag_is_recovered_with_all_that_is_told_about_it(tmp_path):
+def test_a_torn_bag_is_recovered_with_all_that_is_reported_about_it(tmp_path):
     bag = BagWriter(tmp_path / "bag", run_info={"robot": "floating_platform"})
     bag.add_topic("/words", "std_msgs/msg/String", "stream")
     data = bytes(
@@ -230,7 +230,7 @@ def test_a_missing_file_of_a_split_bag_is_named(tmp_path):
     assert ask("info", tmp_path / "bag").exit_code == 1
 
 
-def test_a_damaged_sqlite3_bag_is_told_in_one_line(tmp_path):
+def test_a_damaged_sqlite3_bag_is_reported_in_one_line(tmp_path):
     bag = write_foreign(tmp_path / "bag", StoragePlugin.SQLITE3)
     file = next(bag.glob("*.db3"))
     whole = file.read_bytes()

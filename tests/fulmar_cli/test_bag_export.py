@@ -132,9 +132,9 @@ def test_a_vector_of_one_number_is_a_number_in_the_table():
 
 def test_a_bag_of_others_is_no_dataset_and_no_option_is_named_that_there_is_not(tmp_path):
     bag = write_foreign(tmp_path / "bag", StoragePlugin.MCAP, count=5)
-    told = str(export(bag, "--to", "lerobot", "--out", tmp_path / "set").exception)
-    assert "others recorded it" in told
-    assert "--robot" not in told
+    reported = str(export(bag, "--to", "lerobot", "--out", tmp_path / "set").exception)
+    assert "others recorded it" in reported
+    assert "--robot" not in reported
 
 
 def test_tables_hold_every_number(tmp_path):

@@ -17,7 +17,7 @@ from fulmar_core.topics import ODOMETRY
 from tests.fulmar_cli.bag_commands import POLICY, answer, ask
 
 
-def test_info_tells_what_the_recorder_dropped_and_which_packages_it_ran_with(tmp_path):
+def test_info_states_what_the_recorder_dropped_and_which_packages_it_ran_with(tmp_path):
     bag = BagWriter(
         tmp_path / "bag",
         run_info={"robot": "floating_platform"},
@@ -38,7 +38,7 @@ def test_info_tells_what_the_recorder_dropped_and_which_packages_it_ran_with(tmp
     assert "was not shut down in order" in ask("info", tmp_path / "bag").stdout
 
 
-def test_info_tells_counts_rates_and_where_a_bag_comes_from():
+def test_info_states_counts_rates_and_where_a_bag_comes_from():
     found = answer("info", POLICY)
     topics = {topic["name"]: topic for topic in found["topics"]}
     action = topics["/floating_platform/controller/action"]
@@ -84,13 +84,13 @@ def test_info_counts_gaps_late_and_dropped_messages(tmp_path):
     assert topic["delay_ms"]["max"] >= 400.0
 
 
-def test_a_bag_without_messages_is_told(tmp_path):
+def test_a_bag_without_messages_is_reported(tmp_path):
     BagWriter(tmp_path / "bag", run_info={"robot": "floating_platform"}).close()
     assert answer("info", tmp_path / "bag")["messages"] == 0
 
 
 @pytest.mark.parametrize("closed", [True, False], ids=["closed", "killed"])
-def test_info_tells_when_and_why_a_ring_was_written(tmp_path, closed):
+def test_info_states_when_and_why_a_ring_was_written(tmp_path, closed):
     bag = BagWriter(tmp_path / "bag", run_info={"robot": "floating_platform"})
     fault = {"time_ns": 1_700_000_000_000_000_000, "reason": "plant: the watchdog tripped"}
     bag.note(FAULTS, json.dumps([fault]))

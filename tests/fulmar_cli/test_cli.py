@@ -90,7 +90,7 @@ def test_the_same_evaluation_twice_gives_the_same_figures(fulmar):
     }
 
 
-def test_an_evaluation_for_people_is_a_table_with_a_verdict(fulmar):
+def test_an_evaluation_for_people_is_a_table_with_a_result(fulmar):
     code, out, _ = fulmar(*EVALUATE, "--episodes", "2")
     assert code == 0
     assert "success 1.000 of 2 episodes" in out
@@ -101,10 +101,10 @@ def test_a_passport_is_shown_as_it_is(fulmar):
     code, out, err = fulmar("bundle", "show", SHIPPED, "--json")
     assert (code, err) == (0, "")
     assert json.loads(out) == json.loads((Path(SHIPPED) / "passport.json").read_text())
-    told = fulmar("bundle", "show", SHIPPED)[1]
-    assert "control_hz" in told
-    assert re.search(r"trained: success +0\.\d{3} to \d\.\d{3} in \d+ checks", told)
-    assert "{" not in told
+    reported = fulmar("bundle", "show", SHIPPED)[1]
+    assert "control_hz" in reported
+    assert re.search(r"trained: success +0\.\d{3} to \d\.\d{3} in \d+ checks", reported)
+    assert "{" not in reported
 
 
 def test_the_shipped_bundle_is_accepted(fulmar):

@@ -13,16 +13,16 @@ from tests.fulmar_cli.command_line import EVALUATE, SHIPPED
 
 
 @pytest.mark.parametrize(
-    ("number", "told"), [(signal.SIGTERM, "stopped by SIGTERM"), (signal.SIGINT, "stopped by the user")]
+    ("number", "reported"), [(signal.SIGTERM, "stopped by SIGTERM"), (signal.SIGINT, "stopped by the user")]
 )
-def test_a_command_that_is_told_to_stop_says_so_and_ends_with_1(fulmar, monkeypatch, number, told):
+def test_a_command_that_is_reported_to_stop_says_so_and_ends_with_1(fulmar, monkeypatch, number, reported):
     monkeypatch.setattr("fulmar_evaluation.evaluation.batches", lambda *_a, **_k: signal.raise_signal(number))
     before = signal.getsignal(signal.SIGTERM)
     try:
         code, out, err = fulmar(*EVALUATE)
     finally:
         signal.signal(signal.SIGTERM, before)
-    assert (code, out, err) == (1, "", f"fulmar: {told}\n")
+    assert (code, out, err) == (1, "", f"fulmar: {reported}\n")
 
 
 def test_a_place_that_cannot_be_written_is_a_failure_in_one_line(fulmar, tmp_path):

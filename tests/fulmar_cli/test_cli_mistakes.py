@@ -25,7 +25,7 @@ def broken_configs(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "reported"),
     [
         (["lst"], "No such command 'lst'. Did you mean 'list'?"),
         (["bundle", "shov", "x"], "No such command 'shov'. Did you mean 'show'?"),
@@ -128,11 +128,11 @@ def broken_configs(tmp_path, monkeypatch):
     ],
     ids=lambda value: " ".join(value)[-45:] if isinstance(value, list) else "",
 )  # fmt: skip
-def test_a_mistake_gets_one_line_and_exit_code_2(fulmar, words, told, tmp_path, monkeypatch):
+def test_a_mistake_gets_one_line_and_exit_code_2(fulmar, words, reported, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     if words[0] in ("train", "export"):
         pytest.importorskip("stable_baselines3")
-    assert told in complaint(fulmar(*words))
+    assert reported in complaint(fulmar(*words))
     assert list(tmp_path.iterdir()) == []
 
 
@@ -147,7 +147,7 @@ def test_export_overwrites_no_bundle_without_force(fulmar, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("file", "text", "told"),
+    ("file", "text", "reported"),
     [
         ("robots/floating_platform.yaml", "name: [", "robots/floating_platform.yaml:1: not valid YAML"),
         ("robots/floating_platform.yaml", "", "robots/floating_platform.yaml:1: the file is empty"),
@@ -169,9 +169,9 @@ def test_export_overwrites_no_bundle_without_force(fulmar, tmp_path):
         ("scenarios/nominal.yaml", "title: 3\n", "scenarios/nominal.yaml:1: 'title' = 3 must be text"),
     ],
 )
-def test_a_broken_file_is_told_with_its_line(fulmar, broken_configs, file, text, told):
+def test_a_broken_file_is_reported_with_its_line(fulmar, broken_configs, file, text, reported):
     (broken_configs / file).write_text(text)
-    assert told in complaint(fulmar(*EVALUATE, "--episodes", "1"))
+    assert reported in complaint(fulmar(*EVALUATE, "--episodes", "1"))
 
 
 def test_the_list_shows_the_good_files_and_a_line_for_each_broken_one(fulmar, broken_configs):
@@ -232,13 +232,13 @@ def test_a_robot_of_one_s_own_is_one_file_beside_those_that_come_with_fulmar(ful
     assert "or use --controller classical." in complaint(fulmar(*words))
 
 
-def test_a_configuration_folder_that_is_none_is_told(fulmar, tmp_path, monkeypatch):
+def test_a_configuration_folder_that_is_none_is_reported(fulmar, tmp_path, monkeypatch):
     monkeypatch.setenv("FULMAR_CONFIGS", str(tmp_path))
     assert "Set FULMAR_CONFIGS" in complaint(fulmar("list"))
 
 
 @pytest.mark.parametrize("name", ["policy.onnx", "golden.npz", "passport.json"])
-def test_a_damaged_bundle_is_told(fulmar, tmp_path, name):
+def test_a_damaged_bundle_is_reported(fulmar, tmp_path, name):
     folder = shutil.copytree(SHIPPED, tmp_path / "bundle")
     (folder / name).write_bytes(b"broken")
     line = complaint(fulmar("evaluate", "floating_platform", "go_to_pose", "--policy", str(folder)))
@@ -275,8 +275,8 @@ def test_a_part_that_is_not_installed_is_named_with_its_extra(module, extra, wor
         [sys.executable, "-c", program],
         capture_output=True, text=True, timeout=60, check=False, cwd=tmp_path,
     )  # fmt: skip
-    told = complaint((done.returncode, done.stdout, done.stderr))
-    assert f"needs '{module}', which the extra '{extra}' brings" in told
+    reported = complaint((done.returncode, done.stdout, done.stderr))
+    assert f"needs '{module}', which the extra '{extra}' brings" in reported
     assert list(tmp_path.iterdir()) == []
 
 

@@ -19,8 +19,8 @@ import pytest
 
 from fulmar_bringup import robot_operator
 from fulmar_cli.diagnosis import checks
+from fulmar_cli.diagnosis.check_result import Finding
 from fulmar_cli.diagnosis.devices import check_permissions, devices_of
-from fulmar_cli.diagnosis.finding import Finding
 from fulmar_cli.diagnosis.installation import check_python
 from fulmar_cli.diagnosis.machine import (
     check_clock,

@@ -21,9 +21,9 @@ def call(name=None, robot=None, as_path=False, pose=None):
 
 def test_without_a_name_every_file_is_listed_with_its_title(capsys):
     call()
-    told = capsys.readouterr().out
+    reported = capsys.readouterr().out
     for name in config_names("goals"):
-        assert name in told and load_goals(name).title in told
+        assert name in reported and load_goals(name).title in reported
 
 
 def test_goals_are_somebody_s():

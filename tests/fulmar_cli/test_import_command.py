@@ -33,7 +33,7 @@ def test_an_import_for_a_platform_names_the_nozzles_that_its_actions_open(fulmar
 
 
 @pytest.mark.parametrize(
-    ("more", "told"),
+    ("more", "reported"),
     [
         ((), "Give --activation, one of elu"),
         (("--activation", "elu", "--hz", "7"), "control_hz = 7 must divide the physics rate"),
@@ -42,7 +42,7 @@ def test_an_import_for_a_platform_names_the_nozzles_that_its_actions_open(fulmar
         (("--format", "onnx"), "is no ONNX model"),
     ],
 )
-def test_a_mistake_of_an_import_gets_one_line_and_no_bundle(fulmar, more, told, tmp_path):
+def test_a_mistake_of_an_import_gets_one_line_and_no_bundle(fulmar, more, reported, tmp_path):
     path = foreign.save_skrl(tmp_path / "agent.pt", foreign.network(8, 2))
-    assert told in complaint(fulmar("import", path, *ASKED, tmp_path / "out", *more))
+    assert reported in complaint(fulmar("import", path, *ASKED, tmp_path / "out", *more))
     assert not (tmp_path / "out").exists()

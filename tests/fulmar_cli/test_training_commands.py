@@ -1,4 +1,4 @@
-"""`fulmar train`, `fulmar policies` and `fulmar benchmark training`: what is asked for, and what is told."""
+"""`fulmar train`, `fulmar policies` and `fulmar benchmark training`: what is asked for, and what is reported."""
 
 from __future__ import annotations
 
@@ -64,25 +64,27 @@ def call(command, *words):
 
 
 def test_a_campaign_is_one_job_for_each_seed_and_the_best_is_named(asked, tmp_path):
-    code, told = call(train, *PLATFORM, "--seeds", 2, "--seed", 3, "--out", tmp_path / "c", "--updates", 7)
+    code, reported = call(
+        train, *PLATFORM, "--seeds", 2, "--seed", 3, "--out", tmp_path / "c", "--updates", 7
+    )
     assert code == 0
     assert [(job.seed, job.updates, job.episodes) for job in asked] == [(3, 7, 256), (4, 7, 256)]
     assert [job.out.name for job in asked] == ["seed_3", "seed_4"]
-    assert "best: seed 4" in told
-    assert f"fulmar export {tmp_path / 'c' / 'seed_4'}".replace(" ", "") in "".join(told.split())
+    assert "best: seed 4" in reported
+    assert f"fulmar export {tmp_path / 'c' / 'seed_4'}".replace(" ", "") in "".join(reported.split())
 
 
-def test_a_seed_that_fails_is_told_and_the_command_fails(asked, tmp_path):
-    code, told = call(train, *PLATFORM, "--seeds", 3, "--out", tmp_path / "c")
+def test_a_seed_that_fails_is_reported_and_the_command_fails(asked, tmp_path):
+    code, reported = call(train, *PLATFORM, "--seeds", 3, "--out", tmp_path / "c")
     assert code == 1
-    assert "2  failed: no memory left" in told
-    code, told = call(train, *PLATFORM, "--seeds", 2, "--out", tmp_path / "d", "--json")
+    assert "2  failed: no memory left" in reported
+    code, reported = call(train, *PLATFORM, "--seeds", 2, "--out", tmp_path / "d", "--json")
     assert code == 1
-    assert json.loads(told)["failed"] == 1
+    assert json.loads(reported)["failed"] == 1
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "reported"),
     [
         ((), "ROBOT and TASK are needed, or --resume RUN"),
         (("floating_platform",), "ROBOT and TASK are needed"),
@@ -98,8 +100,8 @@ def test_a_seed_that_fails_is_told_and_the_command_fails(asked, tmp_path):
         ((*PLATFORM, "--seeds", 3, "--seed", 2025), "seed 2026 must not be negative, nor"),
     ],
 )
-def test_what_cannot_be_trained_is_told(words, told):
-    with pytest.raises(ConfigError, match=told):
+def test_what_cannot_be_trained_is_reported(words, reported):
+    with pytest.raises(ConfigError, match=reported):
         call(train, *words)
 
 
@@ -121,14 +123,14 @@ def learned(monkeypatch):
 
 def test_where_a_run_lies_is_said_once_when_it_begins(capsys, tmp_path):
     bar = LearningBar(tmp_path / "run")
-    for _ in ("the specialist", "the rest"):
+    for _ in ("the fallback", "the rest"):
         bar.begin()
         bar.end()
     assert capsys.readouterr().err.count(f"run folder: {tmp_path / 'run'}\n") == 1
 
 
 @pytest.mark.parametrize(
-    ("left", "told"),
+    ("left", "reported"),
     [
         ((), set()),
         (("checkpoint.pkl",), {"--resume"}),
@@ -136,7 +138,7 @@ def test_where_a_run_lies_is_said_once_when_it_begins(capsys, tmp_path):
     ],
     ids=["at once", "before anything was checked", "in order"],
 )
-def test_a_run_that_is_broken_off_says_how_to_go_on_with_it(monkeypatch, tmp_path, left, told):
+def test_a_run_that_is_broken_off_says_how_to_go_on_with_it(monkeypatch, tmp_path, left, reported):
     run, said = tmp_path / "run", io.StringIO()
 
     def broken_off(job, watcher):
@@ -148,16 +150,16 @@ def test_a_run_that_is_broken_off_says_how_to_go_on_with_it(monkeypatch, tmp_pat
     monkeypatch.setattr("fulmar_bringup.console.console", Console(file=said, width=500))
     assert call(train, *PLATFORM, "--out", run)[0] != 0
     offers = {"--resume": f"fulmar train --resume {run}", "export": f"fulmar export {run} --out"}
-    assert {word for word, offer in offers.items() if offer in said.getvalue()} == told
+    assert {word for word, offer in offers.items() if offer in said.getvalue()} == reported
 
 
-def test_a_single_run_is_learned_here_and_judged(learned, tmp_path):
+def test_a_single_run_is_learned_here_and_evaluated(learned, tmp_path):
     words = (*PLATFORM, "--time-limit", 30, "--stop-at-success", 0.99, "--out", tmp_path / "run")
-    code, told = call(train, *words, "--episodes", 16)
+    code, reported = call(train, *words, "--episodes", 16)
     assert code == 0
     (job,) = learned
     assert (job.time_limit_s, job.settings.stop_at_success) == (30.0, StopAtSuccess(0.99))
-    assert "success 0.875 of 16 episodes in MuJoCo" in told
+    assert "success 0.875 of 16 episodes in MuJoCo" in reported
 
 
 @pytest.mark.parametrize(
@@ -260,30 +262,30 @@ def passports(monkeypatch):
     """Every bundle says that it succeeded in 0.96 of its episodes."""
     from types import SimpleNamespace
 
-    told = SimpleNamespace(
+    reported = SimpleNamespace(
         training={"mujoco": {"success_rate": 0.96}, "wall_s": 2.0, "steps": 1000, "recipe": ""}
     )
-    monkeypatch.setattr("training.policies.read_passport", lambda folder: told)
+    monkeypatch.setattr("training.policies.read_passport", lambda folder: reported)
 
 
-def test_policies_that_reach_less_than_they_have_to_are_told_and_the_command_fails(
+def test_policies_that_reach_less_than_they_have_to_are_reported_and_the_command_fails(
     asked, passports, tmp_path
 ):
-    code, told = call(policies, "turtlebot2_go_to_position", "kingfisher_go_to_pose", "--out", tmp_path)
+    code, reported = call(policies, "turtlebot2_go_to_position", "kingfisher_go_to_pose", "--out", tmp_path)
     assert code == 1
     assert {job.bundle for job in asked} == {
         tmp_path / "kingfisher_go_to_pose",
         tmp_path / "turtlebot2_go_to_position",
     }
-    lines = sorted(told.splitlines()[1:3])
+    lines = sorted(reported.splitlines()[1:3])
     assert lines[0].split() == ["kingfisher_go_to_pose", "0.960", "0.90"]
     assert lines[1].split() == ["turtlebot2_go_to_position", "0.960", "0.99", "too", "low"]
 
 
-def test_policies_can_be_made_one_by_one_and_told_as_json(asked, passports, tmp_path):
-    code, told = call(policies, "kingfisher_go_to_pose", "--out", tmp_path, "--json")
+def test_policies_can_be_made_one_by_one_and_reported_as_json(asked, passports, tmp_path):
+    code, reported = call(policies, "kingfisher_go_to_pose", "--out", tmp_path, "--json")
     assert code == 0
-    (line,) = json.loads(told)["policies"]
+    (line,) = json.loads(reported)["policies"]
     assert (line["policy"], line["made"], line["good"]) == ("kingfisher_go_to_pose", True, True)
 
 
@@ -299,16 +301,16 @@ def test_anew_puts_the_asked_bundle_aside_and_leaves_the_others(asked, passports
     assert [folder.name for folder in bundles.iterdir()] == ["turtlebot2_go_to_pose"]
 
 
-def test_an_unknown_policy_is_told():
+def test_an_unknown_policy_is_reported():
     with pytest.raises(ConfigError, match="has no policy 'kingfisher_go_to_post'"):
         call(policies, "kingfisher_go_to_post")
 
 
 def test_the_comparison_with_stock_ppo_prints_both_and_fails_if_a_run_does(asked, tmp_path):
-    code, told = call(training, "--seeds", 1, "--seconds", 8, "--out", tmp_path)
+    code, reported = call(training, "--seeds", 1, "--seconds", 8, "--out", tmp_path)
     assert code == 0
-    assert "fast is 1.0 times as fast as stock" in told
-    assert told.count("0.950 – 0.950 – 0.950") == 4  # two kinds, two times
-    code, told = call(training, "--seeds", 2, "--seconds", 8, "--out", tmp_path / "again", "--json")
+    assert "fast is 1.0 times as fast as stock" in reported
+    assert reported.count("0.950 – 0.950 – 0.950") == 4  # two kinds, two times
+    code, reported = call(training, "--seeds", 2, "--seconds", 8, "--out", tmp_path / "again", "--json")
     assert code == 1
-    assert json.loads(told)["failed"] == ["stock 2: no memory left", "fast 2: no memory left"]
+    assert json.loads(reported)["failed"] == ["stock 2: no memory left", "fast 2: no memory left"]

@@ -199,7 +199,7 @@ def test_a_heading_gain_that_would_not_be_stable_is_refused():
         replace(gains, heading=-5.0)
 
 
-def test_docs_tell_of_every_law_and_of_every_task_that_one_does():
+def test_docs_state_of_every_law_and_of_every_task_that_one_does():
     text = (Path(__file__).parents[2] / "docs/controllers.md").read_text(encoding="utf-8")
     entries = {**LAWS, **{law: entry for law, (_, entry) in OTHERS.items()}}
     names = set(entries) | {entry.law.law for entry in entries.values()}

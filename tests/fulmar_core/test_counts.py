@@ -65,7 +65,7 @@ def test_the_memory_of_a_container_counts_where_it_is_less_than_that_of_the_mach
     assert free_memory(meminfo, tmp_path) == 4_096_000_000
 
 
-def test_a_system_that_does_not_tell_its_memory_sets_no_limit(tmp_path):
+def test_a_system_that_does_not_state_its_memory_sets_no_limit(tmp_path):
     assert free_memory(tmp_path / "none", tmp_path) == sys.maxsize
 
 

@@ -58,7 +58,7 @@ def test_every_kind_of_path_ships_in_a_file():
     assert {goals.path.kind for goals in shipped if isinstance(goals, FollowedPath)} == set(PATHS)
 
 
-def test_docs_tell_of_every_kind_of_goal_and_path_and_of_all_their_entries():
+def test_docs_state_of_every_kind_of_goal_and_path_and_of_all_their_entries():
     text = (Path(__file__).parents[2] / "docs/goals.md").read_text(encoding="utf-8")
     kinds = (Positions, Poses, HeldVelocity, FollowedPath, *PATHS.values())
     entries = {field.name for kind in kinds for field in fields(kind)} - {"title"}

@@ -178,7 +178,7 @@ def test_nothing_touches_at_the_start_and_distances_are_as_the_task_says(robot, 
         assert away.max() <= TASK.start_distance[1]
 
 
-def test_names_tell_what_is_in_the_columns():
+def test_names_state_what_is_in_the_columns():
     goal = goal_at((3.0, 1.0, 0.0)).among({"block": np.array([2.0, 1.0, 0.0])})
     state = PlanarState(*(np.asarray(v) for v in (2.0, 0.0, np.pi / 2, 0.0, 0.3, 0.1)))
     seen = {name: float(v) for name, v in zip(TASK.observation_names, TASK.observe(state, goal), strict=True)}

@@ -79,7 +79,7 @@ class Still(Habit):
 
 
 @pytest.mark.parametrize("through", ["batch", "backends"])
-def test_a_waypoint_is_reached_as_near_as_the_robot_can_tell(through):
+def test_a_waypoint_is_reached_as_near_as_the_robot_can_state(through):
     base, course = load_robot("turtlebot2"), load_task("go_through_positions")
     near = 2 * (course.reach + 0.02,)
     task = replace(course, start_distance=near, episode_s=0.3)
@@ -185,7 +185,7 @@ def test_episodes_go_alike_in_the_batch_and_one_by_one(robot, name):
     np.testing.assert_allclose(np.cos(batch.yaw - alone.yaw), 1.0, rtol=0, atol=1e-5)
 
 
-def test_judging_works_where_training_is_not_installed(monkeypatch):
+def test_evaluating_works_where_training_is_not_installed(monkeypatch):
     from fulmar_cli.main import app
 
     for name in [name for name in sys.modules if name.split(".")[0] == "training"]:

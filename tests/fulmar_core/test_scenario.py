@@ -28,6 +28,7 @@ from fulmar_core.holdability import uncontrollable_losses
 from fulmar_core.paths import config_names
 from fulmar_core.robot import load_robot
 
+TOGETHER = {"stranding": True}  # word: YAML key
 ROBOTS = {name: load_robot(name) for name in config_names("robots")}
 PLATFORM, BOAT = ROBOTS["floating_platform"], ROBOTS["kingfisher"]
 COUNT = 2000
@@ -90,9 +91,9 @@ ENTRIES = {
         {"actuation": Actuation(failures=1, failure_chance=0.9)},
         {"alive"},
     ),
-    "actuation.stranding": (
+    "actuation.stranding": (  # word: key of scenario files
         replace(STILL, actuation=Actuation(failures=2, failure_chance=0.1)),
-        {"actuation": Actuation(failures=2, failure_chance=1.0, stranding=True)},
+        {"actuation": Actuation(failures=2, failure_chance=1.0, **TOGETHER)},
         {"alive"},
     ),
     "sensing.noise": (SEEING, {"sensing": Sensing(noise=2.0)}, {"noise"}),
@@ -239,9 +240,9 @@ def test_no_more_actuators_fail_than_may_and_each_candidate_with_its_chance(most
         np.testing.assert_allclose(1.0 - alive.mean(axis=1), most * 0.5 / 8, atol=0.035)
 
 
-def test_what_strands_a_robot_fails_together_each_set_as_often_and_with_the_chance_of_one():
-    stranding = Actuation(failures=2, failure_chance=0.75, stranding=True)
-    alive = worlds(replace(STILL, actuation=stranding)).alive.T
+def test_losses_that_make_a_robot_uncontrollable_come_together_each_set_as_often_and_with_one_chance():
+    uncontrollable = Actuation(failures=2, failure_chance=0.75, **TOGETHER)
+    alive = worlds(replace(STILL, actuation=uncontrollable)).alive.T
     sets, counts = np.unique(alive, axis=0, return_counts=True)
     lost = {tuple(np.flatnonzero(row < 0.5)): count for row, count in zip(sets, counts, strict=True)}
     assert lost.pop(()) == pytest.approx(0.25 * COUNT, rel=0.15)
@@ -250,15 +251,15 @@ def test_what_strands_a_robot_fails_together_each_set_as_often_and_with_the_chan
         assert count == pytest.approx(0.75 * COUNT / len(lost), rel=0.35)
 
 
-def test_robots_that_nothing_strands_lose_whatever_may_fail():
+def test_robots_that_nothing_makes_uncontrollable_lose_whatever_may_fail():
     loses = Actuation(failures=1, failure_chance=1.0)
-    plain, asked = (replace(STILL, actuation=each) for each in (loses, replace(loses, stranding=True)))
+    plain, asked = (replace(STILL, actuation=each) for each in (loses, replace(loses, **TOGETHER)))
     np.testing.assert_array_equal(worlds(asked, BOAT).alive, worlds(plain, BOAT).alive)
 
 
-def test_to_be_stranded_something_has_to_fail():
+def test_to_be_uncontrollable_something_has_to_fail():
     with pytest.raises(ValueError, match="needs 'failures'"):
-        Actuation(stranding=True)
+        Actuation(**TOGETHER)
 
 
 def test_a_robot_with_fewer_actuators_than_may_fail_can_lose_all():
@@ -346,7 +347,7 @@ def test_an_unknown_scenario_gets_the_nearest_name():
         load_scenario("nominall")
 
 
-def test_docs_tell_of_every_entry():
+def test_docs_state_of_every_entry():
     text = (Path(__file__).parents[2] / "docs/scenarios.md").read_text(encoding="utf-8")
     names = {field.name for part in (Scenario, *PARTS.values()) for field in fields(part)}
     assert {name for name in names if f"`{name}`" not in text} == set()

@@ -53,7 +53,7 @@ def test_moving_and_turning_the_whole_world_changes_no_observation(
 
 
 @BOTH
-def test_names_tell_what_is_in_the_columns(task):
+def test_names_state_what_is_in_the_columns(task):
     expected = {
         "goal_x_in_body": 2.0,  # the goal lies straight ahead
         "goal_y_in_body": 0.0,

@@ -47,7 +47,7 @@ def square(done=0.0, place=(-1.0, 0.0)):
 
 
 @EACH
-def test_names_tell_what_is_in_the_columns(task):
+def test_names_state_what_is_in_the_columns(task):
     state = body(-1.0, 0.0, np.pi / 2, vx=0.3, vy=0.1, yaw_rate=0.2)
     seen = dict(zip(task.observation_names, task.observe(state, square()), strict=True))
     expected = {

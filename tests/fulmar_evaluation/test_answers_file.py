@@ -91,7 +91,7 @@ def test_a_bundle_that_is_gone_is_named_with_the_one_that_is_asked_instead(tmp_p
     assert "is gone" not in ask("rerun", POLICY).output
 
 
-def test_the_controller_that_began_is_compared_and_the_others_are_told(tmp_path):
+def test_the_controller_that_began_is_compared_and_the_others_are_reported(tmp_path):
     bag = copied(tmp_path / "bag", said=(json.dumps({"sha256": "0" * 64, "fallback": True}),))
     done = ask("rerun", bag, "--json")
     found = json.loads(done.stdout[done.stdout.index("{") :])

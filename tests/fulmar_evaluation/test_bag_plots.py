@@ -1,4 +1,4 @@
-"""`fulmar bag plot`: a run with its goal and what its actuators did, as a page or as a picture."""
+"""`fulmar bag plot`: a run with its goal and what its actuators did, as a page or as a plot."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Bounds on visits of waypoints: exact where paper can tell, and never beaten."""
+"""Bounds on visits of waypoints: exact where paper can state, and never beaten."""
 
 from __future__ import annotations
 

@@ -85,7 +85,7 @@ def test_a_length_said_twice_and_worlds_elsewhere_are_refused():
         )
 
 
-def test_the_help_tells_what_every_figure_means():
+def test_the_help_states_what_every_figure_means():
     text = CliRunner().invoke(app, ["evaluate", "--help"]).output
     assert all(name in text for name in FIGURES)
     assert " ".join(SUCCESS.split()[:9]) in " ".join(text.split())

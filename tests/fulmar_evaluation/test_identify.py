@@ -1,4 +1,4 @@
-"""`fulmar identify` on real bags of machines driven in MuJoCo, and the benchmark that judges it."""
+"""`fulmar identify` on real bags of machines driven in MuJoCo, and the benchmark that evaluates it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`fulmar identify` on runs that tell little: what they do not tell gets into no calibration."""
+"""`fulmar identify` on runs that state little: what they do not state gets into no calibration."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def test_a_boat_that_nobody_drove_gives_no_calibration(tmp_path):
 
 
 @pytest.mark.slow
-def test_what_is_known_is_kept_and_what_the_run_does_not_tell_is_named_and_left_out(tmp_path):
+def test_what_is_known_is_kept_and_what_the_run_does_not_state_is_named_and_left_out(tmp_path):
     out = tmp_path / "calibration.yaml"
     done = identify(boat(tmp_path, driven_s=3.0), "--known", "mass=35.0+-0.5", "--out", out, "--json")
     assert done.exit_code == 0, done.exception

@@ -181,7 +181,7 @@ def test_a_controller_forgets_at_a_pause_as_in_the_node():
 @pytest.mark.parametrize(
     "option", [["--from", "thoughts"], ["--through", "telepathy"], ["--controller", "lqrr"]]
 )
-def test_a_mistake_is_told(option):
+def test_a_mistake_is_reported(option):
     done = CliRunner().invoke(app, ["bag", "rerun", str(POLICY), *option])
     assert isinstance(done.exception, ConfigError)
 

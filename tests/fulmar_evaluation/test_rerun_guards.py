@@ -68,7 +68,7 @@ def test_max_run_time_ends_the_run_where_the_node_would(bag):
     assert not answers.commands[51:].any()
 
 
-def test_a_ring_says_that_the_run_time_is_not_judged(bag):
+def test_a_ring_says_that_the_run_time_is_not_evaluated(bag):
     ring = guarded(bag, max_run_time_s=10.0)
     course = control_steps_of(replace(ring, info={**ring.info, "recording": {"mode": "ring"}}))
     assert course.settings.max_run_time_s == 0.0
@@ -90,8 +90,8 @@ def test_an_estop_stops_and_takes_the_goal_away(bag):
     course = at_its_pace(control_steps_of(bag))
     beats = range(int(course.log_ns[0]) - 50 * MS, int(course.log_ns[60]), 100 * MS)
     pressed = range(int(course.log_ns[20]) + 100 * MS, int(course.log_ns[30]))
-    told = saying(bag, ESTOP, *((log, log in pressed) for log in beats))
-    course, answers = again(guarded(told, estop=True), paced=True)
+    reported = saying(bag, ESTOP, *((log, log in pressed) for log in beats))
+    course, answers = again(guarded(reported, estop=True), paced=True)
     assert answers.acted[:21].all()
     assert not answers.acted[21:].any()
     assert answers.reasons[25].startswith("e-stop: pressed")
@@ -103,9 +103,9 @@ def test_in_a_bag_that_lists_resets_only_a_reset_ends_a_press(bag):
     course = at_its_pace(control_steps_of(bag))
     beats = range(int(course.log_ns[0]) - 50 * MS, int(course.log_ns[-1]) + 50 * MS, 100 * MS)
     press = next(log for log in beats if log > course.log_ns[20])
-    told = saying(bag, ESTOP, *((log, log == press) for log in beats))
+    reported = saying(bag, ESTOP, *((log, log == press) for log in beats))
     for resets, reason in (((), "e-stop: pressed"), ((int(course.log_ns[40]),), "no goal yet")):
-        listed = saying(told, ESTOP_RELEASED, *((log, "") for log in resets))
+        listed = saying(reported, ESTOP_RELEASED, *((log, "") for log in resets))
         _, answers = again(guarded(listed, estop=True), paced=True)
         assert answers.acted[:20].all()
         assert answers.reasons[35].startswith("e-stop: pressed")
@@ -116,8 +116,8 @@ def test_while_a_press_is_on_its_way_the_record_decides(bag):
     course = at_its_pace(control_steps_of(bag))
     beats = range(int(course.log_ns[0]) - 30 * MS, int(course.log_ns[-1]) + 50 * MS, 100 * MS)
     at = int(course.log_ns[20])
-    told = saying(bag, ESTOP, *((log, log >= at - 30 * MS) for log in beats))
-    course = at_its_pace(control_steps_of(told))
+    reported = saying(bag, ESTOP, *((log, log >= at - 30 * MS) for log in beats))
+    course = at_its_pace(control_steps_of(reported))
     for acted in (True, False):
         recorded = course.acted.copy()
         recorded[20] = acted
@@ -184,9 +184,9 @@ def test_a_policy_that_took_over_takes_over_again(bag):
     course = control_steps_of(bag)
     law = load_classical(course.robot, course.task, control_hz=5.0)
     at, sha256 = int(course.log_ns[40]), law.metadata()["sha256"]
-    told = saying(bag, SWAP, (at - 2, "lqr"))
-    told = saying(told, METADATA, (at - 4, metadata(bag)), (at - 1, json.dumps({"sha256": sha256})))
-    course = control_steps_of(told)
+    reported = saying(bag, SWAP, (at - 2, "lqr"))
+    reported = saying(reported, METADATA, (at - 4, metadata(bag)), (at - 1, json.dumps({"sha256": sha256})))
+    course = control_steps_of(reported)
     assert [change.value for change in course.changes] == [("lqr", sha256)]
     first = Refused(course, after=1000)
     answers = rerun(course, first, source="odometry", load=lambda folder: law)
@@ -197,11 +197,11 @@ def test_a_policy_that_took_over_takes_over_again(bag):
 def test_a_policy_that_took_over_and_is_another_or_gone_is_refused(bag):
     at = int(control_steps_of(bag).log_ns[40])
     said = (at - 4, metadata(bag)), (at - 1, json.dumps({"sha256": "0" * 64}))
-    told = saying(bag, METADATA, *said)
+    reported = saying(bag, METADATA, *said)
     with pytest.raises(BagError, match="another one by now"):
-        again(saying(told, SWAP, (at - 2, BUNDLE)), follow=True)
+        again(saying(reported, SWAP, (at - 2, BUNDLE)), follow=True)
     with pytest.raises(BagError, match="cannot be loaded"):
-        again(saying(told, SWAP, (at - 2, "/nowhere/policy")), follow=True)
+        again(saying(reported, SWAP, (at - 2, "/nowhere/policy")), follow=True)
 
 
 def metadata(bag: Bag) -> str:
@@ -210,8 +210,8 @@ def metadata(bag: Bag) -> str:
 
 
 def test_a_request_that_came_to_nothing_changes_nothing(bag):
-    told = saying(bag, SWAP, (bag.of(METADATA).log_ns[-1] + 1, "/nowhere/policy"))
-    assert control_steps_of(told).changes == ()
+    reported = saying(bag, SWAP, (bag.of(METADATA).log_ns[-1] + 1, "/nowhere/policy"))
+    assert control_steps_of(reported).changes == ()
 
 
 @pytest.mark.parametrize("guards", [{"max_run_time_s": "long"}, {"area": [0.0, 0.0, 2.0, 0.0]}])

@@ -112,7 +112,7 @@ def test_figures_of_the_nodes_are_taken_over(reached):
     assert summary["watchdog_trips"] == 0
 
 
-def test_latency_comes_from_the_bag_where_the_plant_does_not_tell_it(reached):
+def test_latency_comes_from_the_bag_where_the_plant_does_not_state_it(reached):
     latency = summarise(read_run(reached))["latency_ms"]
     assert 1.5 < latency["p50"] < latency["p99"] <= latency["max"] < 6.0
 
@@ -127,7 +127,7 @@ def test_latency_does_not_count_how_late_the_recorder_received_a_command(reached
     np.testing.assert_allclose(after, before + 1.0, atol=1e-3)
 
 
-def test_latency_of_the_plant_counts_where_it_tells_it(reached):
+def test_latency_of_the_plant_counts_where_it_states_it(reached):
     record = read_run(reached)
     plant = record.last_health("plant")
     reported = {"latency_ms_p50": "1.0", "latency_ms_p99": "2.0", "latency_ms_max": "3.0"}

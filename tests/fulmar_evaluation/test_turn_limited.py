@@ -1,4 +1,4 @@
-"""Bound on visits of robots that go where they point: exact where paper can tell, and never beaten."""
+"""Bound on visits of robots that go where they point: exact where paper can state, and never beaten."""
 
 from __future__ import annotations
 
@@ -182,7 +182,7 @@ def test_no_steering_beats_the_bound(robot, least):
     [("turtlebot2", 0.9, 42), pytest.param("kingfisher", 0.8, 47, marks=pytest.mark.slow)],
 )
 def test_planned_drives_come_near_the_bound_and_do_not_beat_it(robot, least, passed):
-    """Commands of the first judged episodes, in thousandths, as optimal control with all the dynamics found them."""
+    """Commands of the first evaluated episodes, in thousandths, as optimal control with all the dynamics found them."""
     with np.load(Path(__file__).with_name("time_optimal_drives.npz")) as drives:
         commands = drives[robot].astype(np.float32) / 1000.0
     machine, task, scenario = load_robot(robot), load_task("go_through_positions"), load_scenario("nominal")

@@ -32,7 +32,7 @@ def arrivals(sender: socket.socket, receiver: socket.socket) -> list[tuple[int, 
     """Numbers of the frames that come through, and how late each is [s]."""
     found = []
 
-    def hear(timeout_s: float) -> None:
+    def receive(timeout_s: float) -> None:
         while select.select([receiver], [], [], timeout_s)[0]:
             number, sent = receiver.recv(100).split()
             found.append((int(number), time.monotonic() - float(sent)))
@@ -40,8 +40,8 @@ def arrivals(sender: socket.socket, receiver: socket.socket) -> list[tuple[int, 
 
     for number in range(COUNT):
         sender.send(f"{number} {time.monotonic()}".encode())
-        hear(0.001)
-    hear(0.2)
+        receive(0.001)
+    receive(0.2)
     return found
 
 

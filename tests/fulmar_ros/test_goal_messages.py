@@ -144,7 +144,7 @@ def test_obstacles_come_back_as_they_were_without_those_that_are_not_there():
     np.testing.assert_allclose(discs, [[1.0, 2.0, 0.3]])
 
 
-def test_no_obstacles_are_told_with_a_stamp_and_clear_a_viewer():
+def test_no_obstacles_are_reported_with_a_stamp_and_clear_a_viewer():
     message = obstacles_message(np.zeros((0, 3)), 7)
     assert [marker.action for marker in message.markers] == [Marker.DELETEALL]
     assert stamp_ns(message.markers[0].header.stamp) == 7
@@ -189,9 +189,9 @@ def test_a_frame_that_is_no_name_is_not_quoted_whole():
     goal.header.frame_id = marks.markers[1].header.frame_id = long
     odometry.header.frame_id = odometry.child_frame_id = long
     found = measurement_of(odometry)
-    for told in (goal_of(goal)[1], obstacles_of(marks)[1], found.frame, found.child_frame):
-        assert "ffff" in told
-        assert len(told) < 200
+    for reported in (goal_of(goal)[1], obstacles_of(marks)[1], found.frame, found.child_frame):
+        assert "ffff" in reported
+        assert len(reported) < 200
 
 
 def test_an_absurd_number_of_obstacles_is_refused():

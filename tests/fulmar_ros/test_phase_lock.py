@@ -1,4 +1,4 @@
-"""The phase of arrivals: the least delayed measurement tells it."""
+"""The phase of arrivals: the least delayed measurement states it."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ second = LeRobotDataset("local/second", root=folder, episodes=[1])
 ahead = LeRobotDataset("local/ahead", root=folder, delta_timestamps={"action": [0.0, 2.0 / whole.fps]})
 end = whole.meta.episodes[0]["dataset_to_index"] - 1
 
-told = {
+reported = {
     "version": whole.meta.info["codebase_version"],
     "robot_type": whole.meta.robot_type,
     "fps": whole.fps,
@@ -30,4 +30,4 @@ told = {
     "stats": {key: value.tolist() for key, value in whole.meta.stats["action"].items()},
     "task_index": whole.meta.get_task_index(whole[0]["task"]),
 }
-sys.stdout.write(json.dumps(told))
+sys.stdout.write(json.dumps(reported))

@@ -27,18 +27,18 @@ SCRIPT = Path(__file__).with_name("load_dataset.py")
 )
 def test_lerobot_loads_an_exported_dataset_with_the_values_of_its_bags(pytestconfig, tmp_path, bags, robot):
     answer("export", *bags, "--to", "lerobot", "--out", tmp_path / "set")
-    told = json.loads(run_peer(pytestconfig.rootpath, SCRIPT, tmp_path / "set", home=tmp_path / "home"))
+    reported = json.loads(run_peer(pytestconfig.rootpath, SCRIPT, tmp_path / "set", home=tmp_path / "home"))
     opened = [open_bag(bag) for bag in bags]
     seen = [joint_vectors(bag.of(OBSERVATION), "position") for bag in opened]
     sent = [joint_vectors(bag.of(ACTION), "effort") for bag in opened]
     lengths = [len(each) for each in sent]
     observations, actions = (np.concatenate([each.values for each in every]) for every in (seen, sent))
     hz = load_robot(robot).timing.control_hz
-    assert (told["version"], told["robot_type"], told["fps"]) == ("v3.0", robot, hz)
-    assert told["names"]["observation.state"] == list(seen[0].names)
-    assert told["names"]["action"] == list(sent[0].names)
-    assert told["episodes"] == [[0, lengths[0]], [lengths[0], sum(lengths)]]
-    frames = told["frames"]
+    assert (reported["version"], reported["robot_type"], reported["fps"]) == ("v3.0", robot, hz)
+    assert reported["names"]["observation.state"] == list(seen[0].names)
+    assert reported["names"]["action"] == list(sent[0].names)
+    assert reported["episodes"] == [[0, lengths[0]], [lengths[0], sum(lengths)]]
+    frames = reported["frames"]
     assert len(frames) == sum(lengths)
 
     def column(name: str) -> np.ndarray:
@@ -52,14 +52,16 @@ def test_lerobot_loads_an_exported_dataset_with_the_values_of_its_bags(pytestcon
     np.testing.assert_allclose(column("timestamp"), steps / hz, rtol=1e-6)
     assert np.flatnonzero(column("next.done")).tolist() == [lengths[0] - 1, sum(lengths) - 1]
     assert len(set(column("task"))) == 1
-    assert told["task_index"] == 0
+    assert reported["task_index"] == 0
     # One episode alone, and windows of time that end where an episode does.
-    assert told["second"] == [lengths[1], lengths[0]]
+    assert reported["second"] == [lengths[1], lengths[0]]
     last = lengths[0] - 1
-    np.testing.assert_array_equal(told["ahead"], actions[[[0, 2], [last, last]]].astype(np.float32))
-    assert told["padded"] == [[False, False], [False, True]]
-    np.testing.assert_allclose(told["stats"]["mean"], actions.mean(axis=0), rtol=1e-6, atol=1e-7)
-    np.testing.assert_allclose(told["stats"]["q90"], np.quantile(actions, 0.9, axis=0), rtol=1e-6, atol=1e-7)
+    np.testing.assert_array_equal(reported["ahead"], actions[[[0, 2], [last, last]]].astype(np.float32))
+    assert reported["padded"] == [[False, False], [False, True]]
+    np.testing.assert_allclose(reported["stats"]["mean"], actions.mean(axis=0), rtol=1e-6, atol=1e-7)
+    np.testing.assert_allclose(
+        reported["stats"]["q90"], np.quantile(actions, 0.9, axis=0), rtol=1e-6, atol=1e-7
+    )
 
 
 def layout_of(dataset: Path) -> dict[str, object]:
@@ -71,7 +73,7 @@ def layout_of(dataset: Path) -> dict[str, object]:
         found[str(path.relative_to(dataset))] = types
     info = json.loads((dataset / "meta/info.json").read_text())
     stats = json.loads((dataset / "meta/stats.json").read_text())
-    told = (
+    reported = (
         "codebase_version",
         "chunks_size",
         "data_files_size_in_mb",
@@ -84,7 +86,7 @@ def layout_of(dataset: Path) -> dict[str, object]:
         **found,
         "info": sorted(info),
         "stats": {key: sorted(each) for key, each in stats.items()},
-        **{key: info[key] for key in told},
+        **{key: info[key] for key in reported},
     }
 
 

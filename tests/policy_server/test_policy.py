@@ -400,7 +400,9 @@ def test_every_row_of_a_batch_has_a_memory_of_its_own(remembering):
         ({"action": "on_off"}, "gives on_off commands, 'turtlebot2' takes continuous"),
     ],
 )
-def test_a_memory_or_a_kind_of_command_that_the_passport_does_not_tell_is_refused(remembering, change, words):
+def test_a_memory_or_a_kind_of_command_that_the_passport_does_not_state_is_refused(
+    remembering, change, words
+):
     reseal(remembering, **change)
     with pytest.raises(BundleError, match=re.escape(words)):
         Policy(remembering, ROLLING, ROLLING_TASK)

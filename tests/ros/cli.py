@@ -92,10 +92,10 @@ def under_way(run: psutil.Popen, bag: Path, messages: int, timeout_s: float = 40
 
 def _messages_of(bag: Path) -> int:
     try:
-        told = yaml.safe_load((bag / "metadata.yaml").read_text(encoding="utf-8"))
+        reported = yaml.safe_load((bag / "metadata.yaml").read_text(encoding="utf-8"))
     except FileNotFoundError:
         return 0
-    return int(told["rosbag2_bagfile_information"]["message_count"])
+    return int(reported["rosbag2_bagfile_information"]["message_count"])
 
 
 def json_of(output: str) -> dict[str, Any]:

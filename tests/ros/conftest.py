@@ -1,4 +1,4 @@
-"""Single nodes with their neighbour, and recorders with what they hear, each in a ROS domain of its own."""
+"""Single nodes with their neighbour, and recorders with what they receive, each in a ROS domain of its own."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ def record(ros_domain, tmp_path) -> Iterator[object]:
 
 @pytest.fixture
 def node(ros_domain) -> Iterator[Node]:
-    """Who talks to the recorder, and hears it."""
+    """Who talks to the recorder, and receives it."""
     context = rclpy.Context()
     rclpy.init(context=context, domain_id=ros_domain.id)
     made = rclpy.create_node("talker", namespace=NAMESPACE, context=context)
@@ -102,17 +102,17 @@ def node(ros_domain) -> Iterator[Node]:
 @pytest.fixture
 def healths(node) -> Iterator[list[DiagnosticStatus]]:
     """What the recorder said about itself, newest last."""
-    heard: list[DiagnosticStatus] = []
+    received: list[DiagnosticStatus] = []
     node.create_subscription(
         DiagnosticArray,
         DIAGNOSTICS.name,
-        lambda message: heard.extend(message.status),
+        lambda message: received.extend(message.status),
         subscriber_qos(DIAGNOSTICS),
     )
     executor = SingleThreadedExecutor(context=node.context)
     executor.add_node(node)
     thread = threading.Thread(target=executor.spin)
     thread.start()
-    yield heard
+    yield received
     executor.shutdown()
     thread.join()

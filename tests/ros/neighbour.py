@@ -1,4 +1,4 @@
-"""A hand-made neighbour for one node under test: it publishes by hand, and keeps what it hears."""
+"""A hand-made neighbour for one node under test: it publishes by hand, and keeps what it receives."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Said(dict[str, tuple[str, dict[str, str]]]):
 
 
 class Neighbour:
-    """Another node: publishes by hand, and keeps what it hears."""
+    """Another node: publishes by hand, and keeps what it receives."""
 
     def __init__(self, robot: str = ROBOT) -> None:
         self.node = Node("neighbour", namespace=f"/{robot}")
@@ -66,7 +66,7 @@ class Neighbour:
         listen(
             DiagnosticArray,
             DIAGNOSTICS.name,
-            self._hear,
+            self._receive,
             subscriber_qos(DIAGNOSTICS, **many),
         )
         self._command = self.node.create_publisher(JointState, COMMAND.name, publisher_qos(COMMAND))
@@ -88,7 +88,7 @@ class Neighbour:
     def _commanded(self, message: JointState) -> None:
         self.commands.append(np.array(message.effort))
 
-    def _hear(self, message: DiagnosticArray) -> None:
+    def _receive(self, message: DiagnosticArray) -> None:
         for status in message.status:
             self.said[status.name.split(": ")[1]] = (
                 status.message,
@@ -147,7 +147,7 @@ def open_valves(robot: Robot) -> list[float]:
 
 
 class Stream:
-    """Odometry at 50 Hz from a thread, until told otherwise."""
+    """Odometry at 50 Hz from a thread, until reported otherwise."""
 
     def __init__(self, neighbour: Neighbour) -> None:
         self.neighbour, self.spoil, self.step_ns, self.moving = (

@@ -1,4 +1,4 @@
-"""A recorder process as tests see it from outside, and odometry for it to hear."""
+"""A recorder process as tests see it from outside, and odometry for it to receive."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ ROBOT = "/floating_platform"
 
 
 class Recorder:
-    """A recorder process, its output, and a publisher that it hears."""
+    """A recorder process, its output, and a publisher that it receives."""
 
     def __init__(self, directory: Path, env: dict[str, str], *parameters: str) -> None:
         options = [f"directory:={directory}", *parameters]

@@ -24,7 +24,7 @@ from tests.ros.neighbour import Stream, until
 PLATFORM = load_robot("floating_platform")
 
 
-def told(bag: Path, topic: str) -> list[JointState]:
+def reported(bag: Path, topic: str) -> list[JointState]:
     """Every message of one topic."""
     (file,) = bag.glob("*.mcap")
     with file.open("rb") as stream:
@@ -51,7 +51,7 @@ def test_the_estimate_that_a_policy_uses_of_its_valves_is_in_the_bag_of_its_run(
     more = ("--scenario", scenario, "--seed", str(seed), "--duration", "20")
     bag = run_policy(ros_domain, tmp_path, task.name, *more)
     world = draw_episode(PLATFORM, task, load_scenario(scenario), seed=seed, number=0).world
-    health = told(bag, ACTUATORS_HEALTH.name)
+    health = reported(bag, ACTUATORS_HEALTH.name)
     assert len(health) >= 95
     assert list(health[-1].name) == list(PLATFORM.actuators.names)
     last = np.array(health[-1].effort)
@@ -64,8 +64,8 @@ def test_the_estimate_that_a_policy_uses_of_its_valves_is_in_the_bag_of_its_run(
 @pytest.mark.slow
 def test_a_controller_without_an_estimator_publishes_no_health(ros_domain: RosDomain, tmp_path: Path) -> None:
     bag = run_policy(ros_domain, tmp_path, "go_to_pose", "--duration", "2")
-    assert told(bag, COMMAND.name)
-    assert told(bag, ACTUATORS_HEALTH.name) == []
+    assert reported(bag, COMMAND.name)
+    assert reported(bag, ACTUATORS_HEALTH.name) == []
 
 
 @pytest.mark.real_time

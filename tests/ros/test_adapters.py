@@ -18,7 +18,7 @@ pytestmark = pytest.mark.real_time
 
 
 @pytest.fixture
-def heard(neighbour: Neighbour):
+def received(neighbour: Neighbour):
     """Starts a node in this process, and keeps what comes on a topic of another stack."""
     messages: list = []
 
@@ -36,9 +36,9 @@ def running(make, namespace: str, *parameters: str, request_exit=lambda _code: N
     return node, spinning(node, lambda error: pytest.fail(repr(error)))
 
 
-def test_our_commands_reach_the_lab_s_valve_node_and_silence_closes_its_valves(neighbour, heard) -> None:
+def test_our_commands_reach_the_lab_s_valve_node_and_silence_closes_its_valves(neighbour, received) -> None:
     """Entry i after the bearing is thruster ORDER[i]; the node beyond has no watchdog, ours stands before it."""
-    messages = heard(Int16MultiArray, "/spacer_floating_platform/valves/input")
+    messages = received(Int16MultiArray, "/spacer_floating_platform/valves/input")
     node, spin = running(DriverNode, "floating_platform", "hardware:=zero_g_lab_valve_node")
     with spin:
         first = [1.0] + [0.0] * 7
@@ -51,8 +51,8 @@ def test_our_commands_reach_the_lab_s_valve_node_and_silence_closes_its_valves(n
 
 
 @pytest.mark.parametrize("neighbour", ["turtlebot2"], indirect=True)
-def test_our_commands_reach_a_base_that_takes_plain_twists(neighbour, heard) -> None:
-    messages = heard(Twist, "/commands/velocity")
+def test_our_commands_reach_a_base_that_takes_plain_twists(neighbour, received) -> None:
+    messages = received(Twist, "/commands/velocity")
     node, spin = running(DriverNode, "turtlebot2", "robot:=turtlebot2", "hardware:=turtlebot2_kobuki_node")
     with spin:
         until(
@@ -66,8 +66,8 @@ def test_our_commands_reach_a_base_that_takes_plain_twists(neighbour, heard) -> 
 
 
 @pytest.mark.parametrize("neighbour", ["kingfisher"], indirect=True)
-def test_our_commands_reach_a_boat_that_takes_two_numbers(neighbour, heard) -> None:
-    messages = heard(Float32MultiArray, "/action")
+def test_our_commands_reach_a_boat_that_takes_two_numbers(neighbour, received) -> None:
+    messages = received(Float32MultiArray, "/action")
     node, spin = running(DriverNode, "kingfisher", "robot:=kingfisher", "hardware:=kingfisher_action")
     with spin:
         until(
@@ -80,7 +80,7 @@ def test_our_commands_reach_a_boat_that_takes_two_numbers(neighbour, heard) -> N
 
 
 @pytest.mark.parametrize(("message", "kind"), [("byte", ByteMultiArray), ("uint8", UInt8MultiArray)])
-def test_byte_arrays_with_a_named_order_go_both_ways(neighbour, heard, tmp_path, message, kind) -> None:
+def test_byte_arrays_with_a_named_order_go_both_ways(neighbour, received, tmp_path, message, kind) -> None:
     """Ours to their valve node, and their controller to ours: entry 1 of RANS's order is thruster 3."""
     files = []
     for name in ("out", "in"):
@@ -89,7 +89,7 @@ def test_byte_arrays_with_a_named_order_go_both_ways(neighbour, heard, tmp_path,
             "title: t\nrobot: floating_platform\n"
             f"driver: {{kind: valve_topic, topic: /valves/{name}, order: rans, message: {message}}}\n"
         )
-    messages = heard(kind, "/valves/out")
+    messages = received(kind, "/valves/out")
     node, spin = running(DriverNode, "floating_platform", f"hardware:={files[0]}")
     _adapter, spin_adapter = running(AdapterNode, "floating_platform", f"hardware:={files[1]}")
     neighbour.withdraw_command()  # the plant obeys no two nodes, and the adapter is one
@@ -126,7 +126,7 @@ def test_the_lab_s_controllers_command_our_valves_through_the_adapter(neighbour,
         assert bool(found) is (commanded is not None)
 
 
-def test_an_adapter_that_hears_our_own_driver_passes_nothing_on_and_ends(neighbour) -> None:
+def test_an_adapter_that_receives_our_own_driver_passes_nothing_on_and_ends(neighbour) -> None:
     """Both of one hardware file: what the driver publishes would come back as a command and feed its watchdog."""
     ended: list[int] = []
     file = "hardware:=zero_g_lab_valve_node"

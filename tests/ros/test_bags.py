@@ -28,8 +28,8 @@ POLICY, LQR = BAGS / "floating_platform_go_to_pose_policy", BAGS / "floating_pla
 
 
 @pytest.fixture
-def heard(ros_domain: RosDomain):
-    """What a listener in a context of its own hears: odometry as bytes, and the clock."""
+def received(ros_domain: RosDomain):
+    """What a listener in a context of its own receives: odometry as bytes, and the clock."""
     found: dict[str, list] = {"odom": [], "clock": []}
     context = rclpy.Context()
     rclpy.init(args=[], context=context, signal_handler_options=SignalHandlerOptions.NO)
@@ -56,17 +56,17 @@ def heard(ros_domain: RosDomain):
 
 @pytest.mark.real_time
 @pytest.mark.slow
-def test_a_bag_is_played_byte_for_byte_with_its_clock(heard):
+def test_a_bag_is_played_byte_for_byte_with_its_clock(received):
     bag = open_bag(POLICY)
     plan = schedule(bag, topics=["odom"])
     done = play(plan, bag, rate=10.0, clock=True, wait_s=3.0)
     assert done.messages == 100
-    assert heard["odom"] == bag.of(ODOMETRY).data
+    assert received["odom"] == bag.of(ODOMETRY).data
     stamps = stamps_ns(bag.of(ODOMETRY))
-    assert len(heard["clock"]) > 20
-    assert heard["clock"] == sorted(heard["clock"])
-    assert stamps[0] <= heard["clock"][0]
-    assert heard["clock"][-1] <= stamps[-1]
+    assert len(received["clock"]) > 20
+    assert received["clock"] == sorted(received["clock"])
+    assert stamps[0] <= received["clock"][0]
+    assert received["clock"][-1] <= stamps[-1]
 
 
 def test_a_lockstep_bag_plays_at_the_pace_of_its_stamps():
@@ -76,7 +76,7 @@ def test_a_lockstep_bag_plays_at_the_pace_of_its_stamps():
     assert plan.times_ns == stamps_ns(bag.of(ODOMETRY)).tolist()
 
 
-def test_playing_from_later_still_tells_the_goal():
+def test_playing_from_later_still_states_the_goal():
     bag = open_bag(POLICY)
     plan = schedule(bag, start_s=10.0)
     names = [

@@ -34,7 +34,7 @@ def test_lock_step_loses_no_message_of_any_step(ros_domain: RosDomain, tmp_path:
 
 
 @pytest.mark.slow
-def test_the_cost_is_told_for_both_with_its_interval(ros_domain: RosDomain, tmp_path: Path) -> None:
+def test_the_cost_is_reported_for_both_with_its_interval(ros_domain: RosDomain, tmp_path: Path) -> None:
     """Real plant, real controller, a recorder that comes and goes."""
     small = ("--parts", "cost", "--stretches", "2", "--stretch-s", "1")
     asked = ("benchmark", "recorder", *small, "--out", "bags", "--json")

@@ -105,7 +105,7 @@ def test_without_a_confirmation_each_valve_clicks_once_and_nothing_is_identified
     seen = [valves for valves, before in zip(opened[1:], opened, strict=False) if valves != before]
     clicked = [int(np.argmax(valves)) for valves in seen if any(valves)]
     order = list(load_hardware("zero_g_lab").driver.order)
-    assert len(clicked) >= 5  # on a busy machine this test hears the emulator late
+    assert len(clicked) >= 5  # on a busy machine this test receives the emulator late
     assert clicked == order[-len(clicked) :]
 
 

@@ -80,7 +80,7 @@ def measured(neighbour: Neighbour) -> Iterator[Stream]:
         odometry.stop()
 
 
-def told(neighbour: Neighbour, key: str) -> str:
+def reported(neighbour: Neighbour, key: str) -> str:
     """A value of the controller's status; empty before the first."""
     return neighbour.said.get("controller", ("", {}))[1].get(key, "")
 
@@ -115,29 +115,29 @@ def test_unbelievable_odometry_gets_closed_valves_and_a_reason(
 ) -> None:
     """Each fault alone, after a good start."""
     stream.spoil = spoil
-    until(lambda: reason in told(stream.neighbour, "reason"))
+    until(lambda: reason in reported(stream.neighbour, "reason"))
     until(lambda: not stream.neighbour.commands[-1].any())
 
 
 def test_a_frozen_sensor_is_noticed(stream: Stream) -> None:
     """Stamps go on, the pose does not move by a micrometre."""
     stream.moving = False
-    until(lambda: "stuck" in told(stream.neighbour, "reason"))
+    until(lambda: "stuck" in reported(stream.neighbour, "reason"))
     until(lambda: not stream.neighbour.commands[-1].any())
 
 
 def test_a_base_that_has_stood_for_long_goes_when_it_is_given_a_goal(neighbour: Neighbour) -> None:
-    """Encoders at rest tell the very same; only motion could change that."""
+    """Encoders at rest state the very same; only motion could change that."""
     with running(make_lqr, [], "odometry_may_repeat:=true"), measured(neighbour) as odometry:
         odometry.moving = False
-        until(lambda: told(neighbour, "reason") == "no goal yet")
+        until(lambda: reported(neighbour, "reason") == "no goal yet")
         time.sleep(1.0)  # of the very same odometry, many times the ten messages that are a stuck sensor
-        assert told(neighbour, "reason") == "no goal yet"
+        assert reported(neighbour, "reason") == "no goal yet"
         neighbour.give_goal()
         until(lambda: bool(neighbour.commands) and neighbour.commands[-1].any())
 
 
-def test_a_place_that_jumps_is_told_and_the_controller_begins_anew(neighbour: Neighbour) -> None:
+def test_a_place_that_jumps_is_reported_and_the_controller_begins_anew(neighbour: Neighbour) -> None:
     resets: list[int] = []
 
     def reset(self: Lqr) -> None:
@@ -152,7 +152,7 @@ def test_a_place_that_jumps_is_told_and_the_controller_begins_anew(neighbour: Ne
         until(lambda: bool(neighbour.commands) and neighbour.commands[-1].any())
         begun = len(resets)
         odometry.spoil = jump
-        until(lambda: told(neighbour, "epoch") == "1")
+        until(lambda: reported(neighbour, "epoch") == "1")
         until(lambda: len(resets) == begun + 1)
         until(lambda: not node.guard.mission.lacking and neighbour.commands[-1].any())
 
@@ -160,7 +160,7 @@ def test_a_place_that_jumps_is_told_and_the_controller_begins_anew(neighbour: Ne
 def test_a_stamp_that_goes_back_is_refused(stream: Stream) -> None:
     """Reordered or replayed measurements do not move the robot."""
     stream.step_ns = -20_000_000
-    until(lambda: "went back" in told(stream.neighbour, "reason"))
+    until(lambda: "went back" in reported(stream.neighbour, "reason"))
     until(lambda: not stream.neighbour.commands[-1].any())
 
 
@@ -170,18 +170,18 @@ def test_silence_of_the_odometry_closes_the_valves(stream: Stream) -> None:
     since = time.monotonic()
     until(lambda: not stream.neighbour.commands[-1].any())
     assert time.monotonic() - since < 0.4
-    until(lambda: "no usable odom" in told(stream.neighbour, "reason"))
+    until(lambda: "no usable odom" in reported(stream.neighbour, "reason"))
 
 
-def test_a_controller_hears_odometry_and_its_goal_and_never_the_truth(
+def test_a_controller_receives_odometry_and_its_goal_and_never_the_truth(
     neighbour: Neighbour, controller: ControllerNode
 ) -> None:
     """What a deployed controller may know; of a robot with thrusters on an air bearing, what these do as well."""
-    heard = {subscription.topic_name for subscription in controller.subscriptions}
+    received = {subscription.topic_name for subscription in controller.subscriptions}
     wires = (ODOMETRY, GOAL_POSE, ESTOP, ESTOP_RELEASED, SWAP, ACTUATORS_STATE, AIR_BEARING)
-    assert heard == {f"{NAMESPACE}/{wire.name}" for wire in wires}
-    assert f"{NAMESPACE}/{TRUTH.name}" not in heard
-    assert {STATUS.name, IMU.name}.isdisjoint(heard)
+    assert received == {f"{NAMESPACE}/{wire.name}" for wire in wires}
+    assert f"{NAMESPACE}/{TRUTH.name}" not in received
+    assert {STATUS.name, IMU.name}.isdisjoint(received)
 
 
 def test_a_controller_that_raises_commands_what_is_safe_and_ends(
@@ -198,16 +198,16 @@ def test_a_controller_that_raises_commands_what_is_safe_and_ends(
     with running(lqr_that(act=act), codes), measured(neighbour):
         neighbour.give_goal()
         until(lambda: codes != [])
-        until(lambda: "no gain today" in told(neighbour, "reason"))
+        until(lambda: "no gain today" in reported(neighbour, "reason"))
         assert set(codes) == {1}
         assert not any(command.any() for command in neighbour.commands)
 
 
 def test_a_goal_beyond_the_geofence_opens_no_valve(stream: Stream) -> None:
-    """Judged at once, not at the next measurement."""
+    """Evaluated at once, not at the next measurement."""
     neighbour = stream.neighbour
     neighbour.goal_publisher.publish(goal_message(goal_at((300.0, 0.0, 0.0)), "goal_pose", 2))
-    until(lambda: "geofence" in told(neighbour, "reason"))
+    until(lambda: "geofence" in reported(neighbour, "reason"))
     until(lambda: not neighbour.commands[-1].any())
 
 
@@ -222,16 +222,16 @@ def test_a_robot_that_left_its_area_waits_there_and_back_inside_for_somebody_to_
             message.pose.pose.position.y += 1.1
 
         odometry.spoil = beyond
-        until(lambda: "outside its area" in told(neighbour, "reason"))
+        until(lambda: "outside its area" in reported(neighbour, "reason"))
         until(lambda: not neighbour.commands[-1].any())
         neighbour.give_goal()  # still out there
         time.sleep(0.3)
-        assert "outside its area" in told(neighbour, "reason")
+        assert "outside its area" in reported(neighbour, "reason")
         odometry.spoil = lambda _message: None
         count = len(neighbour.commands)
         until(lambda: len(neighbour.commands) > count + 25)
         assert not any(command.any() for command in neighbour.commands[count + 1 :])
-        assert "outside its area" in told(neighbour, "reason")
+        assert "outside its area" in reported(neighbour, "reason")
         neighbour.give_goal()
         until(lambda: neighbour.commands[-1].any())
 
@@ -241,7 +241,7 @@ def test_a_run_that_has_acted_for_as_long_as_it_may_stops(neighbour: Neighbour) 
         neighbour.give_goal()
         until(lambda: bool(neighbour.commands) and neighbour.commands[-1].any())
         since = time.monotonic()
-        until(lambda: "max_run_time of 0.5 s is over" in told(neighbour, "reason"))
+        until(lambda: "max_run_time of 0.5 s is over" in reported(neighbour, "reason"))
         assert time.monotonic() - since > 0.3
         until(lambda: not neighbour.commands[-1].any())
 
@@ -253,8 +253,8 @@ def test_beats_that_all_come_late_are_a_fault(neighbour: Neighbour) -> None:
 
     with running(lqr_that(act=act), [], "overruns_to_stop:=5"), measured(neighbour):
         neighbour.give_goal()
-        until(lambda: "5 beats in a row came late" in told(neighbour, "reason"))
-        assert told(neighbour, "mode") == "fault"
+        until(lambda: "5 beats in a row came late" in reported(neighbour, "reason"))
+        assert reported(neighbour, "mode") == "fault"
         until(lambda: not neighbour.commands[-1].any())
 
 
@@ -313,8 +313,8 @@ def test_a_control_loop_that_fails_outside_the_controller_is_a_fault_and_ends_th
 
         monkeypatch.setattr(node.wires, "publish_reasoning", lost)
         until(lambda: codes == [1])
-        until(lambda: "the middleware is gone" in told(neighbour, "reason"))
-        assert told(neighbour, "mode") == "fault"
+        until(lambda: "the middleware is gone" in reported(neighbour, "reason"))
+        assert reported(neighbour, "mode") == "fault"
 
 
 @pytest.mark.parametrize("fallback", [False, True])
@@ -333,11 +333,11 @@ def test_a_controller_that_raises_when_it_begins_anew_is_given_up(
     with running(lqr_that(reset=reset), codes, *parameters), measured(neighbour):
         neighbour.give_goal()
         if fallback:
-            until(lambda: "no memory" in told(neighbour, "fell_back"))
+            until(lambda: "no memory" in reported(neighbour, "fell_back"))
             until(lambda: neighbour.commands[-1].any())
             assert codes == []
         else:
-            until(lambda: "no memory" in told(neighbour, "reason"))
+            until(lambda: "no memory" in reported(neighbour, "reason"))
             assert set(codes) == {1}
 
 

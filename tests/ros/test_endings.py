@@ -1,4 +1,4 @@
-"""Runs, demos and evaluations that end early, at no time that counts: everybody ends, and the reason is told."""
+"""Runs, demos and evaluations that end early, at no time that counts: everybody ends, and the reason is reported."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ UNDER_WAY_S = 1.5  # from the start of the processes of an evaluation until they
 def test_a_recorder_that_fails_at_its_end_fails_the_run(
     ros_domain: RosDomain, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A full disk is told by the recorder's exit code alone, when all else went well."""
-    told = outcome_with(monkeypatch, tmp_path, [Ended("controller", 0), Ended("recorder", 1)])
-    assert told.failure == "recorder ended with exit code 1 when it was stopped"
-    assert told.exit_code == 1
+    """A full disk is reported by the recorder's exit code alone, when all else went well."""
+    reported = outcome_with(monkeypatch, tmp_path, [Ended("controller", 0), Ended("recorder", 1)])
+    assert reported.failure == "recorder ended with exit code 1 when it was stopped"
+    assert reported.exit_code == 1
 
 
 def test_commands_that_are_not_in_the_bag_fail_a_lockstep_run(
     ros_domain: RosDomain, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Whatever lost them."""
-    told = outcome_with(monkeypatch, tmp_path, [], lost=3)
-    assert told.failure == "the bag lacks 3 of 13 commands"
-    assert told.exit_code == 1
+    reported = outcome_with(monkeypatch, tmp_path, [], lost=3)
+    assert reported.failure == "the bag lacks 3 of 13 commands"
+    assert reported.exit_code == 1
 
 
 def outcome_with(
@@ -126,7 +126,7 @@ def test_a_recorder_that_cannot_begin_is_the_failure(ros_domain: RosDomain, tmp_
 @pytest.mark.parametrize(
     "number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow), signal.SIGKILL]
 )
-def test_an_evaluation_that_is_told_to_stop_leaves_nobody_behind(
+def test_an_evaluation_that_is_reported_to_stop_leaves_nobody_behind(
     number: signal.Signals, ros_domain: RosDomain, tmp_path: Path
 ) -> None:
     """Two workers with a controller each, in the middle of their shares."""

@@ -100,7 +100,7 @@ def test_a_gap_is_bridged_and_then_silence_says_that_it_is_stale(sources: Source
 @pytest.mark.parametrize(
     ("spoil", "words"), [({"frame": "camera"}, "'camera'"), ({"bad": True}, "not finite")]
 )
-def test_senseless_messages_are_refused_and_told(
+def test_senseless_messages_are_refused_and_reported(
     sources: Sources, spoil: dict[str, object], words: str
 ) -> None:
     sources.until_odometry()

@@ -71,16 +71,16 @@ def test_a_trigger_closes_the_valves_while_commands_go_on(
 
 def test_an_e_stop_says_nothing_before_it_can_go_on_saying_it(neighbour: Neighbour) -> None:
     """A word from a node that is still starting would be followed by silence, which takes goals away."""
-    heard: list[bool] = []
+    received: list[bool] = []
     neighbour.node.create_subscription(
-        Bool, ESTOP.name, lambda message: heard.append(message.data), subscriber_qos(ESTOP, reliable=True)
+        Bool, ESTOP.name, lambda message: received.append(message.data), subscriber_qos(ESTOP, reliable=True)
     )
     node = EstopNode(lambda _code: None, cli_args=["--ros-args", "-r", f"__ns:={NAMESPACE}"])
     until(lambda: neighbour.node.count_publishers(ESTOP.name) == 1)
     time.sleep(0.3)
-    assert not heard
+    assert not received
     with spinning(node, lambda error: pytest.fail(repr(error))):
-        until(lambda: heard == [False] * len(heard) and len(heard) > 3)
+        until(lambda: received == [False] * len(received) and len(received) > 3)
         node.stop()
 
 
@@ -271,7 +271,7 @@ def test_an_e_stop_node_that_hangs_keeps_neither_its_robot_nor_another_from_bein
         said = {answer["robot"]: answer for answer in json.loads(done.stdout)["robots"]}
         assert said["floating_platform"]["done"], said
         assert "no e-stop node answers" in said["floating_platform"]["said"]
-        assert not said["a_robot"]["done"]  # it has no plant that could hear
+        assert not said["a_robot"]["done"]  # it has no plant that could receive
         assert done.returncode == 1
         assert "Traceback" not in done.stderr
         until(lambda: not drive(neighbour) and "e-stop: pressed" in neighbour.said["plant"][0])
@@ -286,7 +286,7 @@ def test_an_e_stop_node_that_hangs_keeps_neither_its_robot_nor_another_from_bein
             node.wait()
 
 
-def test_where_nobody_is_heard_the_command_says_what_to_do(ros_domain: RosDomain, monkeypatch) -> None:
+def test_where_nobody_is_received_the_command_says_what_to_do(ros_domain: RosDomain, monkeypatch) -> None:
     monkeypatch.setattr(robot_operator, "FIND_S", 0.2)
     with pytest.raises(RunFailed, match="ROS_DOMAIN_ID"):
         estop()

@@ -53,7 +53,7 @@ ROBOTS, TASKS = (
 
 
 class Wanderer:
-    """Does something that depends on all that it sees and is told, and on what it has seen; reaches nothing."""
+    """Does something that depends on all that it sees and is reported, and on what it has seen; reaches nothing."""
 
     name, estimator = "wanderer", None
 
@@ -168,8 +168,10 @@ def test_a_policy_with_memory_goes_the_same_way_over_the_wires_as_without_them(
     from training.train import train
 
     robot, task = load_robot("turtlebot2"), load_task("go_to_position")
-    told = load_training_settings(robot, task, "recurrent_ppo")
-    briefly = replace(told, algorithm=replace(told.algorithm, epochs=1, steps=16, minibatch=256), worlds=64)
+    reported = load_training_settings(robot, task, "recurrent_ppo")
+    briefly = replace(
+        reported, algorithm=replace(reported.algorithm, epochs=1, steps=16, minibatch=256), worlds=64
+    )
     monkeypatch.setattr("training.train.held_out_evaluator", lambda *_: lambda network: (0.5, 0.5))
     train(robot, task, briefly, seed=1, out=tmp_path / "run", updates=2)
     assert export(tmp_path / "run", tmp_path / "bundle").memory

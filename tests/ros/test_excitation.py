@@ -1,4 +1,4 @@
-"""A run that is driven to identify the robot by, over ROS, and what its bag tells."""
+"""A run that is driven to identify the robot by, over ROS, and what its bag states."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from tests.ros.cli import fulmar, json_of
 
 
 @pytest.mark.slow
-def test_an_excited_run_succeeds_without_a_goal_and_its_bag_tells_thrust_and_inertia(
+def test_an_excited_run_succeeds_without_a_goal_and_its_bag_states_thrust_and_inertia(
     ros_domain: RosDomain, tmp_path: Path
 ) -> None:
     asked = ("floating_platform", "--controller", "excite", "--lockstep", "--duration", "60", "--seed", "4")
     done = fulmar("run", *asked, "--record", "bag", "--json", env=ros_domain.env, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
-    told = fulmar(
+    reported = fulmar(
         "identify", "bag", "--known", "mass=5.32+-0.005", "--json", env=ros_domain.env, cwd=tmp_path
     )
-    assert told.returncode == 0, told.stderr
-    estimates = json_of(told.stdout)["estimates"]
+    assert reported.returncode == 0, reported.stderr
+    estimates = json_of(reported.stdout)["estimates"]
     assert estimates["thrust"]["value"] == pytest.approx(1.0, rel=0.03)
     assert estimates["yaw_inertia"]["value"] == pytest.approx(0.2045, rel=0.03)
 

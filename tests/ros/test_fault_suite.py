@@ -1,4 +1,4 @@
-"""Faults done to live systems: each stops the robot in time, and a system that nothing was done to fails the judge."""
+"""The fault suite of a robot, and its results."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def test_faults_that_need_root_are_left_out_and_refused_where_there_is_none(monk
         faults_of("turtlebot2", ["cable_cut"])
 
 
-def test_a_fault_that_does_not_exist_is_told_with_the_nearest():
+def test_a_fault_that_does_not_exist_is_reported_with_the_nearest():
     with pytest.raises(UnknownNameError, match="Did you mean 'controller_killed'"):
         faults_of("turtlebot2", ["controller_kiled"])
 
@@ -85,7 +85,7 @@ def test_a_list_of_faults_may_end_with_a_comma_and_must_name_one():
 def test_a_robot_that_goes_on_or_never_moved_does_not_pass_for_one_that_stopped(
     ros_domain: RosDomain, tmp_path: Path
 ):
-    """The judge alone, with nothing done to the system."""
+    """The evaluate alone, with nothing done to the system."""
     with live_system(request_of("floating_platform", tmp_path / "bag")) as live:
         with pytest.raises(NothingShown):
             stopped(live, time.monotonic(), 0.1)

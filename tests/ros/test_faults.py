@@ -1,4 +1,4 @@
-"""What happens when a process dies, hangs or is told to stop: the robot stops, the bag stays, the run says why."""
+"""What happens when a process dies, hangs or is reported to stop: the robot stops, the bag stays, the run says why."""
 
 from __future__ import annotations
 
@@ -127,7 +127,7 @@ def check_that_a_second_run_is_refused(domain: RosDomain, folder: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("number", "told"),
+    ("number", "reported"),
     [
         (signal.SIGINT, "stopped by the user"),
         # one handler for all
@@ -136,7 +136,7 @@ def check_that_a_second_run_is_refused(domain: RosDomain, folder: Path) -> None:
     ],
 )
 def test_ctrl_c_sigterm_and_a_lost_terminal_stop_in_order_with_the_valves_closed_last(
-    number: signal.Signals, told: str, ros_domain: RosDomain, tmp_path: Path
+    number: signal.Signals, reported: str, ros_domain: RosDomain, tmp_path: Path
 ) -> None:
     """The bag is whole and ends with closed valves; no process is left behind."""
     run = start_run(ros_domain, tmp_path)
@@ -146,7 +146,7 @@ def test_ctrl_c_sigterm_and_a_lost_terminal_stop_in_order_with_the_valves_closed
     run.send_signal(number)
     out, _ = run.communicate(timeout=30.0)
     assert run.returncode == 1
-    assert json_of(out)["failure"] == told
+    assert json_of(out)["failure"] == reported
     assert nothing_left(children)
     record = read_run(tmp_path / "bag")
     assert not record.warnings
@@ -178,8 +178,8 @@ def test_a_ring_writes_the_run_of_a_controller_that_died(ros_domain: RosDomain, 
     assert len(record.goals) == 1
     assert len(record.truth) > 50
     assert not np.any(record.applied.effort[-1])
-    told = yaml.safe_load((tmp_path / "bag" / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
+    reported = yaml.safe_load((tmp_path / "bag" / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
     assert any(
         fault["reason"].startswith("plant: no command")
-        for fault in json.loads(told["custom_data"]["fulmar_faults"])
+        for fault in json.loads(reported["custom_data"]["fulmar_faults"])
     )

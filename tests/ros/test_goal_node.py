@@ -53,7 +53,7 @@ PATIENT = {"input_timeout_s": 5.0}  # a busy machine may hold up the odometry
 
 
 class Ears:
-    """Keeps every goal that is told."""
+    """Keeps every goal that is reported."""
 
     def __init__(self, neighbour: Neighbour) -> None:
         self.points: list[PointStamped] = []
@@ -230,7 +230,7 @@ def test_whoever_stops_the_node_stops_the_robot(tmp_path, neighbour: Neighbour, 
 
 
 def test_a_file_that_is_wrong_is_named(tmp_path, ros_domain: RosDomain, neighbour: Neighbour) -> None:
-    """Before anything is told."""
+    """Before anything is reported."""
     with pytest.raises(ConfigError, match=r"mine\.yaml"), goal_node(tmp_path, "kind: dances\ntitle: no\n"):
         pass
     assert rclpy.ok()
@@ -321,7 +321,7 @@ def test_a_pose_for_a_controller_that_takes_other_goals_ends_with_one_line(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("controller", [["odometry_may_repeat:=true"]], indirect=True)  # a mock has no noise
-def test_a_simulated_platform_goes_where_the_command_tells_it(
+def test_a_simulated_platform_goes_where_the_command_states_it(
     tmp_path, neighbour: Neighbour, plant: Any, controller: Any, ros_domain: RosDomain
 ) -> None:
     """`fulmar goals` in a process of its own, with a plant and an LQR that go to poses."""

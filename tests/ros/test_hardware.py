@@ -53,7 +53,7 @@ class Rig:
         self.neighbour, self.robot = neighbour, neighbour.robot.name
         self.device: list[np.ndarray] = []
         qos = subscriber_qos(DEVICE_STATE, reliable=True, depth=50)
-        neighbour.node.create_subscription(JointState, DEVICE_STATE.name, self._heard, qos)
+        neighbour.node.create_subscription(JointState, DEVICE_STATE.name, self._received, qos)
         found = load_hardware(hardware)
         emulation = emulation_of(found, folder)
         plan = RunPlan(self.robot, "go_to_position", "policy", "hardware", 10.0)
@@ -64,7 +64,7 @@ class Rig:
         self.plant = plant_spec(plan, port=emulation.port)
         self.group.start(self.plant)
 
-    def _heard(self, message: JointState) -> None:
+    def _received(self, message: JointState) -> None:
         self.device.append(np.array(message.effort))
 
     @property
@@ -161,8 +161,8 @@ def valves(neighbour: Neighbour, tmp_path: Path) -> Iterator[tuple[ValveBank, ps
 @pytest.mark.parametrize(
     "number", ["SIGHUP", *(pytest.param(n, marks=pytest.mark.slow) for n in ("SIGTERM", "SIGINT", "SIGQUIT"))]
 )
-def test_a_driver_that_is_told_to_end_closes_its_valves_first(valves, number: str) -> None:
-    """SIGHUP is what a driver hears whose ssh connection drops."""
+def test_a_driver_that_is_reported_to_end_closes_its_valves_first(valves, number: str) -> None:
+    """SIGHUP is what a driver receives whose ssh connection drops."""
     bank, driver = valves
     driver.send_signal(signal.Signals[number])
     until(lambda: not bank.command(0.0).any(), timeout_s=1.0)
@@ -237,7 +237,7 @@ RUNS = (  # with as many seconds as each needs to get there and stay for four
 @pytest.mark.slow
 @pytest.mark.timeout(240)
 def test_runs_reach_their_goals_through_the_protocols(ros_domain: RosDomain, tmp_path: Path) -> None:
-    """Driver, protocol, controller and recorder as on the robot; judged by where the emulated robot really is."""
+    """Driver, protocol, controller and recorder as on the robot; evaluated by where the emulated robot really is."""
     with reserved_domains(2) as domains, ThreadPoolExecutor(2) as pool:
         free: SimpleQueue[int] = SimpleQueue()
         for domain in domains:

@@ -15,7 +15,7 @@ pytestmark = pytest.mark.real_time
 
 
 @pytest.mark.slow
-def test_a_cell_tells_latency_errors_of_the_period_and_what_each_node_uses() -> None:
+def test_a_cell_states_latency_errors_of_the_period_and_what_each_node_uses() -> None:
     """rclpy's own executor, whose figures nothing is asked of, at 100 Hz."""
     figures = measure([Cell(100.0, False, "default")], 1.0, lambda _done: None)
     (row,) = figures["cells"]
@@ -29,7 +29,7 @@ def test_a_cell_tells_latency_errors_of_the_period_and_what_each_node_uses() -> 
 
 
 @pytest.mark.slow
-def test_a_long_run_tells_growth_of_memory_and_commands_that_the_bag_lacks(tmp_path: Path) -> None:
+def test_a_long_run_states_growth_of_memory_and_commands_that_the_bag_lacks(tmp_path: Path) -> None:
     figures = endure(simulated_s=10.0, rate=4.0, folder=tmp_path / "long", progress=lambda _done: None)
     assert figures["commands_lost"] == 0
     assert figures["commands_in_the_bag"] >= figures["commands_answered"] > 300
@@ -44,6 +44,6 @@ def test_idle_cells_come_first_and_loads_do_not_reach_into_them() -> None:
 
 
 @pytest.mark.parametrize("wrong", [{"rates": "0"}, {"rates": "fast"}, {"executors": "mine"}])
-def test_rates_and_executors_that_do_not_exist_are_told(wrong: dict[str, str]) -> None:
+def test_rates_and_executors_that_do_not_exist_are_reported(wrong: dict[str, str]) -> None:
     with pytest.raises(ConfigError, match=next(iter(wrong))):
         latency(**{"rates": "50", "seconds": 1.0, "executors": "events", "as_json": False, **wrong})

@@ -262,17 +262,17 @@ def goals(neighbour: Neighbour, request: pytest.FixtureRequest) -> Iterator[Goal
 
 @given(messages=st.lists(odometries() | good_odometries(), max_size=10), lockstep=st.booleans())
 @FUZZ
-def test_a_goal_node_tells_nothing_but_finite_goals(
+def test_a_goal_node_states_nothing_but_finite_goals(
     goals: GoalNode, messages: list[Odometry], lockstep: bool
 ) -> None:
-    told: list[object] = []
-    goals._publisher.publish = told.append  # type: ignore[method-assign]
+    reported: list[object] = []
+    goals._publisher.publish = reported.append  # type: ignore[method-assign]
     goals._settings = dataclasses.replace(goals._settings, lockstep=lockstep)
     for message in messages:
         with np.errstate(all="ignore"):
             goals._on_odometry(message)
             goals._watch()
-    for message in told:
+    for message in reported:
         goal, problem = goal_of(message)
         assert goal is not None, problem
 
@@ -348,7 +348,7 @@ def test_a_recorder_keeps_any_bytes_and_loses_none(
         st.sampled_from(topics), st.binary(max_size=200) | st.tuples(st.integers(0, 200), st.integers(0, 255))
     )
     @FUZZ
-    def hear(topic: str, data: bytes | tuple[int, int]) -> None:
+    def receive(topic: str, data: bytes | tuple[int, int]) -> None:
         nonlocal count
         if isinstance(data, tuple):  # a real one with a byte changed
             spoilt = bytearray(error)
@@ -357,7 +357,7 @@ def test_a_recorder_keeps_any_bytes_and_loses_none(
         node._keep(topic)(data, {"source_timestamp": 1})
         count += 1
 
-    hear()
+    receive()
     node._keep("/diagnostics")(error, {"source_timestamp": 1})
     assert node.stop() == 0
     node.destroy_node()

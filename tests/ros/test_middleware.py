@@ -22,7 +22,7 @@ publisher = node.create_publisher(Odometry, "odom", 10)
 print("ready", flush=True)
 input()
 """
-NOBODY = 25  # number of a participant that is not there; its port is told of everybody all the same
+NOBODY = 25  # number of a participant that is not there; its port is reported of everybody all the same
 
 
 @contextmanager
@@ -39,7 +39,7 @@ def node(env: dict[str, str]) -> Iterator[subprocess.Popen[str]]:
         child.communicate("\n")
 
 
-def heard(port: socket.socket, seconds: float) -> int:
+def received(port: socket.socket, seconds: float) -> int:
     """How many datagrams come in so many seconds."""
     count, end = 0, time.monotonic() + seconds
     while (left := end - time.monotonic()) > 0.0:
@@ -52,11 +52,11 @@ def heard(port: socket.socket, seconds: float) -> int:
     return count
 
 
-def test_whoever_misses_the_first_words_of_a_node_soon_hears_of_it(ros_domain: RosDomain) -> None:
+def test_whoever_misses_the_first_words_of_a_node_soon_receives_of_it(ros_domain: RosDomain) -> None:
     """By itself Fast DDS speaks in the first half second and then every 3 s."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as port:
         port.bind(("127.0.0.1", 7400 + 250 * ros_domain.id + 10 + 2 * NOBODY))  # RTPS 2.2, §9.6.1.1
         with node(ros_domain.env):
-            assert heard(port, 0.5) >= 1
-            heard(port, 0.5)
-            assert heard(port, 1.0) >= 3
+            assert received(port, 0.5) >= 1
+            received(port, 0.5)
+            assert received(port, 1.0) >= 3

@@ -111,9 +111,9 @@ def test_two_named_robots_of_one_type_reach_their_own_goals_in_one_domain(
         }
         assert first[ODOMETRY].child_frame_id == first[TRUTH].child_frame_id == f"{name}/base_link"
         info = fulmar("bag", "info", name, "--json", env=ros_domain.env, cwd=tmp_path)
-        told = json_of(info.stdout)
-        assert (told["damage"], told["provenance"]["name"]) == ([], name)
-        assert {topic["name"].split("/")[1] for topic in told["topics"]} == {name, "clock", "diagnostics"}
+        reported = json_of(info.stdout)
+        assert (reported["damage"], reported["provenance"]["name"]) == ([], name)
+        assert {topic["name"].split("/")[1] for topic in reported["topics"]} == {name, "clock", "diagnostics"}
         again = fulmar("bag", "rerun", name, "--tolerance", "1e-9", env=ros_domain.env, cwd=tmp_path)
         assert again.returncode == DONE, again.stdout
     report = fulmar("report", *GOALS, env=ros_domain.env, cwd=tmp_path)

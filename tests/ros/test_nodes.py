@@ -149,5 +149,5 @@ def test_a_node_survives_its_whole_lifecycle_twice(
     assert not ours
     for transition in ("configure", "activate"):
         assert getattr(node, f"trigger_{transition}")() == TransitionCallbackReturn.SUCCESS
-    heard = len(neighbour.applied) if part == "plant" else len(neighbour.commands)
-    until(lambda: (len(neighbour.applied) if part == "plant" else len(neighbour.commands)) > heard)
+    received = len(neighbour.applied) if part == "plant" else len(neighbour.commands)
+    until(lambda: (len(neighbour.applied) if part == "plant" else len(neighbour.commands)) > received)

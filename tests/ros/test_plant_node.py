@@ -159,7 +159,7 @@ def test_wheels_follow_cmd_vel_and_slow_down_within_a_second_when_it_falls_silen
         node.stop()
 
 
-def test_in_real_time_the_newest_command_is_heard_from_best_effort_publishers_too(
+def test_in_real_time_the_newest_command_is_received_from_best_effort_publishers_too(
     neighbour: Neighbour, plant: PlantNode
 ) -> None:
     """A reader that asks for reliability holds newer commands back behind one that a network lost."""

@@ -98,9 +98,9 @@ def check_provenance(file):
     """A bag carries the code and the packages that made it."""
     with file.open("rb") as stream:
         files = {file.name: file.data for file in make_reader(stream).iter_attachments()}
-    told = json.loads(files["provenance.json"])
-    assert told["packages"]["numpy"] == version("numpy")
-    assert set(told) == {"fulmar_version", "git_revision", "python", "platform", "packages"}
+    reported = json.loads(files["provenance.json"])
+    assert reported["packages"]["numpy"] == version("numpy")
+    assert set(reported) == {"fulmar_version", "git_revision", "python", "platform", "packages"}
 
 
 def test_a_killed_recorder_leaves_a_bag_up_to_its_last_second(record, node):
@@ -176,11 +176,11 @@ def test_in_real_time_a_recorder_that_hangs_holds_up_nothing(record, node):
             publisher.publish(Odometry())
         return time.monotonic() - begin
 
-    heard_s = [round_s() for _ in range(3)]
+    received_s = [round_s() for _ in range(3)]
     recorder.process.send_signal(signal.SIGSTOP)
     hung_s = [round_s() for _ in range(3)]
     # Who is held up is so each time; the machine's own pauses are not.
-    assert statistics.median(hung_s) < 3.0 * statistics.median(heard_s)
+    assert statistics.median(hung_s) < 3.0 * statistics.median(received_s)
 
 
 PUBLISHES_AND_ASKS = """

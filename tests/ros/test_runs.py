@@ -1,4 +1,4 @@
-"""Whole runs: plant, controller and recorder as processes, started and judged by `fulmar run`."""
+"""Whole runs: plant, controller and recorder as processes, started and evaluated by `fulmar run`."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ def test_the_mock_backend_runs_without_mujoco(ros_domain: RosDomain, tmp_path: P
         pytest.param("modular_freeflyer", "go_through_poses", "goals_reached", marks=pytest.mark.slow),
     ],
 )
-def test_every_kind_of_goal_and_robot_runs_and_is_judged(
+def test_every_kind_of_goal_and_robot_runs_and_is_evaluated(
     robot: str, task: str, figure: str, ros_domain: RosDomain, tmp_path: Path
 ) -> None:
     """Paths, obstacles, velocities; wheels, propellers, steering and thrusters that open by degrees."""
@@ -157,7 +157,7 @@ def test_a_realtime_run_holds_its_rate_and_records_every_wire(ros_domain: RosDom
 
 @pytest.mark.slow
 def test_evaluation_through_ros_agrees_with_mujoco_alone(ros_domain: RosDomain, tmp_path: Path) -> None:
-    """The same episodes, the same simulator, the same law: ROS in between must not change the verdict."""
+    """The same episodes, the same simulator, the same law: ROS in between must not change the result."""
     asked = (
         "evaluate",
         "floating_platform",
@@ -210,7 +210,7 @@ def test_places_of_a_file_are_visited_one_after_another(ros_domain: RosDomain, t
 
 
 @pytest.mark.slow
-def test_a_ring_without_a_fault_is_a_run_without_a_bag_or_a_verdict(
+def test_a_ring_without_a_fault_is_a_run_without_a_bag_or_a_result(
     ros_domain: RosDomain, tmp_path: Path
 ) -> None:
     """Nobody recorded whether the goal was met, so nobody says so."""

@@ -1,4 +1,4 @@
-"""The operator's side of a run, against plants that do not do as they are told."""
+"""The operator's side of a run, against plants that do not do as they are reported."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def operated(
         other = rclpy.create_node("other", namespace=NAMESPACE)
         button = Button(other)
         with spinning(controller, overseer.fail):
-            until(lambda: "no odom yet" in reason(overseer))  # the e-stop is heard, and released
+            until(lambda: "no odom yet" in reason(overseer))  # the e-stop is received, and released
             yield overseer, button, other
             controller.stop()
         button.stop()
@@ -115,7 +115,7 @@ def give(
     return thread
 
 
-def test_a_goal_that_was_refused_for_a_silent_e_stop_is_told_again(
+def test_a_goal_that_was_refused_for_a_silent_e_stop_is_reported_again(
     operated: tuple[Supervisor, Button, Node],
 ) -> None:
     overseer, button, _ = operated
@@ -131,7 +131,7 @@ def test_a_goal_that_was_refused_for_a_silent_e_stop_is_told_again(
     assert overseer.controller.values["goal_refused"] == ""
 
 
-def test_a_goal_that_a_silent_e_stop_took_away_before_all_were_ready_is_told_again(
+def test_a_goal_that_a_silent_e_stop_took_away_before_all_were_ready_is_reported_again(
     operated: tuple[Supervisor, Button, Node],
 ) -> None:
     overseer, button, other = operated
@@ -147,7 +147,7 @@ def test_a_goal_that_a_silent_e_stop_took_away_before_all_were_ready_is_told_aga
     assert overseer.controller.values["goal_stamp_ns"] == "6"
 
 
-def test_a_goal_that_was_refused_for_a_pressed_e_stop_is_not_told_again_by_itself(
+def test_a_goal_that_was_refused_for_a_pressed_e_stop_is_not_reported_again_by_itself(
     operated: tuple[Supervisor, Button, Node],
 ) -> None:
     overseer, button, other = operated

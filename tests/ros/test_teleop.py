@@ -116,14 +116,14 @@ def test_a_plant_that_dies_while_it_is_asked_does_not_keep_the_hand_for_ever(
         node.stop()
 
 
-def test_without_a_plant_of_the_name_it_lists_the_robots_that_are_heard(
+def test_without_a_plant_of_the_name_it_lists_the_robots_that_are_received(
     plant: PlantNode, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(teleop_node, "PATIENCE_S", 0.5)
     arguments = ["--ros-args", "-r", "__ns:=/alpha", "-p", "keyboard:=false"]
     said: list[str] = []
 
-    def told() -> bool:
+    def reported() -> bool:
         said.append(capfd.readouterr().err)
         return "no plant subscribes /alpha/teleop/command. Running robots: floating_platform." in "".join(
             said
@@ -131,7 +131,7 @@ def test_without_a_plant_of_the_name_it_lists_the_robots_that_are_heard(
 
     node = TeleopNode(lambda _code: None, cli_args=arguments)
     with spinning(node, lambda error: pytest.fail(repr(error))):
-        until(told)
+        until(reported)
         node.stop()
 
 

@@ -61,7 +61,7 @@ def identify(
     trials = [Trial(name, number, seed, duration, bags) for name in names for number in range(platforms)]
     done = 0
 
-    def tell(result: dict[str, Any]) -> None:
+    def state(result: dict[str, Any]) -> None:
         nonlocal done
         done += 1
         progress(done, len(trials))
@@ -73,7 +73,7 @@ def identify(
         console.print(f"{result['robot']} {result['number']}: {worst}", markup=False, soft_wrap=True)
 
     with work_bar("driving") as progress:
-        results = run_identification(trials, jobs=jobs or len(os.sched_getaffinity(0)), on_done=tell)
+        results = run_identification(trials, jobs=jobs or len(os.sched_getaffinity(0)), on_done=state)
     document = document_of(results, seed=seed)
     if as_json:
         print_json(document)

@@ -135,7 +135,7 @@ def lost_in_lock_step(robot: str, *, control_hz: float, simulated_s: float, out:
     }
 
 
-AT_ONCE = 5  # recorders that hear the same traffic and die one after another
+AT_ONCE = 5  # recorders that receive the same traffic and die one after another
 LONGEST_S = 10.0  # a recorder lives up to this long [s]
 SHORT_FILES = Recording(split_s=1.0)  # every other recorder, so that some die while they change files
 

@@ -73,6 +73,6 @@ def test_refusals_in_a_row_latch_with_the_last_reason():
 
 def test_one_good_command_breaks_the_row_but_not_the_total():
     rejections = Rejections(to_latch=2)
-    verdicts = [rejections.note(reason) for reason in ("x", None, "x", None, "x")]
-    assert verdicts == [None] * 5
+    results = [rejections.note(reason) for reason in ("x", None, "x", None, "x")]
+    assert results == [None] * 5
     assert rejections.total == 3

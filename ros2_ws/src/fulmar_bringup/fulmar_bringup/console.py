@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 Result = TypeVar("Result", bound=dict[str, Any])
 
-# Without emoji: `robot.yaml:100: ...` would come out with a picture in the place of its line.
+# Without emoji: `robot.yaml:100: ...` would come out with a symbol in place of its line.
 console = Console(stderr=True, highlight=False, emoji=False)
 output = Console(highlight=False, emoji=False)
 

@@ -69,8 +69,8 @@ def free_memory(meminfo: Path = MEMINFO, cgroup: Path = CGROUP) -> int:
     """Memory that this process may still take [bytes]; without bound where the system does not tell.
 
     Args:
-        meminfo: What Linux tells of the machine.
-        cgroup: What Linux tells of the container or unit that this process runs in.
+        meminfo: What Linux reports of the machine.
+        cgroup: What Linux reports of the container or unit that this process runs in.
     """
     try:
         lines = dict(line.split(":", 1) for line in meminfo.read_text().splitlines())

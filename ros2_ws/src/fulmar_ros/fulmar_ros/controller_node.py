@@ -33,7 +33,7 @@ from fulmar_ros.controller_status import PERIOD_S, ControllerStatus
 from fulmar_ros.controller_wires import ControllerWires
 from fulmar_ros.convert import OdometryReader, VectorReader
 from fulmar_ros.deadline import ControlBeat
-from fulmar_ros.fallback import MakeController, PolicySwap, line_up, load_other
+from fulmar_ros.fallback import MakeController, PolicySwap, controllers_of, load_other
 from fulmar_ros.goal_messages import GoalMessage
 from fulmar_ros.graph import WireWatch
 from fulmar_ros.parameters import own_frames, read_parameters
@@ -99,7 +99,7 @@ class ControllerNode(LifecycleNode):
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Load, validate and warm up the controller; refuse it if anything is wrong."""
         try:
-            succession = line_up(
+            switch = controllers_of(
                 self._make_controller, self.robot, self.task, self.settings, self.get_logger().error
             )
         except (FulmarError, ImportError) as error:
@@ -107,7 +107,7 @@ class ControllerNode(LifecycleNode):
             self.get_logger().error(f"not configured: {error}")
             return REFUSED
         self.guard = GuardedLoop(
-            self.robot, self.task, self.settings, succession, self._estop, applied=self._applied
+            self.robot, self.task, self.settings, switch, self._estop, applied=self._applied
         )
         self.wires = ControllerWires(
             self,
@@ -125,7 +125,7 @@ class ControllerNode(LifecycleNode):
             on_bearing=self._on_bearing if self.settings.has_bearing(self.robot) else None,
             lockstep=self.settings.lockstep,
         )
-        self.wires.publish_metadata(succession.current.metadata)
+        self.wires.publish_metadata(switch.current.metadata)
         self._wire_watch = WireWatch(self, self.wires.subscribed)
         # Lock step has no beat of its own; a wall-clock timer keeps the status alive between messages.
         self._status_timer = self.create_timer(PERIOD_S / 4, self._publish_idle_status)

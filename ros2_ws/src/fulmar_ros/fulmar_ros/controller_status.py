@@ -50,17 +50,17 @@ class ControllerStatus:
 
         `decision` is the arbiter's for now, `beliefs` are warnings about actuators.
         """
-        mission, succession, refusal = guard.mission, guard.switch, guard.refusal
-        standby, last_input_ns = succession.current, guard.flags.last_input_ns
+        mission, switch, refusal = guard.mission, guard.switch, guard.refusal
+        standby, last_input_ns = switch.current, guard.flags.last_input_ns
         changed = (
             decision.mode,
             decision.reason.split(" (")[0][:24],
             not self._goals_streamed and (mission.goal_stamp_ns, mission.goals_received),
             mission.obstacles_stamp_ns,
             refusal.stamp_ns,
-            succession.rejections,
+            switch.rejections,
             standby.sha256,
-            succession.fell_back,
+            switch.fell_back,
             self._swap.said,
             *self.wire_problems,
             beliefs.dead,
@@ -72,7 +72,7 @@ class ControllerStatus:
             return
         self._said, self._said_at = changed, now
         level = {Mode.ACTIVE: "ok", Mode.FAULT: "error"}.get(decision.mode, "warn")
-        doubtful = succession.fell_back or self.wire_problems or beliefs.words
+        doubtful = switch.fell_back or self.wire_problems or beliefs.words
         level = "warn" if level == "ok" and doubtful else level
         age_ms = (time.monotonic_ns() - last_input_ns) / 1e6 if last_input_ns else 0.0
         values = {
@@ -80,7 +80,7 @@ class ControllerStatus:
             "reason": decision.reason,
             "sha256": standby.sha256,
             "controller": standby.controller.name,
-            "fell_back": succession.fell_back,
+            "fell_back": switch.fell_back,
             "swap": self._swap.said,
             "believed_dead": ", ".join(beliefs.dead),
             "beliefs": "; ".join(beliefs.words),
@@ -99,7 +99,7 @@ class ControllerStatus:
             "observation_age_ms": f"{age_ms:.1f}",
             "control_rate_hz": f"{deadlines.rate_hz:.4f}",
             "overruns": str(deadlines.overruns),
-            "rejections": str(succession.rejections),
+            "rejections": str(switch.rejections),
             **self.inference_ms.percentiles("inference_ms"),
             **deadlines.period_error_ms.percentiles("period_error_ms"),
         }

@@ -18,7 +18,7 @@ from fulmar_core.tasks import Task
 MakeController = Callable[[Robot, Task, ControllerSettings], Controller]
 
 
-def line_up(
+def controllers_of(
     make_controller: MakeController,
     robot: Robot,
     task: Task,

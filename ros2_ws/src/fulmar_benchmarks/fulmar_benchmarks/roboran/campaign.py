@@ -18,9 +18,9 @@ from fulmar_core.provenance import fulmar_version, git_revision
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 from fulmar_evaluation.evaluation import BATCH_EPISODES
-from fulmar_evaluation.evaluation import EPISODES as JUDGED
+from fulmar_evaluation.evaluation import EPISODES as EVALUATED
 
-EPISODES = {"batch": BATCH_EPISODES, "mujoco": JUDGED, "ros": 16}
+EPISODES = {"batch": BATCH_EPISODES, "mujoco": EVALUATED, "ros": 16}
 
 
 @dataclass(frozen=True)
@@ -96,11 +96,11 @@ def run_benchmark(
         command=request.command,
         wall_s=time.monotonic() - began,
     )
-    judged = {
+    evaluated = {
         pair: {way: outcome for way, outcome in ways.items() if isinstance(outcome, PairResult)}
         for pair, ways in by_pair.items()
     }
-    return CampaignResult(document, pairs, judged)
+    return CampaignResult(document, pairs, evaluated)
 
 
 def document_of(

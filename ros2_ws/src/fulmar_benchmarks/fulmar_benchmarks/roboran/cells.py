@@ -90,7 +90,9 @@ def rows(task: str, entries: list[dict[str, Any]]) -> list[Row]:
     """Every quantity of a task, a cell for each pair; figures are means of its first way."""
     figure = "share of the bound" if task == "go_through_positions" else "success"
     ways = [way for way in WAYS if any(way in entry["ways"] for entry in entries)]
-    table = [Row(f"{figure}, {WAYS[way]}", tuple(_judged(entry, way) for entry in entries)) for way in ways]
+    table = [
+        Row(f"{figure}, {WAYS[way]}", tuple(_evaluated(entry, way) for entry in entries)) for way in ways
+    ]
     table += [
         Row("required", tuple(_required(entry) for entry in entries)),
         Row("thesis: success", tuple(_thesis_success(entry) for entry in entries)),
@@ -111,7 +113,7 @@ def _checks(entry: dict[str, Any]) -> dict[str, dict[str, Any]]:
     return {check["name"]: check for check in entry["verdicts"]}
 
 
-def _judged(entry: dict[str, Any], way: str) -> Cell:
+def _evaluated(entry: dict[str, Any], way: str) -> Cell:
     return Cell(_number(entry["judged"].get(way), 3), _tone(_checks(entry).get(way)))
 
 

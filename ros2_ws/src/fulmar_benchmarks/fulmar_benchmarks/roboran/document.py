@@ -24,12 +24,12 @@ def pair_entry(pair: Pair, outcomes: dict[str, PairResult | str]) -> dict[str, A
     Returns:
         An entry of `pairs`; docs/evaluation.md names its keys.
     """
-    judged = {way: outcome for way, outcome in outcomes.items() if isinstance(outcome, PairResult)}
+    evaluated = {way: outcome for way, outcome in outcomes.items() if isinstance(outcome, PairResult)}
     faults = [f"{way}: {outcome}" for way, outcome in outcomes.items() if isinstance(outcome, str)]
     figure = main_figure(pair.task)
-    values = {way: _value(outcome, figure) for way, outcome in judged.items()}
+    values = {way: _value(outcome, figure) for way, outcome in evaluated.items()}
     training_s = _seconds(pair.passport.get("wall_s"))
-    same = judged["batch"].about.get("same_at_64_worlds") if "batch" in judged else None
+    same = evaluated["batch"].about.get("same_at_64_worlds") if "batch" in evaluated else None
     checks = (
         checks_of(pair.robot, pair.task, values, same=same, training_s=training_s)
         if pair.kind == "policy"
@@ -42,15 +42,15 @@ def pair_entry(pair: Pair, outcomes: dict[str, PairResult | str]) -> dict[str, A
         "kind": pair.kind,
         "controller": pair.controller or None,
         "law": pair.law or None,
-        "status": "missing" if pair.missing else "failed" if faults or not judged else "judged",
+        "status": "missing" if pair.missing else "failed" if faults or not evaluated else "judged",
         "reason": pair.reason or "; ".join(faults) or None,
         "sha256": pair.sha256 or None,
         "training_s": training_s,
         "judged_figure": figure,
         "judged": values,
-        "judged_in_batch_on_mujocos_episodes": _on_mujocos_episodes(judged, figure),
+        "judged_in_batch_on_mujocos_episodes": _on_mujocos_episodes(evaluated, figure),
         "same_at_64_worlds": same,
-        "ways": {way: _way(outcome) for way, outcome in judged.items()},
+        "ways": {way: _way(outcome) for way, outcome in evaluated.items()},
         "thesis": dataclasses.asdict(thesis_row(pair.robot, pair.task))
         | {"time_to_target_s": thesis_row(pair.robot, pair.task).time_to_target_s},
         "verdicts": [dataclasses.asdict(check) for check in checks],
@@ -86,11 +86,11 @@ def _value(outcome: PairResult, figure: str, episodes: int | None = None) -> flo
     return float(np.nanmean(values[:episodes]))
 
 
-def _on_mujocos_episodes(judged: dict[str, PairResult], figure: str) -> float | None:
+def _on_mujocos_episodes(evaluated: dict[str, PairResult], figure: str) -> float | None:
     """The main figure of the batch on the very episodes that MuJoCo ran."""
-    if not {"batch", "mujoco"} <= set(judged):
+    if not {"batch", "mujoco"} <= set(evaluated):
         return None
-    return _value(judged["batch"], figure, len(judged["mujoco"].succeeded))
+    return _value(evaluated["batch"], figure, len(evaluated["mujoco"].succeeded))
 
 
 def _seconds(value: Any) -> float | None:

@@ -98,14 +98,14 @@ def main_figure(task: str) -> str:
 
 
 def checks_of(
-    robot: str, task: str, judged: dict[str, float], *, same: bool | None, training_s: float | None
+    robot: str, task: str, evaluated: dict[str, float], *, same: bool | None, training_s: float | None
 ) -> list[Check]:
     """Compare a pair with what is required of it.
 
     Args:
         robot: Name of the robot.
         task: Name of the task.
-        judged: The main figure by way: batch, mujoco, ros.
+        evaluated: The main figure by way: batch, mujoco, ros.
         same: Whether figures were the same with 64 worlds as with all; None: not looked at.
         training_s: Wall-clock that the policy was trained for; None for what was not trained [s].
 
@@ -117,9 +117,9 @@ def checks_of(
         return []
     found = [
         Check(way, value, least, None if value is None else value >= least)
-        for way, value in ((way, judged.get(way)) for way in ("batch", "mujoco"))
+        for way, value in ((way, evaluated.get(way)) for way in ("batch", "mujoco"))
     ]
-    gap = abs(judged["batch"] - judged["mujoco"]) if {"batch", "mujoco"} <= set(judged) else None
+    gap = abs(evaluated["batch"] - evaluated["mujoco"]) if {"batch", "mujoco"} <= set(evaluated) else None
     found.append(Check("batch_minus_mujoco", gap, WAY_GAP, None if gap is None else gap <= WAY_GAP))
     found.append(Check("same_at_64_worlds", None if same is None else float(same), 1.0, same))
     if training_s is not None:

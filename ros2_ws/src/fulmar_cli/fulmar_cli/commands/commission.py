@@ -61,7 +61,7 @@ def commission(
     say = (lambda text: None) if as_json else lambda text: write_line(f"  {text}")
     if not as_json:
         write_line("each wire is pulsed; keep a hand on the e-stop (`fulmar estop`)" if yes
-            else "AIR CLOSED? Each valve clicks once; note which one you hear:")  # fmt: skip
+            else "AIR CLOSED? Each valve clicks once; note which one clicks:")  # fmt: skip
     found = conduct(request, say)
     value = found.get(found.get("key", ""))
     target = out or (hardware_path(hardware) if write else None)
@@ -76,7 +76,7 @@ def commission(
         if target is not None and found["written"] is None:
             log_line("nothing was written: correct what is named above first")
     else:
-        write_line("heard each? Open the air, free 0.5 m around the robot, and add --yes")
+        write_line("did each click? Open the air, free 0.5 m around the robot, and add --yes")
     raise typer.Exit(DONE if found["success"] else FAILED)
 
 

@@ -33,8 +33,8 @@ def doctor(
     With --for hardware also for each hardware file what stops the device when the driver dies; for a named one also
     whether its port is there.
     """
+    from fulmar_cli.diagnosis.check_result import healthy
     from fulmar_cli.diagnosis.checks import PURPOSES, diagnose
-    from fulmar_cli.diagnosis.finding import healthy
 
     if purpose is not None and purpose not in PURPOSES:
         raise UnknownNameError("purpose of --for", purpose, PURPOSES)

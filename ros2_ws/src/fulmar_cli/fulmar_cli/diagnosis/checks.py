@@ -7,8 +7,8 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
+from fulmar_cli.diagnosis.check_result import Finding
 from fulmar_cli.diagnosis.devices import check_permissions, devices_of, diagnose_hardware
-from fulmar_cli.diagnosis.finding import Finding
 from fulmar_cli.diagnosis.installation import (
     check_configuration,
     check_extra,

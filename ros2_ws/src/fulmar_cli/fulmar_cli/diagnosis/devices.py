@@ -7,7 +7,7 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from fulmar_cli.diagnosis.finding import Finding
+from fulmar_cli.diagnosis.check_result import Finding
 from fulmar_cli.diagnosis.installation import check_module
 from fulmar_core.errors import FulmarError
 from fulmar_core.paths import config_names

@@ -6,7 +6,7 @@ import importlib
 import sys
 from importlib.metadata import PackageNotFoundError, version
 
-from fulmar_cli.diagnosis.finding import Finding
+from fulmar_cli.diagnosis.check_result import Finding
 from fulmar_cli.extras import EXTRAS
 from fulmar_core.errors import FulmarError
 from fulmar_core.paths import config_directories, config_names

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fulmar_cli.diagnosis.finding import Finding
+from fulmar_cli.diagnosis.check_result import Finding
 from fulmar_core.process import PLANT_PRIORITY
 
 LATE_MS = 2.0  # what a 50 Hz loop may be late at the 99th percentile

@@ -15,7 +15,7 @@ from fulmar_bringup.shared_memory_cleanup import (
     count_abandoned_memory,
     give_back_abandoned_memory,
 )
-from fulmar_cli.diagnosis.finding import Finding
+from fulmar_cli.diagnosis.check_result import Finding
 from fulmar_ros.middleware import DISCOVERY_RANGE
 
 RANGES = ("SUBNET", "LOCALHOST", "OFF", "SYSTEM_DEFAULT")

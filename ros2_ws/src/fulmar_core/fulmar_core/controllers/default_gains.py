@@ -73,7 +73,7 @@ def lqr_weights(robot: Robot) -> LqrWeights:
         overshoot=1.0,
         braking=0.6,  # the rest is for pushes, and for a body that is heavier than written down
         least_open_s=0.04 if thrusters.binary else 0.0,
-        observer=_suspicion(robot, thrusters) if can_estimate_health(robot) else None,
+        observer=_health_settings(robot, thrusters) if can_estimate_health(robot) else None,
         speed_around=0.4,
     )
 
@@ -91,7 +91,7 @@ def _least(thrusters: Thrusters, columns: list[int], directions: np.ndarray) -> 
     return float(most.min())
 
 
-def _suspicion(robot: Robot, thrusters: Thrusters) -> HealthSettings:
+def _health_settings(robot: Robot, thrusters: Thrusters) -> HealthSettings:
     """The observer's own defaults, in proportion to one valve, and no less noise than the robot's sensors have."""
     usual, sensors = HealthSettings(), robot.sensors.odometry
     pushes = thrusters.thrust / SUSPECTED_FORCE

@@ -32,7 +32,7 @@ class MpcGains(LqrWeights):
     aligned: float = 1.0  # same of a second away from the heading [1/s]
     position_scale: float = 0.01  # where half of the cost is lost [m]
     heading_scale_deg: float = 1.0  # [deg]
-    gas: float = 0.01  # cost of one open valve for a second [1/s]
+    gas: float = 0.01  # cost of one open valve for a second [1/s]  # word: key of gains files
     pace: float = 10.0  # cost of a second at another velocity than the LQR asks for [s/m²]
     rest: float = 1.0  # factor on the LQR's cost of what is left at the end [-]
 
@@ -75,7 +75,7 @@ class Mpc(Law):
         self._commands, wrench, self._offset = allocation.every
         self._force, self._torque = wrench[:, 0] + 1j * wrench[:, 1], wrench[:, 2]
         self._slope = 2.0 * allocation.weight @ wrench.T
-        self._price = dt * gains.gas * self._commands.sum(axis=1)
+        self._price = dt * gains.gas * self._commands.sum(axis=1)  # word: key of gains files
 
     def command(self, inputs: Inputs) -> np.ndarray:
         """Choose valves; shapes as in `Controller.act`."""

@@ -112,7 +112,7 @@ class Actuation:
     failures: int = 0  # most actuators that stay closed or still for a whole episode
     failure_chance: float = 0.0  # of each of these [-]
     # Only failures, all at once, after which no pose can be held, where a robot has thrusters that can fail so.
-    stranding: bool = False
+    stranding: bool = False  # word: YAML key
 
     def __post_init__(self) -> None:
         if min(self.noise, self.delay_s, self.failures, self.gain[0], self.failure_chance) < 0.0:
@@ -125,8 +125,8 @@ class Actuation:
             raise ValueError(
                 "'failures' and 'failure_chance' need one another: how many may fail, and how often."
             )
-        if self.stranding and not self.failures:
-            raise ValueError("'stranding' needs 'failures', the number of those that are lost together.")
+        if self.stranding and not self.failures:  # word: YAML key
+            raise ValueError("'stranding' needs 'failures': how many are lost together.")  # word: YAML key
         if not 0.0 <= self.least_noise <= 1.0:
             raise ValueError("'least_noise' must lie in [0, 1].")
 
@@ -263,7 +263,7 @@ def draw_world(robot: Robot, scenario: Scenario, draws: Draws) -> World:
     offset = uncertain * draws.uniform(0.0, spans.center_of_mass)
     xp = array_namespace(mass)
     faults, sensing = scenario.actuation, scenario.sensing
-    together = uncontrollable_losses(robot, faults.failures) if faults.stranding else ()
+    together = uncontrollable_losses(robot, faults.failures) if faults.stranding else ()  # word: YAML key
     force, torque = robot.performance.force, robot.performance.torque
     push, wave, kick = scenario.push, scenario.wave, scenario.kick
     size = force * push.force * draws.uniform(push.least, 1.0)

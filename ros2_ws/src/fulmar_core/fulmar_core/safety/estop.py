@@ -96,8 +96,8 @@ class EstopButton:
         Returns:
             Why it stays pressed; empty if it is released.
         """
-        for source, (heard_ns, moves) in sorted(self._moving.items()):
-            if moves and now_ns - heard_ns <= QUIET_NS:
+        for source, (received_ns, moves) in sorted(self._moving.items()):
+            if moves and now_ns - received_ns <= QUIET_NS:
                 return f"refused: the newest command on {source} is not zero. Stop who sends it, then reset."
         self.pressed = False
         return ""

@@ -63,8 +63,8 @@ class GoToPose(Task):
     fine_heading_deg: float = 0.0  # where the magnified heading error saturates; 0: not observed [deg]
     fine_speed: float = 0.0  # where magnified velocities saturate; 0: not observed [m/s]
     fine_yaw_rate: float = 0.0  # same of the turn rate; 0: not observed [rad/s]
-    # Instead of `reward_weights`, in training, where all failures leave no pose to hold (`stranding`).
-    stranded_weights: PoseReward | None = None
+    # In training, instead of `reward_weights`, where the dead valves leave no pose to hold.
+    stranded_weights: PoseReward | None = None  # word: key of task files
 
     goal_topic: ClassVar[str] = "goal_pose"
 

@@ -58,7 +58,7 @@ def write_benchmark(out: Path, title: str, parts: Sequence[Part], *, style: str 
         parts: Of the page, drawn inside `house_style`; each plot has a name.
         style: Rules beside those of every benchmark.
     """
-    folder = out / "pictures"
+    folder = out / "pictures"  # word: folder of reports
     folder.mkdir(parents=True, exist_ok=True)
     with house_style():
         for plot in parts:

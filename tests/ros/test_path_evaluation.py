@@ -1,4 +1,4 @@
-"""A path that is judged through the nodes: the goal node tells what a loop without ROS is told."""
+"""A path that is evaluated through the nodes: the goal node states what a loop without ROS is reported."""
 
 from __future__ import annotations
 
