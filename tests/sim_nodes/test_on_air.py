@@ -134,7 +134,7 @@ def test_held_for_2_s_by_hand_the_lqr_accuses_no_valve_and_reaches_its_goal(seed
 
 def test_without_the_test_for_a_hold_valves_are_accused_that_work():
     lqr = load_classical(ROBOT, TASK, control_hz=5.0, law="lqr")
-    gains = replace(lqr._weights, observer=replace(lqr._weights.observer, held=0.0, retry_s=0.0))
+    gains = replace(lqr.gains, observer=replace(lqr.gains.observer, held=0.0, retry_s=0.0))
     lqr = type(lqr)(ROBOT, TASK, gains, control_hz=5.0)
     accused = []
     for seed in range(2):
