@@ -65,8 +65,7 @@ def test_a_valve_that_works_again_is_believed_again_by_the_lqr():
         simulation = BatchSimulation(robot, task, scenario, worlds=worlds, seed=5, control_hz=5.0)
         lqr = load_classical(robot, task, control_hz=5.0, law="lqr")
         if not retries:
-            gains = replace(lqr._weights, observer=replace(lqr._weights.observer, retry_s=0.0))
-            lqr = type(lqr)(robot, task, gains, control_hz=5.0)
+            lqr.estimator = replace(lqr.estimator, retry_s=0.0)
         loop = ControlLoop(robot, task, lqr, robots=worlds)
         loop.begin(goal_in_float64(simulation.goal))
         loop.reset()
