@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from fulmar_core.estimation.estimator import Estimator
-from fulmar_core.estimation.motion_filter import EstimatorSettings
+from fulmar_core.estimation.settings import EstimatorSettings
 from fulmar_core.robot import Limits
 from fulmar_core.rotation import from_yaw
 from fulmar_core.sensors.imu import ImuSample

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from fulmar_core.errors import ConfigError
 from fulmar_core.estimation.estimator import TO_BEGIN_ANEW, Estimator
-from fulmar_core.estimation.motion_filter import load_estimator
+from fulmar_core.estimation.settings import load_estimator
 from fulmar_core.robot import load_robot
 from fulmar_core.rotation import from_yaw
 from fulmar_core.sensors.imu import ImuSample

@@ -11,7 +11,7 @@ from fulmar_bringup.emulation import Emulation
 from fulmar_bringup.goal_plan import is_path_of_places
 from fulmar_bringup.run_plan import NodeSpec, Parameter, RunPlan, node_row
 from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.estimation.motion_filter import load_estimator
+from fulmar_core.estimation.settings import load_estimator
 from fulmar_core.recording import Recording
 from fulmar_core.robot import load_robot
 from fulmar_core.robot_name import namespace_of

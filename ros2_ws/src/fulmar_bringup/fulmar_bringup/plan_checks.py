@@ -20,7 +20,7 @@ from fulmar_bringup.system import (
 from fulmar_core.bundle_signature import verify_bundle
 from fulmar_core.controllers.classical import has_law
 from fulmar_core.errors import BundleError, ConfigError, UnknownNameError
-from fulmar_core.estimation.motion_filter import load_estimator
+from fulmar_core.estimation.settings import load_estimator
 from fulmar_core.goal import Goal, PoseTuple
 from fulmar_core.own_class import is_own
 from fulmar_core.paths import config_names

@@ -18,7 +18,7 @@ from sensor_msgs.msg import Imu
 from fulmar_bags.message_reader import stamp_ns
 from fulmar_core.errors import shortened
 from fulmar_core.estimation.estimator import Estimate, Estimator
-from fulmar_core.estimation.motion_filter import load_estimator
+from fulmar_core.estimation.settings import load_estimator
 from fulmar_core.process import CONTROL_PRIORITY, take_priority_with_helpers
 from fulmar_core.robot import load_robot
 from fulmar_core.sensors.imu import ImuSample

@@ -19,12 +19,12 @@ from fulmar_core.estimation.motion_filter import (
     VX,
     VY,
     YAW,
-    EstimatorSettings,
     MotionFilter,
     Snapshot,
     X,
     Y,
 )
+from fulmar_core.estimation.settings import EstimatorSettings
 from fulmar_core.robot import Limits
 from fulmar_core.rotation import from_yaw, multiply, rotate, yaw_of
 from fulmar_core.sensors.imu import ImuSample
