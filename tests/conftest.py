@@ -47,8 +47,9 @@ def pytest_collection_finish() -> None:
 
 @pytest.fixture(autouse=True, scope="session")
 def interruptible() -> None:
-    """Let child processes receive SIGINT also if a shell runs the tests in its background, which ignores it."""
+    """Let children receive SIGINT also in the background of a shell, and SIGHUP also below nohup; both ignore them."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 
 @pytest.fixture(autouse=True, scope="session")

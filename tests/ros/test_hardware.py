@@ -161,7 +161,7 @@ def valves(neighbour: Neighbour, tmp_path: Path) -> Iterator[tuple[ValveBank, ps
 @pytest.mark.parametrize(
     "number", ["SIGHUP", *(pytest.param(n, marks=pytest.mark.slow) for n in ("SIGTERM", "SIGINT", "SIGQUIT"))]
 )
-def test_a_driver_that_is_reported_to_end_closes_its_valves_first(valves, number: str) -> None:
+def test_a_driver_that_is_asked_to_end_closes_its_valves_first(valves, number: str) -> None:
     """SIGHUP is what a driver receives whose ssh connection drops."""
     bank, driver = valves
     driver.send_signal(signal.Signals[number])
