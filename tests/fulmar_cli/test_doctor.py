@@ -1,4 +1,4 @@
-"""`fulmar doctor`: each check finds what is really wrong, and names the command that mends it."""
+"""`fulmar doctor`: each check finds what is really wrong, and names the command that repairs it."""
 
 from __future__ import annotations
 

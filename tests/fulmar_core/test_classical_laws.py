@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, fields, replace
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from fulmar_core.config import load_config
-from fulmar_core.controllers.classical import LAWS, OTHERS, load_classical
+from fulmar_core.controllers.classical import LAWS, OTHERS, check_pair, has_law, load_classical
+from fulmar_core.controllers.excite import Excite
 from fulmar_core.controllers.guidance import way_to_face
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.errors import ConfigError
@@ -218,3 +219,22 @@ def test_every_file_of_gains_belongs_to_a_robot_and_its_law():
     found = set(config_names("controllers"))
     assert every <= found <= every | others
     assert {name.removeprefix("floating_platform_") for name in found & others} == set(OTHERS)
+
+
+@dataclass(frozen=True)
+class Sails:
+    """Actuators of a family that no law knows."""
+
+    kind: str = "sails"
+
+
+def test_a_family_without_a_law_or_an_excitation_is_named_in_one_line():
+    robot, task = replace(load_robot("turtlebot2")), load_task("go_to_pose")
+    object.__setattr__(robot, "actuators", Sails())
+    assert not has_law(robot, task)
+    with pytest.raises(
+        ConfigError, match=r"no classical law is for 'turtlebot2' \(sails\); there is one for: "
+    ):
+        check_pair(robot, task)
+    with pytest.raises(ValueError, match="'excite' drives thrusters, .*; 'turtlebot2' has sails"):
+        Excite(robot, task)

@@ -19,7 +19,7 @@ from rosbags.typesys.store import Typestore
 from fulmar_core.errors import BagError
 from fulmar_core.topics import Delivery
 
-# What rmw reports for a duration that nobody set.
+# The value of an unset duration in rmw.
 _FOREVER = {"sec": 9223372036, "nsec": 854775807}
 
 

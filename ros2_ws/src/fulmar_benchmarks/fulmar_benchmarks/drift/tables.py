@@ -26,7 +26,7 @@ from fulmar_benchmarks.drift.targets import BANDS
 _MARKS = {GOOD: (" ✓", "green"), BAD: (" ✗", "bold red"), "": ("", "")}
 _STYLES = {band.name: band.terminal for band in BANDS}
 _PLACES = {"batch": "the core's batch", "mujoco": "MuJoCo", "ros": "MuJoCo, through the deployed ROS nodes"}
-_WIDTH = 170  # where nobody looks at a terminal, lines need not fit one
+_WIDTH = 170  # columns, where the output is not a terminal
 
 
 def print_tables(document: dict[str, Any], output: Console) -> None:

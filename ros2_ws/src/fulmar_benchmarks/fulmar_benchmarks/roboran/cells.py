@@ -163,7 +163,7 @@ def _number(value: float | None, digits: int) -> str:
 
 _MARKS = {GOOD: "[green]{} ✓[/]", BAD: "[bold red]{} ✗[/]", "": "{}"}
 _PLACES = {"batch": "the batch", "mujoco": "MuJoCo", "ros": "ROS"}
-_WIDTH = 140  # where nobody looks at a terminal, lines need not fit one
+_WIDTH = 140  # columns, where the output is not a terminal
 
 
 def print_tables(document: dict[str, Any], output: Console) -> None:

@@ -26,7 +26,7 @@ def doctor(
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Check installation, network, processor, disk and devices; print the command that mends what is not right.
+    """Check installation, network, processor, disk and devices; print the command that repairs what is wrong.
 
     Each check is ok, advice (it works, but worse than it could) or wrong. Exit code: 0, or 1 if something is wrong.
 

@@ -11,7 +11,7 @@ Level = Literal["ok", "advice", "wrong"]
 
 @dataclass(frozen=True)
 class Finding:
-    """What was checked, how it is, and the command that mends it."""
+    """Result of one check, and the command that repairs it."""
 
     what: str
     level: Level  # advice: it works, but worse than it could; wrong: it does not work

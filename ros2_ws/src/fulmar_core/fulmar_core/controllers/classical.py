@@ -61,8 +61,19 @@ OTHERS = {
 
 
 def entry_of(robot: Robot, law: str | None) -> Entry:
-    """The line of a law, or of the robot's family; `check_pair` says whether it is for this robot."""
-    return OTHERS[law][1] if law in OTHERS else LAWS[robot.actuators.kind]
+    """The line of a law, or of the robot's family; `check_pair` says whether it is for this robot.
+
+    Raises:
+        ConfigError: No law is for actuators of this kind.
+    """
+    if law in OTHERS:
+        return OTHERS[law][1]
+    if robot.actuators.kind not in LAWS:
+        raise ConfigError(
+            f"no classical law is for '{robot.name}' ({robot.actuators.kind}); there is one for: {', '.join(LAWS)}. "
+            "Use --controller policy, or your own: --controller mypackage.mymodule:MyController."
+        )
+    return LAWS[robot.actuators.kind]
 
 
 def check_pair(robot: Robot, task: Task, *, law: str | None = None) -> None:
@@ -93,7 +104,8 @@ def check_pair(robot: Robot, task: Task, *, law: str | None = None) -> None:
 
 def has_law(robot: Robot, task: Task) -> bool:
     """Whether there is a classical law for a pair."""
-    return task.kind in LAWS[robot.actuators.kind].tasks
+    entry = LAWS.get(robot.actuators.kind)
+    return entry is not None and task.kind in entry.tasks
 
 
 def load_classical(

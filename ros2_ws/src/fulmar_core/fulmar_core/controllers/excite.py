@@ -65,6 +65,10 @@ class Excite(Law):
         """
         if task.kind not in TASKS:
             raise ValueError(f"'excite' stays around one place; tasks for that are {', '.join(TASKS)}.")
+        if robot.actuators.kind not in EXCITATIONS:
+            raise ValueError(
+                f"'excite' drives {', '.join(EXCITATIONS)}; '{robot.name}' has {robot.actuators.kind}."
+            )
         self._how = gains or EXCITATIONS[robot.actuators.kind]
         super().__init__(robot, task, self._how, control_hz=control_hz)
         self._world = nominal_world(robot)

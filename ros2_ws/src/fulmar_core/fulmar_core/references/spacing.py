@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import ClassVar
 
@@ -65,30 +66,30 @@ def along_curve(
     return np.asarray(curve(at) + np.array(centre))
 
 
-class Curve:
+class Curve(ABC):
     """A reference path along a smooth curve, closed unless it says otherwise."""
 
     centre: Point
     closed: ClassVar[bool] = True
 
+    @abstractmethod
     def at(self, t: np.ndarray) -> np.ndarray:
         """Positions (n, 2) about the origin for parameters (n,) from 0 to 1 [m]."""
-        raise NotImplementedError
 
     def points(self, count: int) -> np.ndarray:
         """Equally spaced points, shape (count, 2) [m]; see `along_curve`."""
         return along_curve(self.at, count, closed=self.closed, centre=self.centre)
 
 
-class Polygon:
+class Polygon(ABC):
     """A closed reference path along straight lines."""
 
     centre: Point
     closed: ClassVar[bool] = True
 
+    @abstractmethod
     def vertices(self) -> np.ndarray:
         """Corners about the origin, shape (n, 2) [m]."""
-        raise NotImplementedError
 
     def points(self, count: int) -> np.ndarray:
         """Equally spaced points, shape (count, 2) [m]."""

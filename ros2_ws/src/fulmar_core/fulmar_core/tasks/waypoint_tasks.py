@@ -231,54 +231,55 @@ def _way_to(state: PlanarState, target: Array, distance: Array) -> Array:
 
 
 @dataclass(frozen=True, kw_only=True)
-class GoThroughPositions(WaypointTask):
+class _OnCourse:
+    """Targets of a random course."""
+
+    course: WaypointCourse
+
+    def places(self, draws: Draws) -> np.ndarray:
+        """Draw where the targets are, shape (worlds, k, 2) [m]."""
+        return self.course.draw(draws)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _OnTrack:
+    """Targets at the corners of a race track."""
+
+    track: RaceTrack
+
+    def places(self, draws: Draws) -> np.ndarray:
+        """Draw where the targets are, shape (worlds, k, 2) [m]."""
+        return self.track.draw(draws)
+
+
+@dataclass(frozen=True, kw_only=True)
+class GoThroughPositions(_OnCourse, WaypointTask):
     """Pass through random positions in their order.
 
     Three of them are seen, one more than in RoboRAN: where a boat leaves a waypoint to depends on the next two.
     """
 
     kind: Literal["go_through_positions"]
-    course: WaypointCourse
-
     seen: ClassVar[int] = 3
     observation_names: ClassVar[tuple[str, ...]] = path_terms(3, heading=False)
 
-    def places(self, draws: Draws) -> np.ndarray:
-        """Draw where the targets are, shape (worlds, k, 2) [m]."""
-        return self.course.draw(draws)
-
 
 @dataclass(frozen=True, kw_only=True)
-class GoThroughPoses(PoseWaypointTask):
+class GoThroughPoses(_OnCourse, PoseWaypointTask):
     """Pass through random poses in their order; each looks from the one before to the one after."""
 
     kind: Literal["go_through_poses"]
-    course: WaypointCourse
-
-    def places(self, draws: Draws) -> np.ndarray:
-        """Draw where the targets are, shape (worlds, k, 2) [m]."""
-        return self.course.draw(draws)
 
 
 @dataclass(frozen=True, kw_only=True)
-class RaceWaypoints(WaypointTask):
+class RaceWaypoints(_OnTrack, WaypointTask):
     """Pass through the corners of a race track in their order."""
 
     kind: Literal["race_waypoints"]
-    track: RaceTrack
-
-    def places(self, draws: Draws) -> np.ndarray:
-        """Draw where the targets are, shape (worlds, k, 2) [m]."""
-        return self.track.draw(draws)
 
 
 @dataclass(frozen=True, kw_only=True)
-class RaceWayposes(PoseWaypointTask):
+class RaceWayposes(_OnTrack, PoseWaypointTask):
     """Pass through the corners of a race track in their order, looking along it."""
 
     kind: Literal["race_wayposes"]
-    track: RaceTrack
-
-    def places(self, draws: Draws) -> np.ndarray:
-        """Draw where the targets are, shape (worlds, k, 2) [m]."""
-        return self.track.draw(draws)
