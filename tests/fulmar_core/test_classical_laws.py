@@ -236,5 +236,5 @@ def test_a_family_without_a_law_or_an_excitation_is_named_in_one_line():
         ConfigError, match=r"no classical law is for 'turtlebot2' \(sails\); there is one for: "
     ):
         check_pair(robot, task)
-    with pytest.raises(ValueError, match="'excite' drives thrusters, .*; 'turtlebot2' has sails"):
+    with pytest.raises(ValueError, match=r"'excite' drives thrusters, .*; 'turtlebot2' has sails"):
         Excite(robot, task)
