@@ -8,11 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from fulmar_bringup import planning
 from fulmar_bringup.node_table import plant_spec
-from fulmar_bringup.planning import plan_run
 from fulmar_bringup.run_executor import execute
-from fulmar_bringup.system import Guards
 from fulmar_core.bundle_signature import make_keys, sign_bundle
 from fulmar_core.errors import BundleError, ConfigError, DeviceError, UnknownNameError
 from fulmar_core.paths import config_directory
@@ -21,31 +18,6 @@ from hardware_drivers.settings import hardware_path
 from policy_server.controllers import shipped_policy
 
 NAN = float("nan")
-
-
-@pytest.fixture
-def plan(tmp_path):
-    def make(**changes):
-        request = {
-            "robot": "floating_platform",
-            "task": "go_to_pose",
-            "controller": "lqr",
-            "backend": "mujoco",
-            "policy": None,
-            "goal": None,
-            "start": None,
-            "duration_s": None,
-            "lockstep": False,
-            "rate": 1.0,
-            "control_hz": None,
-            "scenario": "nominal",
-            "seed": 0,
-            "record": tmp_path / "bag",
-            "command": "fulmar run",
-        }
-        return plan_run(**request | changes)
-
-    return make
 
 
 def test_what_was_not_said_comes_from_files_and_the_seed(plan):
@@ -124,106 +96,6 @@ def test_what_cannot_work_is_refused(plan, change, words):
     with pytest.raises(ConfigError) as caught:
         plan(**change)
     assert words in str(caught.value)
-
-
-NARROW = {"area": (0.0, 2.0, -1.0, 1.0)}
-
-
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        (
-            {"goal": (2.5, 0.0, 0.0), "start": (1.0, 0.0, 0.0)},
-            "the goal x = 2.5 m, y = 0 m lies outside the area of",
-        ),
-        (
-            {"goal": (1.0, 0.0, 0.0), "start": (1.0, 1.5, 0.0)},
-            "the start x = 1 m, y = 1.5 m lies outside the area",
-        ),
-        (
-            {"start": (1.0, 1.5, 0.0), "goals_later": True},
-            "the start x = 1 m, y = 1.5 m lies outside the area",
-        ),
-    ],
-)
-def test_a_goal_or_a_start_outside_the_area_is_refused(plan, change, words):
-    assert plan(**change)  # without an area
-    with pytest.raises(ConfigError) as caught:
-        plan(**change, guards=NARROW)
-    assert words in str(caught.value)
-
-
-def test_a_goal_outside_the_area_of_the_system_file_is_refused(plan, monkeypatch):
-    monkeypatch.setattr(planning, "default_guards", lambda *_: Guards(**NARROW))
-    with pytest.raises(ConfigError, match="outside the area of x 0 to 2 m"):
-        plan(goal=(2.5, 0.0, 0.0), start=(1.0, 0.0, 0.0))
-
-
-def test_a_goal_farther_than_a_kilometre_is_refused_though_the_start_is_near_it(plan):
-    with pytest.raises(ConfigError, match="1,005 m from the origin, farther than 1,000 m"):
-        plan(goal=(1005.0, 0.0, 0.0), start=(1004.0, 0.0, 0.0))
-
-
-@pytest.mark.parametrize("goal", [None, (1.0, 0.5, 0.0)])
-@pytest.mark.parametrize("seed", range(10))
-def test_what_is_drawn_lies_inside_the_area_and_is_the_same_for_one_seed(plan, goal, seed):
-    x_min, x_max, y_min, y_max = area = (-2.5, 2.5, -1.0, 1.5)
-    first, again = (plan(goal=goal, seed=seed, guards={"area": area}) for _ in range(2))
-    assert first == again
-    for x, y, _ in (first.goal, first.plan.start):
-        assert x_min <= x <= x_max
-        assert y_min <= y <= y_max
-
-
-def test_an_area_that_holds_the_seed_s_episode_leaves_it_as_it_is(plan):
-    wide = {"area": (-50.0, 50.0, -50.0, 50.0)}
-    assert [plan(seed=seed, guards=wide).goal for seed in range(3)] == [
-        plan(seed=seed).goal for seed in range(3)
-    ]
-
-
-def test_an_area_too_small_for_any_draw_is_refused_with_what_to_give(plan):
-    with pytest.raises(ConfigError, match="Give --start and --goal, another --seed, or a larger area"):
-        plan(guards={"area": (-0.01, 0.01, -0.01, 0.01)})
-
-
-def test_among_obstacles_a_start_outside_the_area_is_refused_since_the_plant_draws_the_same_ones(plan):
-    change = {"robot": "kingfisher", "task": "go_to_position_with_obstacles", "controller": "policy"}
-    x, _, _ = plan(**change).plan.start
-    with pytest.raises(ConfigError, match="the drawn start"):
-        plan(
-            **change,
-            guards={"area": (-99.0, x - 0.01, -99.0, 99.0) if x > 0 else (x + 0.01, 99.0, -99.0, 99.0)},
-        )
-
-
-@pytest.mark.parametrize("file", ["positions: [[1.0, 0.0], [3.0, 0.0]]", "poses: [[3.0, 0.0, 90.0]]"])
-def test_goals_of_a_file_that_lie_outside_the_area_are_refused(plan, tmp_path, file):
-    path = tmp_path / "mine.yaml"
-    path.write_text(f"kind: {file.partition(':')[0]}\ntitle: mine\n{file}\n")
-    task = "go_to_position" if file.startswith("positions") else "go_to_pose"
-    assert plan(goals=str(path), task=task)
-    with pytest.raises(ConfigError, match=r"mine\.yaml' x = 3 m, y = 0 m lies outside the area"):
-        plan(goals=str(path), task=task, guards={"area": (-2.0, 2.0, -2.0, 2.0)})
-
-
-def test_a_path_that_leaves_the_area_is_refused(plan):
-    with pytest.raises(ConfigError, match=r"the goal of 'circle' x = .* lies outside the area"):
-        plan(goals="circle", task="track_velocities", guards={"area": (-0.5, 0.5, -0.5, 0.5)})
-
-
-def test_where_a_real_robot_starts_is_not_known_and_not_refused(plan):
-    change = {
-        "robot": "turtlebot2",
-        "task": "go_to_position",
-        "controller": "classical",
-        "backend": "hardware",
-    }
-    far = {"area": (3.0, 9.0, 3.0, 9.0)}
-    assert plan(**change, goal=(4.0, 4.0, 0.0), guards=far).plan.guards.area == far["area"]
-    x, y, _ = plan(**change, goal=(4.0, 4.0, 0.0), guards=far, emulate=True).plan.start
-    assert 3.0 <= x <= 9.0
-    assert 3.0 <= y <= 9.0
 
 
 def test_a_folder_that_exists_is_never_recorded_into(plan, tmp_path):

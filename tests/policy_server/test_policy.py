@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
-import shutil
 from dataclasses import asdict, replace
 from pathlib import Path
 
@@ -20,138 +18,26 @@ from fulmar_core.health.thruster_health import Health
 from fulmar_core.observation import Observer
 from fulmar_core.planar import COLUMNS, at_rest
 from fulmar_core.policy_bundle import (
-    FORMAT,
     GOLDEN,
     NETWORK,
     PASSPORT,
-    Golden,
-    Passport,
     read_golden,
     read_passport,
-    write_bundle,
 )
-from fulmar_core.robot import load_robot
-from fulmar_core.tasks import load_task
-from policy_server.controllers import policies_directory, shipped_policies, shipped_policy
-from policy_server.policy import Policy
+from policy_server.controllers import shipped_policies, shipped_policy
 from tests.inputs import inputs_at
+from tests.policy_server.bundles import (
+    ROBOT,
+    SHIPPED,
+    TASK,
+    linear_network,
+    load,
+    refusal,
+    reseal,
+)
 from tests.policy_server.observed import inputs_seeing
 
-ROBOT, TASK = load_robot("floating_platform"), load_task("go_to_pose")
-ROLLING, ROLLING_TASK = load_robot("turtlebot2"), load_task("go_to_position")
 CHECKOUT = Path(__file__).resolve().parents[2]
-SHIPPED = policies_directory() / "floating_platform_go_to_pose"
-
-
-@pytest.fixture
-def folder(tmp_path):
-    return shutil.copytree(SHIPPED, tmp_path / "bundle")
-
-
-def load(folder, **kwargs):
-    return Policy(folder, ROBOT, TASK, **kwargs)
-
-
-def refusal(folder, **kwargs) -> str:
-    with pytest.raises(BundleError) as caught:
-        load(folder, **kwargs)
-    assert "\n" not in str(caught.value)
-    return str(caught.value)
-
-
-def reseal(folder, *, network=None, golden=None, **passport):
-    """What an exporter with a mistake would leave: other content, every hash in order."""
-    write_bundle(
-        folder,
-        network or (folder / NETWORK).read_bytes(),
-        golden or read_golden(folder),
-        replace(read_passport(folder), **passport),
-    )
-
-
-def linear_network(
-    *, inputs=10, outputs=8, batch="worlds", names=("observation", "command", "logits"), extra=False
-):
-    """A small valid ONNX model of the bundle's kind, with one thing different."""
-    onnx = pytest.importorskip("onnx")
-    helper, numpy_helper = onnx.helper, onnx.numpy_helper
-    kind = onnx.TensorProto.FLOAT
-    weights = np.random.default_rng(1).normal(size=(inputs, outputs)).astype(np.float32)
-    nodes = [
-        helper.make_node("MatMul", [names[0], "w"], [names[2]]),
-        helper.make_node("Greater", [names[2], "zero"], ["open"]),
-        helper.make_node("Cast", ["open"], [names[1]], to=kind),
-    ]
-    takes = [helper.make_tensor_value_info(names[0], kind, [batch, inputs])]
-    if extra:
-        takes.append(helper.make_tensor_value_info("zero", kind, [1]))
-    constants = [numpy_helper.from_array(weights, "w")]
-    if not extra:
-        constants.append(numpy_helper.from_array(np.zeros(1, np.float32), "zero"))
-    gives = [helper.make_tensor_value_info(name, kind, [batch, outputs]) for name in names[1:]]
-    graph = helper.make_graph(nodes, "g", takes, gives, constants)
-    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 18)], ir_version=9)
-    observations = np.random.default_rng(2).normal(size=(4, inputs)).astype(np.float32)
-    logits, none = observations @ weights, np.zeros((4, 0), np.float32)
-    return model.SerializeToString(), Golden(
-        observations, none, (logits > 0).astype(np.float32), logits, none
-    )
-
-
-def counting_network(*, gives="next_memory", memory=2):
-    """An ONNX model for the turtlebot: its memory counts calls, and its raw outputs are the memory it was given."""
-    onnx = pytest.importorskip("onnx")
-    helper, numpy_helper = onnx.helper, onnx.numpy_helper
-    kind, inputs = onnx.TensorProto.FLOAT, len(Observer(ROLLING, ROLLING_TASK).names)
-    scale = np.asarray(ROLLING.actuators.scale, np.float32)
-    nodes = [
-        helper.make_node("MatMul", ["observation", "nothing"], ["zeros"]),
-        helper.make_node("Add", ["zeros", "memory"], ["logits"]),
-        helper.make_node("Clip", ["logits", "low", "high"], ["share"]),
-        helper.make_node("Mul", ["share", "scale"], ["command"]),
-        helper.make_node("Add", ["memory", "quarter"], [gives]),
-    ]
-    constants = [
-        numpy_helper.from_array(np.zeros((inputs, 2), np.float32), "nothing"),
-        numpy_helper.from_array(np.float32(-1.0), "low"),
-        numpy_helper.from_array(np.float32(1.0), "high"),
-        numpy_helper.from_array(scale, "scale"),
-        numpy_helper.from_array(np.float32(0.25), "quarter"),
-    ]
-    takes = [
-        helper.make_tensor_value_info("observation", kind, ["worlds", inputs]),
-        helper.make_tensor_value_info("memory", kind, ["worlds", memory]),
-    ]
-    results = [
-        helper.make_tensor_value_info(name, kind, ["worlds", 2]) for name in ("command", "logits", gives)
-    ]
-    graph = helper.make_graph(nodes, "g", takes, results, constants)
-    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 18)], ir_version=9)
-    seen = np.random.default_rng(2).normal(size=(4, inputs)).astype(np.float32)
-    before = np.random.default_rng(3).normal(size=(4, 2)).astype(np.float32)
-    command = np.clip(before, -1.0, 1.0) * scale
-    return model.SerializeToString(), Golden(seen, before, command, before, before + np.float32(0.25))
-
-
-@pytest.fixture
-def remembering(tmp_path):
-    """A bundle with memory and continuous commands."""
-    network, golden = counting_network()
-    passport = Passport(
-        FORMAT,
-        ROLLING.name,
-        ROLLING_TASK.name,
-        ROLLING.timing.control_hz,
-        Observer(ROLLING, ROLLING_TASK).names,
-        ROLLING.actuators.names,
-        "continuous",
-        tuple(ROLLING.actuators.scale),
-        2,
-        "",
-        "",
-    )
-    write_bundle(tmp_path / "remembering", network, golden, passport)
-    return tmp_path / "remembering"
 
 
 def test_the_shipped_bundle_is_accepted():
@@ -366,54 +252,6 @@ def test_rounding_of_another_processor_is_no_reason_to_refuse(folder):
     golden = read_golden(folder)
     reseal(folder, golden=replace(golden, logits=golden.logits + np.float32(5e-5)))
     load(folder)
-
-
-def test_a_continuous_policy_commands_in_the_units_of_the_actuators(remembering):
-    golden = read_golden(remembering)
-    policy = Policy(remembering, ROLLING, ROLLING_TASK)
-    for _ in range(6):
-        command = policy.act(inputs_seeing(golden.observations))
-    np.testing.assert_allclose(command, np.tile(ROLLING.actuators.scale, (4, 1)), rtol=1e-6)
-
-
-def test_memory_is_carried_from_one_command_to_the_next_and_forgotten_on_reset(remembering):
-    policy = Policy(remembering, ROLLING, ROLLING_TASK)
-    seen, speed = inputs_seeing(np.zeros(len(policy.passport.observation_names))), ROLLING.actuators.scale[0]
-    carried = [float(policy.act(seen)[0, 0]) for _ in range(3)]
-    policy.reset()
-    assert [*carried, float(policy.act(seen)[0, 0])] == pytest.approx([0.0, 0.25 * speed, 0.5 * speed, 0.0])
-
-
-def test_every_row_of_a_batch_has_a_memory_of_its_own(remembering):
-    policy = Policy(remembering, ROLLING, ROLLING_TASK)
-    seen = np.zeros((3, len(policy.passport.observation_names)))
-    policy.act(inputs_seeing(seen))
-    assert policy.act(inputs_seeing(seen)).shape == (3, 2)
-    assert (policy.act(inputs_seeing(seen[:2])) == 0.0).all()  # another batch is another story
-
-
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        ({"memory": 3}, "'memory' has shape ['worlds', 2], the passport needs (any number, 3)"),
-        ({"memory": 0}, "takes observation, memory; it must take 'observation' alone"),
-        ({"action": "on_off"}, "gives on_off commands, 'turtlebot2' takes continuous"),
-    ],
-)
-def test_a_memory_or_a_kind_of_command_that_the_passport_does_not_state_is_refused(
-    remembering, change, words
-):
-    reseal(remembering, **change)
-    with pytest.raises(BundleError, match=re.escape(words)):
-        Policy(remembering, ROLLING, ROLLING_TASK)
-
-
-@pytest.mark.parametrize("name", ["memories", "next_memories", "commands"])
-def test_golden_vectors_of_a_network_with_memory_are_compared_too(remembering, name):
-    golden = read_golden(remembering)
-    reseal(remembering, golden=replace(golden, **{name: getattr(golden, name) + np.float32(0.01)}))
-    with pytest.raises(BundleError, match="golden vectors"):
-        Policy(remembering, ROLLING, ROLLING_TASK)
 
 
 def test_what_was_verified_is_what_runs_though_the_files_are_exchanged_afterwards(

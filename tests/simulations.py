@@ -1,0 +1,40 @@
+"""Batches of worlds that several tests step."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fulmar_core.disturbances.scenario import Scenario, load_scenario
+from fulmar_core.paths import config_names
+from fulmar_core.planar import COLUMNS
+from fulmar_core.robot import load_robot
+from fulmar_core.simulation import BatchSimulation
+from fulmar_core.tasks import load_task
+
+ROBOTS = {name: load_robot(name) for name in config_names("robots")}
+PLATFORM, BASE = ROBOTS["floating_platform"], ROBOTS["turtlebot2"]
+POSE = load_task("go_to_pose")
+STILL = Scenario("nothing happens", sensor_noise=False, body="nominal")
+RANDOMISED = load_scenario("randomised")
+
+
+def build(scenario=STILL, robot=PLATFORM, task=POSE, *, worlds=5, seed=3, **kwargs):
+    return BatchSimulation(robot, task, scenario, worlds=worlds, seed=seed, **kwargs)
+
+
+def commands(simulation, steps, seed=1, worlds=None):
+    """Commands for every step; a world gets the same ones in a batch of any size."""
+    scale = simulation.robot.actuators.scale
+    shape = (worlds or simulation.worlds, steps, len(scale))
+    drawn = np.random.default_rng(seed).uniform(-1.2, 1.2, shape).transpose(1, 0, 2)
+    return drawn * scale
+
+
+def run(simulation, steps, **kwargs):
+    for command in commands(simulation, steps, **kwargs):
+        simulation.step(command)
+    return simulation
+
+
+def differing(one, other):
+    return {name for name in COLUMNS if not np.array_equal(getattr(one, name), getattr(other, name))}
