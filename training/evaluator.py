@@ -66,7 +66,7 @@ def _mean(figures: list[dict[str, Any]], name: str) -> float:
 
 
 def evaluate_in_mujoco(run: Path, *, episodes: int, scenario: str = "nominal") -> dict[str, Any]:
-    """Evaluator the best network of a run, and write the figures into its record.
+    """Evaluate the best network of a run, and write the figures into its record.
 
     Args:
         run: Run folder.

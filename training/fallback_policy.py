@@ -41,8 +41,8 @@ def fallback_settings(settings: TrainingSettings, robot: Robot, task: Task) -> T
     name = settings.fallback_policy.settings
     own = load_training_settings(robot, task, name)
     actuation = load_scenario(own.scenario).actuation
-    total = actuation.stranding  # word: YAML key of scenarios
-    if not total or not uncontrollable_losses(robot, actuation.failures):
+    uncontrollable = actuation.stranding  # word: YAML key of scenarios
+    if not uncontrollable or not uncontrollable_losses(robot, actuation.failures):
         raise ConfigError(
             f"'fallback_policy': '{own.scenario}', the scenario of '{name}', must have "
             "'stranding: true', "  # word: YAML key of scenarios

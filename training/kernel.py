@@ -148,7 +148,7 @@ def _laid_as(tensor: torch.Tensor, like: torch.Tensor) -> torch.Tensor:
     return torch.empty_strided(like.shape, like.stride(), dtype=like.dtype, device=like.device).copy_(tensor)
 
 
-Moving = dict[str, Any]  # as of `Moves.moving`, with dictionaries in it
+Moving = dict[str, Any]  # as of `MutableState.mutable_state`, with dictionaries in it
 Parts = dict[str, Any]  # the same without; what was in a dictionary has a name of two words
 
 _RECORDS = {PlanarState: COLUMNS, World: FIELDS}
@@ -156,7 +156,7 @@ _LEAVES_OF = {Goal: Goal.arrays, **{kind: attrgetter(*names) for kind, names in 
 
 
 def parts_of(moving: Moving) -> Parts:
-    """Everything by itself."""
+    """A mutable state with its dictionaries flattened."""
     parts: Parts = {}
     for name, value in moving.items():
         if isinstance(value, dict):

@@ -161,7 +161,7 @@ class JobBars:
         self._bars.stop()
 
     def __call__(self, number: int, state: str, progress: dict[str, Any]) -> None:
-        """Show the state of one job: its number, `waiting`, `learning`, `done` or `failed`, and its newest figures."""
+        """Show the state of one job: its number, `running`, `done` or `failed`, and its newest figures."""
         task = self._tasks[number]
         success = progress.get("success")
         known = "" if success is None else f"  success {success:.3f}"

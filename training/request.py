@@ -61,9 +61,6 @@ def job_of(request: TrainingRequest) -> Job:
     )
     if request.time_limit_s is not None or request.updates is not None:
         job = replace(job, time_limit_s=request.time_limit_s, updates=request.updates)
-        if request.resume:  # a later --resume keeps the limits
-            limits = {"time_limit_s": job.time_limit_s, "updates": job.updates}
-            write_start(job.out, read_start(job.out) | limits)
     settings = job.settings
     if request.stop_at_success is not None:
         settings = replace(settings, stop_at_success=StopAtSuccess(request.stop_at_success))
@@ -74,12 +71,11 @@ def job_of(request: TrainingRequest) -> Job:
     hz = settings.control_hz or robot.timing.control_hz
     check_count("--seeds", request.seeds)
     check_episodes(robot, episodes=job.episodes, steps=round(load_task(job.task).episode_s * hz))
-    if request.resume and request.seeds > 1:
-        raise ConfigError(
-            "--resume and --seeds exclude one another: resume the runs of a campaign one by one."
-        )
     for seed in range(job.seed, job.seed + request.seeds):
         check_seed(seed)  # all of them, before anything is made
+    if request.resume and (request.time_limit_s is not None or request.updates is not None):
+        limits = {"time_limit_s": job.time_limit_s, "updates": job.updates}
+        write_start(job.out, read_start(job.out) | limits)  # a later --resume keeps them
     return replace(job, settings=settings, name=f"{job.robot}_{job.task}_{job.seed}")
 
 
@@ -91,6 +87,10 @@ def _check_options(request: TrainingRequest) -> None:
     if r.resume and (r.robot or r.task or r.settings or r.out or r.seed != 1):
         raise ConfigError(
             "--resume goes on with what the run began with; leave ROBOT, TASK, --seed, --settings and --out out."
+        )
+    if r.resume and r.seeds > 1:
+        raise ConfigError(
+            "--resume and --seeds exclude one another: resume the runs of a campaign one by one."
         )
     if r.stop_at_success == 0.0:
         raise ConfigError("--stop-at-success 0 would stop at once; it must be greater than 0, and at most 1.")

@@ -7,8 +7,9 @@ network.pt      the best weights, as a robot would run them
 checkpoint.pkl  everything a run needs to go on exactly where it was
 tensorboard/    curves
 calibration.yaml the calibration of the robot, if one was given
-fallback/     the run folder of the network that takes over from this one, where it has such
+fallback_policy/ the run folder of the network that takes over from this one, where it has such
 progress.json   its progress, for other processes
+learning.lock   held by the process that learns
 """
 
 from __future__ import annotations

@@ -100,3 +100,16 @@ def test_what_another_robot_says_of_itself_is_not_taken_for_the_own(tmp_path: Pa
     record = read_run(tmp_path / "bag")
     assert record.last_health("plant").message == "alpha"
     assert len(record.health) == 1
+
+
+def test_a_topic_beside_the_robot_s_own_is_compared_by_its_whole_name(tmp_path: Path):
+    bags = []
+    for robot, topics in (("a", ("/a/x", "/b/y")), ("b", ("/b/x",))):
+        bag = BagWriter(tmp_path / robot, run_info={"robot": robot, "name": robot})
+        for topic in topics:
+            bag.add_topic(topic, "std_msgs/msg/Bool", "stream")
+            bag.write(topic, b"\x00\x01\x00\x00\x01", log_ns=1)
+        bag.close()
+        bags.append(open_bag(tmp_path / robot))
+    found = {each["topic"]: each["counts"] for each in differing(*bags)["topics"]}
+    assert found == {"x": [1, 1], "/b/y": [1, 0]}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import shutil
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from fulmar_benchmarks.roboran.campaign import document_of
 from fulmar_benchmarks.roboran.document import wilson
 from fulmar_benchmarks.roboran.targets import LEAST, ROBOTS, TABLE, TASKS, checks_of, main_figure, thesis_row
 from fulmar_benchmarks.unit import done_already
+from fulmar_evaluation import bounds
 from policy_server.controllers import policies_directory
 
 GOOD = {"batch": 0.995, "mujoco": 0.992}
@@ -214,3 +216,10 @@ def test_the_fault_of_one_unit_is_a_sentence_and_costs_no_other(tmp_path, monkey
     )
     assert outcomes == {unit: "RuntimeError: it broke"}
     assert seen == [(unit, "RuntimeError: it broke")]
+
+
+def test_the_hash_of_the_code_knows_the_bounds_that_figures_are_shares_of(monkeypatch):
+    bound = Path(str(bounds.__file__)).parent / "time_optimal.py"
+    before, read = code_hash("batch"), Path.read_bytes
+    monkeypatch.setattr(Path, "read_bytes", lambda path: read(path) + (b"#" if path == bound else b""))
+    assert code_hash("batch") != before

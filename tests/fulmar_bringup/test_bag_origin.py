@@ -114,3 +114,8 @@ def test_the_recorder_is_reported_what_differs_from_its_own_defaults():
         recording=Recording(mode="ring", split_s=60.0),
     )
     assert recorder_spec(plan).parameters == {"mode": "ring", "split_s": 60.0}
+
+
+def test_a_run_under_the_former_name_of_a_scenario_carries_its_file():
+    former = replace(LQR, scenario="drift_stranded")  # word: old name of a scenario
+    assert names(former)["scenario.yaml"] == "drift_uncontrollable.yaml"

@@ -106,3 +106,11 @@ def test_where_a_real_robot_starts_is_not_known_and_not_refused(plan):
     x, y, _ = plan(**change, goal=(4.0, 4.0, 0.0), guards=far, emulate=True).plan.start
     assert 3.0 <= x <= 9.0
     assert 3.0 <= y <= 9.0
+
+
+def test_an_area_without_the_start_of_a_velocity_file_is_refused_with_that_start(plan):
+    change = {"robot": "turtlebot2", "task": "track_velocities", "controller": "classical"}
+    far = {"area": (3.0, 9.0, 3.0, 9.0)}
+    with pytest.raises(ConfigError, match="the start of these goals x = 0 m, y = 0 m lies outside the area"):
+        plan(**change, goals="velocity_steps", guards=far)
+    assert plan(**change, goals="velocity_steps", guards=far, start=(4.0, 4.0, 0.0))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import fcntl
 import os
 import time
+from pathlib import Path
 
 from fulmar_bringup.shared_memory_cleanup import give_back_abandoned_memory
 
@@ -50,3 +51,13 @@ def test_what_another_user_left_stays(tmp_path, monkeypatch):
 
 def test_where_there_is_none_nothing_happens(tmp_path):
     assert give_back_abandoned_memory(tmp_path / "none") == 0
+
+
+def test_memory_that_may_not_be_removed_stays_without_an_error(tmp_path, monkeypatch):
+    left(tmp_path, SEGMENT, f"{SEGMENT}_el")
+
+    def refuse(_path, **_):
+        raise PermissionError
+
+    monkeypatch.setattr(Path, "unlink", refuse)
+    assert give_back_abandoned_memory(tmp_path) == 0

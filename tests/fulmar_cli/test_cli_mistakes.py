@@ -122,6 +122,8 @@ def broken_configs(tmp_path, monkeypatch):
         (["report", __file__], Path(__file__).name),
         (["export", "/nowhere", "--out", "x"], "/nowhere: no finished training run"),
         (["train", "floating_platform", "go_to"], "unknown task 'go_to'"),
+        (["benchmark", "roboran", "--tasks", ","], "names no task"),
+        (["benchmark", "drift", "--controllers", ","], "names no controller"),
         (["train", "floating_platform", "go_to_pose", "--seed", "1000003"], "reserved for evaluation"),
         (["train", "floating_platform", "go_to_pose", "--seeds", "10000001"], "--seeds = 10,000,001 is too many"),
         (["train", "floating_platform", "go_to_pose", "--episodes", "9999999"], "--episodes = 9,999,999 needs"),

@@ -21,7 +21,7 @@ from fulmar_bringup import robot_operator
 from fulmar_cli.diagnosis import checks
 from fulmar_cli.diagnosis.check_result import Finding
 from fulmar_cli.diagnosis.devices import check_permissions, devices_of
-from fulmar_cli.diagnosis.installation import check_python
+from fulmar_cli.diagnosis.installation import check_policies, check_python
 from fulmar_cli.diagnosis.machine import (
     check_clock,
     check_disk_space,
@@ -316,3 +316,9 @@ def _without_root():
         os.seteuid(0)
         os.setegid(0)
         os.setgroups(groups)
+
+
+def test_every_shipped_policy_loads_and_fits_its_robot():
+    finding = check_policies()
+    assert finding.level == "ok", finding.found
+    assert "floating_platform_go_to_pose" in finding.found

@@ -253,8 +253,18 @@ def test_a_run_is_resumed_with_the_calibration_it_began_with_and_no_other(learne
 
 def test_a_run_cannot_be_resumed_as_a_campaign(tmp_path, learned):
     test_a_run_is_resumed_with_the_settings_and_limits_it_began_with(learned, tmp_path)
+    before = read_start(tmp_path)
     with pytest.raises(ConfigError, match="exclude one another"):
-        call(train, "--resume", tmp_path, "--seeds", 2)
+        call(train, "--resume", tmp_path, "--seeds", 2, "--updates", 5)
+    assert read_start(tmp_path) == before
+
+
+def test_a_refused_request_leaves_the_run_that_it_would_resume_as_it_was(tmp_path, learned):
+    test_a_run_is_resumed_with_the_settings_and_limits_it_began_with(learned, tmp_path)
+    before = read_start(tmp_path)
+    with pytest.raises(ConfigError, match="--episodes"):
+        call(train, "--resume", tmp_path, "--updates", 5, "--episodes", 10_000_001)
+    assert read_start(tmp_path) == before
 
 
 @pytest.fixture

@@ -74,3 +74,11 @@ def _most(robot):
     with pytest.raises(ConfigError) as caught:
         check_episodes(robot, episodes=MOST, steps=10**6)
     return int(str(caught.value).rpartition("at most ")[2].rstrip(".").replace(",", ""))
+
+
+def test_processes_share_the_episodes_unless_each_holds_them_all():
+    steps = 10**6
+    alone = _most(ROBOT)
+    with pytest.raises(ConfigError, match=f"at most {alone // 4:,}"):
+        check_episodes(ROBOT, episodes=alone, steps=steps, jobs=4, at_once=4)
+    check_episodes(ROBOT, episodes=max(1, alone // 2), steps=steps, jobs=4)

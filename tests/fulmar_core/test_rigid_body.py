@@ -15,8 +15,8 @@ from fulmar_core.dynamics.rigid_body import (
     kinetic_energy,
     principal_inertia,
     rigid_body_step,
+    shifted,
     times,
-    to_mass_center,
 )
 from fulmar_core.spatial import PARTS, SpatialState, at_rest_in_space, rigid_of_spatial, spatial_of
 
@@ -141,7 +141,7 @@ def test_the_way_to_the_mass_center_and_back_changes_nothing():
         rng.normal(size=(3, 5)),
     )
     offset = rng.normal(size=(3, 5))
-    back = to_mass_center(to_mass_center(state, offset), offset, -1.0)
+    back = shifted(shifted(state, offset), -offset)
     for name in PARTS:
         np.testing.assert_allclose(getattr(back, name), getattr(state, name), atol=1e-12)
 
@@ -193,3 +193,14 @@ def test_the_wire_form_of_a_state_has_its_components_last():
     assert rigid.quat_xyzw.shape == (4, 4)
     for name in PARTS:
         np.testing.assert_array_equal(getattr(spatial_of(rigid), name), getattr(state, name))
+
+
+def test_a_body_at_rest_can_be_written_without_mixing_its_motion():
+    state = at_rest_in_space(np.zeros((3, 2)), np.tile([[0.0], [0.0], [0.0], [1.0]], 2))
+    other = SpatialState(
+        np.ones((3, 1)), np.array([[1.0], [0.0], [0.0], [0.0]]), np.full((3, 1), 2.0), np.full((3, 1), 3.0)
+    )
+    state.write([1], other)
+    assert state.velocity[:, 1].tolist() == [2.0] * 3
+    assert state.turn_rate[:, 1].tolist() == [3.0] * 3
+    assert not state.velocity[:, 0].any()

@@ -124,3 +124,18 @@ def test_damage_gives_exit_code_1_whatever_is_asked(tmp_path):
         done = ask(*words)
         assert done.exit_code == 1, (words, done.output)
         assert isinstance(done.exception, SystemExit)
+
+
+def test_a_warning_that_explains_an_error_stands_before_it(tmp_path, monkeypatch):
+    def fails(*_args, **_kwargs):
+        raise ConfigError("the controller cannot be loaded.")
+
+    monkeypatch.setattr("fulmar_evaluation.rerun.rerun_bag.answers_of", fails)
+    done = ask("rerun", copied(tmp_path / "bag", info={"policy": "/nowhere/bundle"}))
+    assert done.exit_code != 0
+    assert "/nowhere/bundle, is gone" in " ".join(done.output.split())
+
+
+def test_unknown_names_are_refused_before_a_bag_is_opened(tmp_path):
+    done = ask("rerun", tmp_path / "nowhere", "--from", "observation")
+    assert "Did you mean 'observations'" in str(done.exception)

@@ -171,9 +171,9 @@ def differing(
     one, other = _by_name(first), _by_name(second)
     known = sorted({*one, *other})
     machine = {wire.name for wire in OF_THE_MACHINE}
-    wanted = [
-        second.relative(first.relative(name)) for name in only or [n for n in known if n not in machine]
-    ]
+    wanted = [name for name in known if name not in machine]
+    if only:
+        wanted = [second.relative(first.relative(name)) for name in only]
     for name in wanted:
         if name not in known:
             raise UnknownNameError("topic", name, known)

@@ -8,8 +8,16 @@ from dataclasses import dataclass
 from typing import Any
 
 from fulmar_bags.contents import Bag, Topic
-from fulmar_bags.decode import TWIST, Odometries, Vectors, joint_vectors, messages, odometries, stamp_of
-from fulmar_bags.decode import twist_vectors as twists
+from fulmar_bags.decode import (
+    TWIST,
+    Odometries,
+    Vectors,
+    joint_vectors,
+    messages,
+    odometries,
+    stamp_of,
+    twist_vectors,
+)
 from fulmar_bags.message_reader import goal_of, obstacles_of, thing_of
 from fulmar_core.robot_name import Frames
 from fulmar_core.tasks import Task
@@ -51,7 +59,7 @@ class WireReader:
         """Vectors of a wire; `field` is that of JointState."""
         topic = self._topic(wire)
         if wire is VELOCITY_COMMAND:
-            return twists(topic)
+            return twist_vectors(topic)
         found = joint_vectors(topic, field)
         others = found.left_out - len(topic.unreadable)
         if others:
@@ -67,7 +75,7 @@ class WireReader:
             for topic in self.bag.topics.values()
             if topic.type == TWIST and len(topic) and topic.name.split("/")[-1] == VELOCITY_COMMAND.name
         ]
-        return twists(found[0]) if len(found) == 1 else None
+        return twist_vectors(found[0]) if len(found) == 1 else None
 
     def goals(self, task: Task | None) -> list[Received]:
         """Goals in the order of recording; a controller receives the topic of its task alone, None: any topic."""
@@ -115,7 +123,8 @@ class WireReader:
     def _topic(self, wire: Wire) -> Topic:
         """The topic of a wire; messages under its name that are of another type are a warning."""
         name = self.bag.topic_name(wire)
-        others = sum(len(t) for t in self.bag.topics.values() if t.name == name and t.type != wire.type)
+        known = {wire.type, TWIST} if wire is VELOCITY_COMMAND else {wire.type}  # see `unstamped_commands`
+        others = sum(len(t) for t in self.bag.topics.values() if t.name == name and t.type not in known)
         if others:
             self.warnings.append(f"{others} messages of {name} have another type.")
         return self.bag.of(wire)

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import fulmar_core
+import fulmar_evaluation
 import policy_server
 import sim_nodes
 from fulmar_benchmarks.unit import Unit
@@ -117,7 +118,7 @@ def units_of(
 
 def code_hash(way: str) -> str:
     """Hash of the code, the configuration and the libraries that outcomes of one way depend on."""
-    packages = (fulmar_core, policy_server, *((sim_nodes,) if way != "batch" else ()))
+    packages = (fulmar_core, fulmar_evaluation, policy_server, *((sim_nodes,) if way != "batch" else ()))
     files = [
         path for package in packages for path in sorted(Path(str(package.__file__)).parent.rglob("*.py"))
     ]

@@ -246,7 +246,7 @@ def _same_with_few_worlds(trial: Trial, figures: dict[str, np.ndarray]) -> tuple
 
 
 def _map_place(drawn: Episode, trial: Trial) -> np.ndarray:
-    """Where each episode lies in the map of successes, shape (episodes, 2); `MAP_AXES` names the axes."""
+    """Where each episode lies in the map of successes, shape (episodes, 2)."""
     start, targets = drawn.start, np.asarray(drawn.goal.targets)
     task = trial.task
     if counts_targets(task):

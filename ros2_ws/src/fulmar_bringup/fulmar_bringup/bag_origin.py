@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from fulmar_bringup.system import System
 from fulmar_core.calibration import calibration_path
 from fulmar_core.controllers.classical import gains_of, gains_path
+from fulmar_core.disturbances.scenario import scenario_path
 from fulmar_core.paths import config_path
 from fulmar_core.policy_bundle import PASSPORT
 from fulmar_core.provenance import fulmar_version, git_revision
@@ -38,7 +39,7 @@ def attachments(plan: RunPlan) -> str:
     files = {
         "robot.yaml": config_path("robots", plan.robot),
         **_of_task(plan.task),
-        "scenario.yaml": config_path("scenarios", plan.scenario),
+        "scenario.yaml": scenario_path(plan.scenario),
         **({"goals.yaml": Path(plan.goals)} if plan.goals else {}),
         **({"hardware.yaml": Path(plan.hardware)} if plan.hardware else {}),
         **({"estimator.yaml": config_path("estimators", estimator)} if estimator else {}),

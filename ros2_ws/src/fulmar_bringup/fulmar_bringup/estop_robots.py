@@ -120,9 +120,11 @@ def spaces_with(node: Node, service: str) -> set[str]:
 
 def _spaces(node: Node, robot: str | None) -> set[str]:
     """Namespaces with a plant or an e-stop node, as far as discovered."""
-    plants = {space for name, space in node.get_node_names_and_namespaces() if name == "plant"}
-    found = spaces_with(node, ESTOP_TRIGGER) | plants
-    return found if robot is None else found & {namespace_of(robot)}
+    return _only(spaces_with(node, ESTOP_TRIGGER) | _plants(node), robot)
+
+
+def _plants(node: Node) -> set[str]:
+    return {space for name, space in node.get_node_names_and_namespaces() if name == "plant"}
 
 
 WATCH_S = 1.0  # commands must be zero, or absent, for about half of it
@@ -140,8 +142,7 @@ def robots_to_reset(node: Node, robot: str | None, *, find_s: float) -> tuple[se
     while True:
         now_s = time.monotonic()
         nodes = _only(spaces_with(node, ESTOP_RESET), robot)
-        seen = {space for name, space in node.get_node_names_and_namespaces() if name == "plant"}
-        for space in _only(seen, robot):
+        for space in _only(_plants(node), robot):
             plants.setdefault(space, now_s)
         alone = plants.keys() - nodes
         if nodes or plants:

@@ -255,6 +255,9 @@ def _placed(
         check_places("the goal", [goal], area)
     if start is not None and checks_start:
         check_places("the start", [start], area)
+    fixed = start_of(file) if file is not None else None
+    if fixed is not None and start is None and checks_start:
+        check_places("the start of these goals", [fixed], area)
     for number in range(DRAWS):
         episode = draw_episode(robot, task, scenario, seed=seed, number=number)
         mission, drawn = episode.goal, _pose_of_state(episode.start)

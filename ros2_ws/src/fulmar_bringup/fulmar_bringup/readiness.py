@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from fulmar_bringup.console import console
+from fulmar_bringup.console import log_line
 from fulmar_bringup.processes import ProcessGroup
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.supervisor import START_TIMEOUT_S, Report, Supervisor
@@ -19,6 +19,7 @@ from fulmar_ros.recorder_health import COMMANDERS
 from hardware_drivers.adapter_node import message_class
 from hardware_drivers.settings import TOPIC_DRIVERS, load_hardware
 
+EXTERNAL_TIMEOUT_S = 20.0  # for an external controller to publish, and to read
 CONTROLLER_AND_RECORDER = 2  # nodes that receive the goal before anything moves
 
 
@@ -54,9 +55,6 @@ def _last_status(report: Report) -> str:
     refused = report.values.get("goal_refused")
     more = f" (it refused the goal: {refused})" if refused else ""
     return f"{report.message or report.level}{more}, {time.monotonic() - report.received_s:.1f} s ago"
-
-
-TIMEOUT_S = 20.0
 
 
 @dataclass(frozen=True)
@@ -102,18 +100,16 @@ def wait_for_publisher(plan: RunPlan, overseer: Supervisor, alive: Callable[[], 
 
     def waiting() -> None:
         alive()
-        if time.monotonic() - began_s > TIMEOUT_S:
+        if time.monotonic() - began_s > EXTERNAL_TIMEOUT_S:
             unfit = "".join(f" {problem}." for problem in problems(overseer.offers(entry.topic)))
             raise RunFailed(
-                f"no publisher on {entry.topic} within {TIMEOUT_S:g} s.{unfit} Start your controller, in ROS domain "
-                f"{domain}; it publishes {entry.wire.type}."
+                f"no publisher on {entry.topic} within {EXTERNAL_TIMEOUT_S:g} s.{unfit} Start your controller, in ROS "
+                f"domain {domain}; it publishes {entry.wire.type}."
             )
 
     if not fits():
-        console.print(
-            f"waiting for your controller: a publisher of {entry.wire.type} on {entry.topic}, in ROS domain {domain}",
-            markup=False,
-            soft_wrap=True,
+        log_line(
+            f"waiting for your controller: a publisher of {entry.wire.type} on {entry.topic}, in ROS domain {domain}"
         )
     overseer.wait_until(ready, waiting)
 
@@ -130,11 +126,11 @@ def wait_for_reader(plan: RunPlan, overseer: Supervisor, alive: Callable[[], Non
 
     def waiting() -> None:
         alive()
-        if time.monotonic() - began_s > TIMEOUT_S:
+        if time.monotonic() - began_s > EXTERNAL_TIMEOUT_S:
             topic = dict(plan.remappings).get(ODOMETRY.name, ODOMETRY.name)
             raise RunFailed(
-                f"the plant did not begin within {TIMEOUT_S:g} s ({overseer.plant.message}). In lock step your "
-                f"controller subscribes {topic} of '{plan.robot_name}' and answers each message by its stamp."
+                f"the plant did not begin within {EXTERNAL_TIMEOUT_S:g} s ({overseer.plant.message}). In lock step "
+                f"your controller subscribes {topic} of '{plan.robot_name}' and answers each message by its stamp."
             )
 
     overseer.wait_until(

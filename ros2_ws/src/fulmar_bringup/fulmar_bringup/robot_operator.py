@@ -108,7 +108,7 @@ class Operator:
         return stop_robots(self._node, robot, find_s=FIND_S)
 
     def reset_all(self, robot: str | None) -> dict[str, Answer]:
-        """Reset the e-stop of every robot, or of one, by namespace; see `reset_robots`."""
+        """Reset the e-stop of every robot, or of one, by namespace; see `robots_to_reset`."""
         with_node, without = robots_to_reset(self._node, robot, find_s=FIND_S)
         services = {space: f"{space}/{ESTOP_RESET}" for space in sorted(with_node)}
         said = self.ask_all(list(services.values()))
@@ -186,4 +186,9 @@ def operator() -> Iterator[Operator]:
     """An operator whose node spins until the context ends."""
     errors: list[Exception] = []
     with ros_node(f"operator_{os.getpid()}", errors.append) as node:
-        yield Operator(node)
+        try:
+            yield Operator(node)
+        except RunFailed as failed:
+            if errors:
+                raise RunFailed(f"the operator's node failed: {errors[0]!r}") from errors[0]
+            raise failed

@@ -30,7 +30,7 @@ def give_back_abandoned_memory(folder: Path = SHARED_MEMORY) -> int:
     """
     removed = 0
     for lock in _locks(folder):
-        with _abandoned(lock) as abandoned:
+        with _abandoned(lock) as abandoned, contextlib.suppress(OSError):  # a folder that may not be written
             if abandoned:
                 lock.with_name(lock.name.removesuffix("_el")).unlink(missing_ok=True)
                 lock.unlink(missing_ok=True)

@@ -83,7 +83,7 @@ def exponential(rotation: Array) -> Array:
     """Unit quaternion of a rotation vector (Solà eq. 101).
 
     Args:
-        rotation: Axis times angle, shape (3, ...) [rad].
+        rotation: Axis times angle, shape (3, ...) [rad]; to the last bit up to half a turn, to 1e-12 up to a turn.
 
     Returns:
         Shape (4, ...).
@@ -102,7 +102,7 @@ def logarithm(q: Array) -> Array:
     """Rotation vector of a unit quaternion, at most half a turn (Solà eq. 105).
 
     Args:
-        q: Shape (4, ...); q and -q give the same.
+        q: Shape (4, ...); q and -q give the same, but for exactly half a turn.
 
     Returns:
         Axis times angle, shape (3, ...) [rad], of length 0 to pi.
@@ -143,8 +143,8 @@ def angle_between(q: Array, target: Array) -> Array:
 def first_rows(q: Array) -> Array:
     """First two rows of the rotation matrix from body to world: an attitude without jumps for a network.
 
-    Zhou et al., "On the Continuity of Rotation Representations in Neural Networks", CVPR 2019, §4: six numbers are the
-    fewest that are continuous.
+    Zhou et al., "On the Continuity of Rotation Representations in Neural Networks", CVPR 2019: representations of
+    four or fewer numbers jump somewhere; these six do not.
 
     Args:
         q: Shape (4, ...).
@@ -189,10 +189,10 @@ def euler_of(q: Array) -> Array:
     xp = array_namespace(q)
     x, y, z, w = q
     pitch = xp.asin(clip(2.0 * (w * y - x * z), -1.0, 1.0))
-    upright = xp.abs(2.0 * (w * y - x * z)) < 1.0 - 1e-12
-    roll = xp.where(upright, xp.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)), xp.zeros_like(x))
+    regular = xp.abs(2.0 * (w * y - x * z)) < 1.0 - 1e-12
+    roll = xp.where(regular, xp.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)), xp.zeros_like(x))
     yaw = xp.where(
-        upright,
+        regular,
         xp.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)),
         xp.atan2(-2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z)),
     )

@@ -40,7 +40,7 @@ def check_count(option: str, count: int, *, bytes_each: float = 0.0, free: int |
 
 
 def check_episodes(
-    robot: Robot, *, episodes: int, steps: int, worlds: int | None = None, jobs: int = 1
+    robot: Robot, *, episodes: int, steps: int, worlds: int | None = None, jobs: int = 1, at_once: int = 1
 ) -> None:
     """Reject episodes that cannot be evaluated here.
 
@@ -49,7 +49,8 @@ def check_episodes(
         episodes: `--episodes`.
         steps: Control steps of one of them.
         worlds: `--worlds`: how many are in memory at once; all of them by default.
-        jobs: `--jobs`: processes that hold as many each.
+        jobs: `--jobs`.
+        at_once: Processes that each hold all episodes, or worlds, at the same time.
 
     Raises:
         ConfigError: With the limit.
@@ -58,7 +59,7 @@ def check_episodes(
     check_count("--steps", steps)
     check_count("--jobs", jobs, bytes_each=PROCESS_BYTES)
     record = steps * (STEP_BYTES + SHARE_BYTES * len(robot.actuators.scale))
-    each = jobs * (WORLD_BYTES + RECORD_COPIES * record)
+    each = at_once * (WORLD_BYTES + RECORD_COPIES * record)
     if worlds is None:
         check_count("--episodes", episodes, bytes_each=each)
     else:

@@ -30,7 +30,7 @@ class Refusal:
     """A goal that does not count."""
 
     stamp_ns: int = 0
-    reason: str = ""  # of the e-stop; empty if the newest goal counts
+    reason: str = ""  # of the area or of the e-stop; empty if the newest goal counts
 
 
 class Estop(Protocol):
@@ -59,7 +59,7 @@ class GuardedLoop:
         switch: The controller that acts, and its fallback.
         newest: The newest usable measurement since the activation.
         acted: Control steps with a command of the controller's own since the activation.
-        refusal: Why the newest goal does not count, if the e-stop refused it or took it away.
+        refusal: Why the newest goal does not count: it is out of bounds, or the e-stop refused it or took it away.
     """
 
     def __init__(

@@ -8,8 +8,6 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from typing import Any
 
-import numpy as np
-
 from fulmar_core.arrays import array_namespace
 from fulmar_core.attitude import turn_back
 from fulmar_core.rotation import Array
@@ -45,8 +43,8 @@ PARTS = tuple(f.name for f in fields(SpatialState))
 
 def at_rest_in_space(position: Array, quat_xyzw: Array) -> SpatialState:
     """A body that stands still at a pose, shapes (3, ...) and (4, ...) [m, -]."""
-    zero = array_namespace(position).zeros_like(position)
-    return SpatialState(position, quat_xyzw, zero, zero)
+    zeros = array_namespace(position).zeros_like
+    return SpatialState(position, quat_xyzw, zeros(position), zeros(position))
 
 
 def spatial_of(state: RigidBodyState) -> SpatialState:
@@ -68,8 +66,3 @@ def rigid_of_spatial(state: SpatialState) -> RigidBodyState:
     """The rigid-body state of a batch's: component axis last."""
     xp = array_namespace(state.position)
     return RigidBodyState(*(xp.moveaxis(getattr(state, name), 0, -1) for name in PARTS))
-
-
-def stack_spatial(states: list[SpatialState], axis: int = -1) -> SpatialState:
-    """Join states of one shape along a new axis, as NumPy; axis 0 is the one of components."""
-    return SpatialState(*(np.stack([getattr(s, name) for s in states], axis=axis) for name in PARTS))

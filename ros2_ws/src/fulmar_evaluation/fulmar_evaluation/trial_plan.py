@@ -95,13 +95,14 @@ def plan_trial(
             f"an episode of {duration_s:g} s is shorter than the {window_s:g} s that '{task}' is held in the end. "
             "Make it longer."
         )
+    jobs = jobs or len(os.sched_getaffinity(0))
     episodes = episodes or (BATCH_EPISODES if through == "batch" else EPISODES)
     check_episodes(
         the_robot,
         episodes=episodes,
         steps=steps or round(duration_s / control_dt),
         worlds=(worlds or WORLDS) if through == "batch" else None,
-        jobs=(jobs or 1) if through == "ros" else 1,
+        jobs=jobs if through == "ros" else 1,
     )
     policy = chosen_policy(controller, policy, the_robot, the_task, hz)
     plan = RunPlan(
@@ -121,7 +122,7 @@ def plan_trial(
         through,
         episodes,
         worlds or WORLDS,
-        jobs or len(os.sched_getaffinity(0)),
+        jobs,
         bounds or BOUNDED_EPISODES,
     )
 

@@ -37,10 +37,10 @@ from fulmar_ros.fallback import MakeController, PolicySwap, controllers_of, load
 from fulmar_ros.goal_messages import GoalMessage
 from fulmar_ros.graph import WireWatch
 from fulmar_ros.parameters import own_frames, read_parameters
+from fulmar_ros.qos import SAFE_REPEATS
 from fulmar_ros.runtime import RequestExit, settle_memory
 
 DONE, REFUSED = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
-SAFE_REPEATS = 5
 
 
 class ControllerNode(LifecycleNode):

@@ -40,10 +40,9 @@ from fulmar_ros.goal_messages import TYPES, GoalMessage
 from fulmar_ros.health import Health
 from fulmar_ros.operator_subscription import subscribe_operator
 from fulmar_ros.parameters import name_of, own_frames
-from fulmar_ros.qos import FLUSH_S, flush, publish_patiently, publisher_qos, subscriber_qos
+from fulmar_ros.qos import FLUSH_S, LAST_WORDS_S, flush, publish_patiently, publisher_qos, subscriber_qos
 
 APPLIED_DEPTH = 50  # states of the actuators that may wait while this process does something else
-LAST_WORDS_S = 0.3  # for readers in real time to get what was published last
 
 
 class ControllerWires:

@@ -26,12 +26,11 @@ from fulmar_core.topics import IMU, MOCAP, ODOMETRY
 from fulmar_ros.convert import OdometryWriter
 from fulmar_ros.health import Health
 from fulmar_ros.parameters import name_of, own_frames, read_parameters
-from fulmar_ros.qos import publisher_qos, subscriber_qos
+from fulmar_ros.qos import LAST_WORDS_S, publisher_qos, subscriber_qos
 from fulmar_ros.runtime import RequestExit, run_node
 
 WATCH_S = 0.1
 STATUS_PERIOD_S = 0.5
-FLUSH = Duration(seconds=0.3)
 FRAMES = ("odom", "map", "world")  # names of the room in motion captures; all with Z up
 BODY_AXES = np.ix_((0, 1, 5), (0, 1, 5))  # of a 6 × 6 covariance: x, y and yaw
 
@@ -154,7 +153,7 @@ class EstimatorNode(Node):
 
     def stop(self) -> None:
         """Wait for the last odometry to arrive; nodes that receive none stop by themselves."""
-        self._publisher.wait_for_all_acked(FLUSH)
+        self._publisher.wait_for_all_acked(Duration(seconds=LAST_WORDS_S))
 
 
 def _in_body(covariance: np.ndarray, yaw: float) -> np.ndarray:

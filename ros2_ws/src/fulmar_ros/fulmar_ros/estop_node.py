@@ -31,10 +31,9 @@ from fulmar_core.topics import (
 from fulmar_ros.health import Health
 from fulmar_ros.operator_subscription import subscribe_operator
 from fulmar_ros.parameters import name_of, read_parameters
-from fulmar_ros.qos import publisher_qos, subscriber_qos
+from fulmar_ros.qos import LAST_WORDS_S, publisher_qos, subscriber_qos
 from fulmar_ros.runtime import RequestExit, run_node
 
-FLUSH = Duration(seconds=0.3)
 OWN_MESSAGES = 50  # of its own e-stop messages, by which the node recognises them: 5 s of them
 
 
@@ -145,7 +144,7 @@ class EstopNode(Node):
         """Publish a last press before the process ends; silence would do the same half a second later."""
         self._button.press()
         self._publish()
-        self._publisher.wait_for_all_acked(FLUSH)
+        self._publisher.wait_for_all_acked(Duration(seconds=LAST_WORDS_S))
 
 
 def main() -> None:

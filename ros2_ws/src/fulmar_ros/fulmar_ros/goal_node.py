@@ -198,7 +198,7 @@ class GoalNode(Node):
         if self._sequence.topic == "goal_path":
             return "done: one round is over; the controller goes round until another goal comes"
         if self._sequence.topic == "goal_velocity":
-            return "done: the robot stands still"
+            return "done: a standstill goal was published"
         return "done: the robot stays until another goal comes"
 
     def _watch(self) -> None:
@@ -244,7 +244,7 @@ class GoalNode(Node):
             self.get_logger().warning(f"waiting for odometry: {reason}")
             return
         stands = self._stand_still()
-        then = "the goal is standstill" if stands else "the goal stays as it is"
+        then = "published a standstill goal" if stands else "the goal stays as it is"
         self.get_logger().warning(f"no usable odometry for {self._timeout_s:g} s ({reason}): {then}")
 
     def _stand_still(self) -> bool:

@@ -39,7 +39,7 @@ def refuse_living_plant(
         namespace: Of the plant, absolute.
         since_s: When the node was created, on the monotonic clock [s].
         spins: Whether another thread serves the node's callbacks.
-        within_s: Age of the node from which on nothing found means nothing there [s].
+        within_s: Age of the node from which on nothing found means nothing there; an older node does not wait [s].
 
     Raises:
         ConfigError: Another plant lives there; with its name, process and host.

@@ -61,7 +61,7 @@ def subscribe_operator(
         node.create_subscription(
             kind,
             topic or wire.name,
-            once,
+            with_message_info(once.pass_on),
             subscriber_qos(wire, reliable=True, depth=depth, latched=latched),
             raw=raw,
             # A volatile publisher does not match the latched subscription, which is no fault.
@@ -90,16 +90,13 @@ def with_message_info(callback: Callable[[Any, dict[str, int]], None]) -> Callab
 class _Once:
     """A callback of several subscriptions that passes each message on once, by its source time and number."""
 
-    __signature__ = _WITH_INFO
-
     def __init__(self, callback: Callable[..., None], *, with_info: bool) -> None:
         self._callback, self._with_info = callback, with_info
         self._order: deque[tuple[int, int]] = deque(maxlen=REMEMBERED)
         self._known: set[tuple[int, int]] = set()
 
-    def __call__(self, *received: Any) -> None:
-        # The EventsExecutor of rclpy 7.1 passes message and info as one tuple, other executors as two arguments.
-        message, info = received if len(received) == 2 else received[0]
+    def pass_on(self, message: Any, info: dict[str, int]) -> None:
+        """Call back, if this message did not come before."""
         if self._is_second(info["source_timestamp"], info["publication_sequence_number"]):
             return
         if self._with_info:

@@ -28,12 +28,11 @@ from fulmar_ros.plant_health import PlantHealth
 from fulmar_ros.plant_loops import LockstepLoop, OnStep, RealtimeLoop
 from fulmar_ros.plant_settings import PlantSettings, first_episode
 from fulmar_ros.plant_wires import PlantWires
-from fulmar_ros.qos import subscriber_qos
+from fulmar_ros.qos import SAFE_REPEATS, subscriber_qos
 from fulmar_ros.runtime import RequestExit, settle_memory
 
 MakeBackend = Callable[[Robot, PlantSettings], Backend]
 DONE, REFUSED = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
-SAFE_REPEATS = 5  # the safe command is published this often on the way out
 SETTLE_S = 0.3  # a publisher sees a match some milliseconds before the subscriber's side is ready
 PATIENCE_S = 2.0  # for a backend that hangs in a step, before the node goes on without it
 

@@ -55,7 +55,7 @@ from fulmar_ros.motion_capture import MakeCapture
 from fulmar_ros.operator_subscription import subscribe_operator
 from fulmar_ros.parameters import own_frames
 from fulmar_ros.plant_clock import SimulatedTime
-from fulmar_ros.qos import FLUSH_S, flush, publish_patiently, publisher_qos, subscriber_qos
+from fulmar_ros.qos import FLUSH_S, LAST_WORDS_S, flush, publish_patiently, publisher_qos, subscriber_qos
 
 REMEMBERED = 256  # states whose answer may still come, at least
 
@@ -110,7 +110,6 @@ class SentStates:
 
 
 CLOCK_PERIOD_NS = 5_000_000  # /clock at most 200 times a wall-clock second
-LAST_WORDS_S = 0.3  # for readers in real time to get what was published last
 
 
 class PlantWires:

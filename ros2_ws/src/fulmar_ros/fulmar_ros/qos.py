@@ -9,6 +9,7 @@ import time
 from collections.abc import Iterable
 from typing import Any
 
+# What rclpy raises where the history is full has no public name.
 from rclpy._rclpy_pybind11 import RCLError
 from rclpy.duration import Duration
 from rclpy.publisher import Publisher
@@ -70,10 +71,9 @@ def _profile(*, reliable: bool, latched: bool, depth: int) -> QoSProfile:
     )
 
 
-# What rclpy raises where the history is full has no public name.
-
-
 PATIENCE_S = 4.0  # less than a plant waits for an answer, so that whoever is held up says why
+LAST_WORDS_S = 0.3  # for readers in real time to get what was published last
+SAFE_REPEATS = 5  # the safe command is published this often on the way out
 FLUSH_S = 2.0  # at the end of a run; a launcher that asked for the end waits 4 s
 PAUSE_S = 0.002  # the middleware waits with the interpreter held; here others get it
 

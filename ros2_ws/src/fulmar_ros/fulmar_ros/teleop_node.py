@@ -32,14 +32,12 @@ from fulmar_core.topics import GIVE_BACK, JOY, TELEOP
 from fulmar_ros.convert import VectorWriter
 from fulmar_ros.graph import running_robots_text
 from fulmar_ros.parameters import read_parameters
-from fulmar_ros.qos import publisher_qos, subscriber_qos
+from fulmar_ros.qos import LAST_WORDS_S, SAFE_REPEATS, publisher_qos, subscriber_qos
 from fulmar_ros.runtime import RequestExit, run_node
 
 RATE_HZ = 20.0
-SAFE_REPEATS = 5
 PATIENCE_S = 3.0  # for a plant that receives the commands, before a warning
 ANSWER_S = 2.0  # a plant that does not answer a request by then is asked again
-FLUSH = Duration(seconds=0.3)
 HELP = "w/s ahead, back · a/d turn · q/e left, right · hold a key: it is the dead-man switch · g give back · x end"
 
 
@@ -192,7 +190,7 @@ class TeleopNode(Node):
         if self._has_robot:
             for _ in range(SAFE_REPEATS):
                 self._publisher.publish(self._writer.write(self._safe, 0))
-            self._publisher.wait_for_all_acked(FLUSH)
+            self._publisher.wait_for_all_acked(Duration(seconds=LAST_WORDS_S))
         if self._thread is not None:
             self._thread.join(1.0)
 

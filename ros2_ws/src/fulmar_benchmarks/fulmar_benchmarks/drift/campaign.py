@@ -72,7 +72,14 @@ def run_drift(
     began = time.monotonic()
     robot = load_robot(ROBOT)
     steps = episode_steps(load_task(POSE_TASK), robot.timing.control_s)
-    check_episodes(robot, episodes=request.episodes, steps=steps, jobs=request.jobs)
+    units_at_once = min(request.jobs, len(request.rows) * len(request.controllers))
+    check_episodes(
+        robot,
+        episodes=request.episodes,
+        steps=steps,
+        jobs=request.jobs,
+        at_once=1 if request.through == "ros" else units_at_once,  # through ros units come one by one
+    )
     pairs = {
         (task, controller): _pair(request, task, controller)
         for task in dict.fromkeys(_task_of_row(row) for row in request.rows)

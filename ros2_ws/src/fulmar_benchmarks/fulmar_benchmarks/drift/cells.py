@@ -18,7 +18,7 @@ class Cell:
 
     text: str
     tone: str = ""  # GOOD, BAD, or nothing required
-    band: str = ""  # name of a `drop.Band`, or nothing to compare with
+    band: str = ""  # name of a `targets.Band`, or nothing to compare with
 
 
 @dataclass(frozen=True)

@@ -18,9 +18,9 @@ from fulmar_core.provenance import fulmar_version, git_revision
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 from fulmar_evaluation.evaluation import BATCH_EPISODES
-from fulmar_evaluation.evaluation import EPISODES as EVALUATED
+from fulmar_evaluation.evaluation import EPISODES as MUJOCO_EPISODES
 
-EPISODES = {"batch": BATCH_EPISODES, "mujoco": EVALUATED, "ros": 16}
+EPISODES = {"batch": BATCH_EPISODES, "mujoco": MUJOCO_EPISODES, "ros": 16}
 
 
 @dataclass(frozen=True)
@@ -61,9 +61,11 @@ def run_benchmark(
     """
     began = time.monotonic()
     longest_s = max(load_task(task).episode_s for task in request.tasks)
+    at_once = min(request.jobs, len(request.tasks) * len(request.robots) * len(request.kinds))
     for robot in map(load_robot, request.robots):
         steps = round(longest_s * robot.timing.control_hz)
-        check_episodes(robot, episodes=max(request.episodes.values()), steps=steps, jobs=request.jobs)
+        episodes = max(request.episodes.values())
+        check_episodes(robot, episodes=episodes, steps=steps, jobs=request.jobs, at_once=at_once)
     pairs = [
         find_pair(robot, task, kind, request.policies)
         for task in request.tasks

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from fulmar_bringup.console import print_json, write_line
+from fulmar_bringup.console import print_json, warn, write_line
 from fulmar_cli.commands.arguments import JsonOption, argument, option
-from fulmar_cli.commands.damage import finish, open_and_warn, warn
+from fulmar_cli.commands.damage import finish, open_and_warn
 from fulmar_core.errors import BagError, ConfigError, UnknownNameError
 
 FORMATS = ("csv", "npz", "lerobot")

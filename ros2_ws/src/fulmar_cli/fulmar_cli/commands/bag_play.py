@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from fulmar_bringup.console import print_json, write_line
+from fulmar_bringup.console import print_json, warn, write_line
 from fulmar_cli.commands.arguments import BagArgument, JsonOption, flag, option
-from fulmar_cli.commands.damage import finish, open_and_warn, warn
+from fulmar_cli.commands.damage import finish, open_and_warn
 
 
 def play(

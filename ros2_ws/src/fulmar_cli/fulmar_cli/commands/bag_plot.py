@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Annotated
 
 from fulmar_bringup.console import print_json, write_line
-from fulmar_cli.commands.arguments import BagArgument, JsonOption, option
+from fulmar_cli.commands.arguments import BagArgument, JsonOption, OdometryOption, option
 from fulmar_cli.commands.damage import finish, open_and_warn
 from fulmar_cli.extras import require
 
@@ -17,7 +17,7 @@ def plot(
         list[Path] | None,
         option("FILE", "A page (.html) or a .png image; may be repeated. By default both, beside the bag."),
     ] = None,
-    odometry: Annotated[str | None, option("TOPIC", "Which odometry, where a bag has several.")] = None,
+    odometry: OdometryOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Draw a bag: trajectory, errors, actuators, latencies.

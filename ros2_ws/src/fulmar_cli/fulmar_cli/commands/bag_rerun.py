@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any
 
-from fulmar_bringup.console import print_result, write_line
-from fulmar_cli.commands.arguments import BagArgument, JsonOption, PolicyOption, option
-from fulmar_cli.commands.damage import finish, warn
+from fulmar_bringup.console import print_result, warn, write_line
+from fulmar_cli.commands.arguments import BagArgument, JsonOption, OdometryOption, PolicyOption, option
+from fulmar_cli.commands.damage import finish
 from fulmar_cli.commands.values import read_pose
 
 SHOWN = 12  # lines of fields that differ
@@ -44,7 +44,7 @@ def rerun(
     control_hz: Annotated[
         float | None, option("HZ", "Command rate, if the bag does not say it.", min=0.01)
     ] = None,
-    odometry: Annotated[str | None, option("TOPIC", "Which odometry, where a bag has several.")] = None,
+    odometry: OdometryOption = None,
     out: Annotated[Path | None, option("FILE", "Write the answers, step by step: .csv or .npz.")] = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -71,8 +71,7 @@ def rerun(
     tolerances = read_tolerances(tolerance or [], FIELDS)
     opened = open_bag(bag)
     request.check(foreign=opened.info is None)
-    result: dict[str, Any] = {"bag": str(bag), **rerun_bag(opened, request, tolerances)}
-    warn([*result["warnings"], *result.pop("notes")])
+    result: dict[str, Any] = {"bag": str(bag), **rerun_bag(opened, request, tolerances, warn)}
     sums = result.pop("sums")
     print_result(result, lambda result: _show(result, sums), as_json=as_json)
     raise finish(opened, good=result["same"])

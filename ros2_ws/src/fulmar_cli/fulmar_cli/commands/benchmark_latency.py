@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -11,7 +10,7 @@ from rich.table import Table
 
 from fulmar_bringup.console import output, print_result, write_line
 from fulmar_bringup.progress import time_bar, work_bar
-from fulmar_cli.commands.arguments import JsonOption, option
+from fulmar_cli.commands.arguments import JsonOption, dated_folder, option
 from fulmar_core.errors import FAILED, ConfigError
 
 
@@ -72,7 +71,7 @@ def endurance(
     from fulmar_cli.extras import require
 
     require("onnxruntime", "mujoco")
-    folder = out or Path("runs/benchmark") / f"{time.strftime('%Y%m%d_%H%M%S')}_endurance"
+    folder = out or dated_folder("runs/benchmark", "endurance")
     if folder.exists():
         raise ConfigError(
             f"{folder} exists already; nothing recorded is overwritten. Give --out another folder."

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from fulmar_bringup.console import output, print_result, write_line
-from fulmar_cli.commands.arguments import JsonOption, option
+from fulmar_cli.commands.arguments import JsonOption, dated_folder, option
 from fulmar_core.errors import FAILED
 
 
@@ -36,7 +35,7 @@ def training(
 
     check_count("--seeds", seeds)
     check_count("--at-once", at_once, bytes_each=PROCESS_BYTES)
-    out = out or Path("runs") / "benchmark" / f"{time.strftime('%Y%m%d_%H%M%S')}_training"
+    out = out or dated_folder("runs/benchmark", "training")
     numbers = range(1, seeds + 1)
     jobs = benchmark_jobs(robot, task, seeds=numbers, seconds=seconds, check_every_s=check_every, out=out)
     with JobBars([job.name for job in jobs]) as bars:

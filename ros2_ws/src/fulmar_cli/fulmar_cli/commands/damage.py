@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
 
-from fulmar_bringup.console import log_line
+from fulmar_bringup.console import warn
 from fulmar_core.errors import DONE, FAILED
 
 if TYPE_CHECKING:
@@ -26,12 +25,6 @@ def open_and_warn(path: Path) -> Bag:
     bag = open_bag(path)
     warn(bag.warnings)
     return bag
-
-
-def warn(lines: Iterable[str]) -> None:
-    """Say what is wrong, beside the answer."""
-    for line in lines:
-        log_line(f"warning: {line}")
 
 
 def finish(*bags: Bag, good: bool = True) -> typer.Exit:

@@ -7,6 +7,7 @@ from typing import Annotated
 from fulmar_bringup.console import output, print_result
 from fulmar_cli.commands.arguments import (
     CalibrationOption,
+    ControlHzOption,
     ControllerOption,
     JsonOption,
     PolicyOption,
@@ -43,9 +44,7 @@ def evaluate(
     seed: SeedOption = EVALUATION_SEED,
     scenario: ScenarioOption = "nominal",
     calibration: CalibrationOption = None,
-    control_hz: Annotated[
-        float | None, option("HZ", "Command rate; the robot's own by default.", min=0.01)
-    ] = None,
+    control_hz: ControlHzOption = None,
     jobs: Annotated[
         int | None, option("N", "Processes at once, through ros; one for each core.", min=1)
     ] = None,

@@ -6,9 +6,8 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from fulmar_bringup.console import log_line, new_table, output, print_result, write_line
+from fulmar_bringup.console import log_line, new_table, output, print_result, warn, write_line
 from fulmar_cli.commands.arguments import JsonOption, argument, option
-from fulmar_cli.commands.damage import warn
 from fulmar_core.errors import ConfigError
 
 if TYPE_CHECKING:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Annotated
 
 from fulmar_bringup.console import log_line, write_line
-from fulmar_cli.commands.arguments import argument, option
+from fulmar_cli.commands.arguments import argument, invoked_command, option
 
 
 def import_policy(
@@ -56,7 +55,7 @@ def import_policy(
         control_hz=hz,
         activation=activation,
         output_activation=output_activation,
-        command="fulmar " + " ".join(sys.argv[1:]),
+        command=invoked_command(),
     )
     Policy(out, load_robot(passport.robot), load_task(passport.task), control_hz=passport.control_hz)
     write_line(

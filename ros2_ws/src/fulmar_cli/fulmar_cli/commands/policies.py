@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from fulmar_bringup.console import console, log_line, print_json, write_line
-from fulmar_cli.commands.arguments import JsonOption, argument, flag, option
+from fulmar_cli.commands.arguments import JsonOption, argument, flag, invoked_command, option
 from fulmar_core.errors import FAILED, ConfigError, did_you_mean
 
 
@@ -51,7 +50,7 @@ def policies(
             episodes=table.episodes,
             runs=runs,
             bundles=out or policies_directory(),
-            command="fulmar " + " ".join(sys.argv[1:]),
+            command=invoked_command(),
             git_revision=git_revision(),
         )
         for policy in table.policies

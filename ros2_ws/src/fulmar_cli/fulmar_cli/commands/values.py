@@ -17,11 +17,14 @@ def read_names(text: str, family: str, known: Sequence[str]) -> tuple[str, ...]:
 
     Raises:
         UnknownNameError: For the first that is not known.
+        ConfigError: There is none.
     """
     names = {name.strip() for name in text.split(",") if name.strip()}
     for name in sorted(names - {"all"}):
         if name not in known:
             raise UnknownNameError(family, name, known)
+    if not names:
+        raise ConfigError(f"'{text}' names no {family}; known: {', '.join(known)}, or all.")
     return tuple(name for name in known if name in names or "all" in names)
 
 

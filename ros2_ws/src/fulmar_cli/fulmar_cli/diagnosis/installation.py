@@ -62,8 +62,8 @@ def check_policies() -> Finding:
     """Whether every shipped policy loads and fits its robot and its task."""
     try:
         from fulmar_core.policy_bundle import read_passport
+        from policy_server.controllers import shipped_policies
         from policy_server.policy import Policy
-        from policy_server.shipped import shipped_policies
 
         folders = shipped_policies()
         for folder in folders:

@@ -91,7 +91,7 @@ class Law(ABC):
         Args:
             goal: Way to the target, shapes (...,) [m].
             inputs: Hold where the next one is.
-            cruise: Speed where the direction goes straight on [m/s].
+            cruise: Speed where the path goes straight on [m/s].
         """
         if not self.frame.passes:
             return np.zeros_like(goal[0])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import math
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -229,6 +230,15 @@ def check_delays(robot: Robot, scenario: Scenario) -> None:
         )
 
 
+def scenario_path(name: str) -> Path:
+    """File of a scenario, by its name or a former one.
+
+    Raises:
+        ConfigError: Unknown name.
+    """
+    return config_path("scenarios", RENAMED.get(name, name))
+
+
 def load_scenario(name: str) -> Scenario:
     """Read `configs/scenarios/<name>.yaml`; a name of old works for one release, and warns.
 
@@ -237,7 +247,7 @@ def load_scenario(name: str) -> Scenario:
     """
     if name in RENAMED:
         logger.warning("scenario '%s' is called '%s' now; use that name.", name, RENAMED[name])
-    path = config_path("scenarios", RENAMED.get(name, name))
+    path = scenario_path(name)
     scenario = load_config(Scenario, path)
     check_plausible(scenario, SCENARIO, path)
     return scenario

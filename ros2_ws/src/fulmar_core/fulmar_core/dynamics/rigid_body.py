@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from fulmar_core.arrays import array_namespace
-from fulmar_core.attitude import exponential, normalised, product, turn, turn_back, vector_cross
+from fulmar_core.attitude import dot, exponential, normalised, product, turn, turn_back, vector_cross
 from fulmar_core.rotation import Array
 from fulmar_core.spatial import SpatialState
 
@@ -118,15 +118,13 @@ def rigid_body_step(
     return SpatialState(position, quat, state.velocity + gain, after)
 
 
-def to_mass_center(state: SpatialState, offset: Array, sign: float = 1.0) -> SpatialState:
-    """State of the centre of mass from that of the body's origin (+1), or back (-1).
+def shifted(state: SpatialState, arm: Array) -> SpatialState:
+    """State of another point of the same body: of its centre of mass from that of its origin, say.
 
     Args:
-        state: Of either.
-        offset: Of the centre of mass from the origin, in the body's frame, shape (3, ...) [m].
-        sign: 1 or -1.
+        state: Of one point.
+        arm: From it to the other, in the body's frame, shape (3, ...) [m].
     """
-    arm = sign * offset
     return SpatialState(
         state.position + turn(state.quat_xyzw, arm),
         state.quat_xyzw,
@@ -138,7 +136,7 @@ def to_mass_center(state: SpatialState, offset: Array, sign: float = 1.0) -> Spa
 def kinetic_energy(state: SpatialState, mass: Array, inertia: Inertia) -> Array:
     """Of motion and rotation, shape (...,) [J]."""
     v, w = state.velocity, state.turn_rate
-    return 0.5 * (mass * (v * v).sum(0) + (w * times(inertia.tensor, w)).sum(0))
+    return 0.5 * (mass * dot(v, v) + dot(w, times(inertia.tensor, w)))
 
 
 def angular_momentum_in_world(state: SpatialState, inertia: Inertia) -> Array:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fulmar_core.dynamics.hydrodynamics import GRAVITY
 from fulmar_core.estimation.motion_filter import (
     MOTION,
     POSE,
@@ -27,14 +28,12 @@ from fulmar_core.estimation.motion_filter import (
 from fulmar_core.estimation.settings import EstimatorSettings
 from fulmar_core.robot import Limits
 from fulmar_core.rotation import from_yaw, multiply, rotate, yaw_of
+from fulmar_core.safety.input_gate import BACK_NS, FORWARD_NS
 from fulmar_core.sensors.imu import ImuSample
 from fulmar_core.state import RigidBodyState
 
-GRAVITY = 9.81  # [m/s²]
 KEPT_NS = 1_000_000_000  # how far back an estimate can be corrected
 READING_LASTS_NS = 60_000_000  # how long after it an inertial reading still stands for what happens
-BACK_NS = 1_000_000_000  # stamps that go back further begin anew, as in `fulmar_core.safety.input_gate`
-FORWARD_NS = 10_000_000_000
 TO_BEGIN_ANEW = 10  # outliers in a row that agree with one another: then it is the estimate that is wrong
 KNOWN_SPEED_STD = 0.15  # velocity must be known so well before an estimate is published [m/s]
 

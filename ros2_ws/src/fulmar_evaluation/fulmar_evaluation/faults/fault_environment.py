@@ -78,7 +78,7 @@ class FaultEnvironment:
     guards: Mapping[str, Any] = field(default_factory=dict)  # beside the e-stop
     # The wire that passes through the injector; None: the robot's commands.
     intercepted: Wire | None = ODOMETRY
-    answers_pass: bool = False  # the robot's commands, too, pass through a injector, of their own
+    answers_pass: bool = False  # the robot's commands, too, pass through an injector of their own
     by_goal_node: bool = False  # a goal node publishes goals from a file
     by_hand: bool = False  # a node for teleoperation runs, and nobody touches it yet
     scenario: str = "nominal"

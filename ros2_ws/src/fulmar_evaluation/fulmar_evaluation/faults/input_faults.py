@@ -97,7 +97,10 @@ def odometry_out_of_order(live: LiveSystem) -> Outcome:
 
 
 def odometry_late(live: LiveSystem) -> Outcome:
-    """Everything comes later by the same time, which is longer than the robot may be blind."""
+    """Everything comes later by the same time, which is longer than the robot may be blind.
+
+    The result is taken before that time is over.
+    """
     limit_s = live.watchdog_s + live.corrected_s
     late_s = limit_s + STAYS_S + MARGIN_S
     return _intercept(live, delayed(round(late_s / live.tick_s)), live.watchdog_s)

@@ -179,7 +179,7 @@ def _specs(request: RunRequest, about: FaultEnvironment, robot: Robot, wires: Pa
     commands = command_wire(robot)
     intercepted = [about.intercepted or commands, *([commands] if about.answers_pass else [])]
     sources = {_publisher_of(wire, plan): {wire.name: source_of(wire)} for wire in intercepted}
-    # Of a intercepted topic this process alone is the subscriber.
+    # Of an intercepted topic this process alone is the subscriber.
     return [
         replace(
             spec,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -44,17 +44,20 @@ class RerunRequest:
     odometry: str | None  # topic
     out: Path | None  # file for the answers
 
-    def check(self, *, foreign: bool) -> None:
-        """Reject unknown names and options without effect.
-
-        Raises:
-            ConfigError: On the first one.
-        """
+    def __post_init__(self) -> None:
+        """Reject unknown names, before a bag is opened."""
         for what, given, known in (("--from", self.source, FROM), ("--through", self.through, THROUGH)):
             if given not in known:
                 raise UnknownNameError(what, given, known)
         if self.out is not None:
             check_answers_file(self.out)
+
+    def check(self, *, foreign: bool) -> None:
+        """Reject options without effect on a bag, `foreign` if another program recorded it.
+
+        Raises:
+            ConfigError: On the first one.
+        """
         fed = self.source == "observations" and self.through == "direct" and not foreign
         for option, value in (("--goal", self.goal), ("--odometry", self.odometry)):
             if fed and value is not None:
@@ -63,22 +66,27 @@ class RerunRequest:
                 )
 
 
-def rerun_bag(bag: Bag, request: RerunRequest, tolerances: Mapping[str, float]) -> dict[str, Any]:
+def rerun_bag(
+    bag: Bag,
+    request: RerunRequest,
+    tolerances: Mapping[str, float],
+    warn: Callable[[Iterable[str]], None],
+) -> dict[str, Any]:
     """Re-run a bag and compare every field.
 
     Args:
         bag: The bag.
         request: Checked.
         tolerances: Of each field.
+        warn: Receives warnings at once, so that they stand before an error that they explain.
 
     Returns:
-        The result, ready for JSON; beside it `sums`, a line for each kind of field, and `notes`, warnings.
+        The result, ready for JSON; beside it `sums`, a line for each kind of field.
 
     Raises:
         FulmarError: The bag lacks what is needed, or the controller cannot be loaded.
     """
     began = time.monotonic()
-    notes: list[str] = []
     source = "odometry" if bag.info is None else request.source
     with knowing_what_it_carries(bag), calibrated_as(bag):
         course = control_steps_of(
@@ -89,7 +97,8 @@ def rerun_bag(bag: Bag, request: RerunRequest, tolerances: Mapping[str, float]) 
             control_hz=request.control_hz,
             odometry=request.odometry,
         )
-        name, folder = _chosen(bag, course, request, notes)
+        warn(course.warnings)
+        name, folder = _chosen(bag, course, request, warn)
         if request.through == "node":
             from fulmar_evaluation.rerun.live_node import rerun_through_node, without_repeats
 
@@ -98,7 +107,7 @@ def rerun_bag(bag: Bag, request: RerunRequest, tolerances: Mapping[str, float]) 
         else:
             follow = request.policy is None and name == (bag.info or {}).get("controller")
             if course.changes and not follow:
-                notes.append("the run changed its policy on the way; here one policy re-runs all of it")
+                warn(["the run changed its policy on the way; here one policy re-runs all of it"])
             answers, sha256 = answers_of(course, name, folder, source, follow=follow)
     fields = compare_answers(course, answers, tolerances)
     first = first_difference(fields)
@@ -126,12 +135,13 @@ def rerun_bag(bag: Bag, request: RerunRequest, tolerances: Mapping[str, float]) 
         "fields": as_json(fields),
         "sums": [vars(each) for each in sums(fields)],
         "warnings": list(course.warnings),
-        "notes": notes,
         "elapsed_s": time.monotonic() - began,
     }
 
 
-def _chosen(bag: Bag, course: ControlSteps, request: RerunRequest, notes: list[str]) -> tuple[str, str]:
+def _chosen(
+    bag: Bag, course: ControlSteps, request: RerunRequest, warn: Callable[[Iterable[str]], None]
+) -> tuple[str, str]:
     """Name of the controller, and folder of its bundle, empty where it has none."""
     policy = request.policy
     name = request.controller or ("policy" if policy else (bag.info or {}).get("controller"))
@@ -160,7 +170,5 @@ def _chosen(bag: Bag, course: ControlSteps, request: RerunRequest, notes: list[s
         )
     named = (bag.info or {}).get("policy")
     if named and not policy and not recorded:
-        notes.append(
-            f"the recorded bundle, {named}, is gone; {folder} is used instead. Or give --policy DIR."
-        )
+        warn([f"the recorded bundle, {named}, is gone; {folder} is used instead. Or give --policy DIR."])
     return name, str(folder)
