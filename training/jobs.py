@@ -14,7 +14,7 @@ from fulmar_core.errors import ConfigError
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.tasks import Task, load_task
 from training.fallback_policy import FallbackPolicy, fallback_settings, load_fallback
-from training.progress import ProgressFile, Watcher
+from training.progress import Watcher, progress_file
 from training.run_folder import (
     CALIBRATION_FILE,
     CHECKPOINT_FILE,
@@ -69,7 +69,7 @@ def run_job(job: Job, watcher: Watcher | None = None) -> dict[str, Any]:
 
     Progress goes to `watcher`, by default to `progress.json` in the job's folder.
     """
-    record = _finished(job) or learn(job, watcher or ProgressFile(job.out / PROGRESS_FILE))
+    record = _finished(job) or learn(job, watcher or progress_file(job.out / PROGRESS_FILE))
     if job.episodes and record.get("mujoco", {}).get("episodes") != job.episodes:
         from training.evaluator import evaluate_in_mujoco
 

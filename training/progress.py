@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Protocol
@@ -92,13 +92,13 @@ class LearningBar:
         self._bar.stop()
 
 
-class ProgressFile:
-    """Writes the progress of a run into its folder, now and then, for the process that runs several."""
+class ProgressNotes:
+    """Hands the progress of a run on, now and then, to the process that runs several."""
 
-    EVERY_S = 0.5
-
-    def __init__(self, path: Path) -> None:
-        self._path, self._speed, self._next = path, Speed(), 0.0
+    def __init__(self, write: Callable[[dict[str, float | int | None]], None], *, every_s: float) -> None:
+        """Begin; `write` takes the figures at most every so many seconds while a run advances."""
+        self._hand_on, self._every_s = write, every_s
+        self._speed, self._next = Speed(), 0.0
         self._progress: dict[str, float | int | None] = {
             "share": 0.0,
             "steps": 0,
@@ -127,10 +127,19 @@ class ProgressFile:
         self._write()
 
     def _write(self) -> None:
-        self._next = time.monotonic() + self.EVERY_S
-        new = self._path.with_suffix(".new")
-        new.write_text(json.dumps(self._progress), encoding="utf-8")
-        new.replace(self._path)
+        self._next = time.monotonic() + self._every_s
+        self._hand_on(self._progress)
+
+
+def progress_file(path: Path) -> ProgressNotes:
+    """Progress in a file of the run folder."""
+
+    def write(progress: dict[str, float | int | None]) -> None:
+        new = path.with_suffix(".new")
+        new.write_text(json.dumps(progress), encoding="utf-8")
+        new.replace(path)
+
+    return ProgressNotes(write, every_s=0.5)
 
 
 class JobBars:

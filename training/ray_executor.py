@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import tempfile
-import time
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -14,7 +13,7 @@ import ray
 from fulmar_core.errors import FulmarError
 from training.executors import Watch
 from training.jobs import Job, Outcome, run_job
-from training.progress import ProgressFile
+from training.progress import ProgressNotes
 
 POLL_S = 0.5
 
@@ -79,28 +78,15 @@ class _Board:
         return self._progress
 
 
-class _BoardWatcher(ProgressFile):
-    """Writes progress to the board, now and then."""
-
-    EVERY_S = 1.0
-
-    def __init__(self, number: int, board: Any) -> None:
-        super().__init__(Path())
-        self._number, self._board = number, board
-
-    def _write(self) -> None:
-        self._next = time.monotonic() + self.EVERY_S
-        self._board.write.remote(self._number, self._progress)
-
-
 @ray.remote(max_retries=0)
 def _work(number: int, job: Job, board: Any) -> tuple[dict[str, Any], dict[str, bytes]]:
     """Do a job on whichever machine this is; returns its record and every file of its folder."""
     with tempfile.TemporaryDirectory() as folder:
         here = Path(folder)
         bundle = here / "bundle" if job.bundle is not None else None
+        notes = ProgressNotes(lambda progress: board.write.remote(number, progress), every_s=1.0)
         try:
-            record = run_job(replace(job, out=here, bundle=bundle), _BoardWatcher(number, board))
+            record = run_job(replace(job, out=here, bundle=bundle), notes)
         except FulmarError as error:
             raise RuntimeError(str(error)) from None
         files = {str(path.relative_to(here)): path.read_bytes() for path in here.rglob("*") if path.is_file()}

@@ -24,6 +24,7 @@ from fulmar_benchmarks.drift.targets import (
     published,
     requirements,
 )
+from fulmar_cli.commands.values import read_names
 from fulmar_cli.main import app
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.errors import UnknownNameError
@@ -192,3 +193,10 @@ def test_people_get_both_tables_with_marks_and_a_result(document, capsys):
     ):
         assert words in text
     assert "✓" in text or "✗" in text
+
+
+def test_controllers_are_evaluated_in_the_order_that_was_given():
+    known = ("policy", "lqr", "mpc")
+    assert read_names("mpc,policy", "controller", known, as_given=True) == ("mpc", "policy")
+    assert read_names("mpc,policy", "controller", known) == ("policy", "mpc")
+    assert read_names("all", "controller", known, as_given=True) == known

@@ -10,7 +10,7 @@ from fulmar_core.calibration import Calibration, Measured, save_calibration
 from fulmar_core.robot import load_robot, use_calibration
 from training import jobs
 from training.jobs import Job, learn
-from training.progress import ProgressFile
+from training.progress import progress_file
 
 
 @pytest.fixture
@@ -29,11 +29,11 @@ def test_it_learns_on_the_measured_robot_and_keeps_the_file(in_use, tmp_path, sm
         jobs, "train", lambda robot, *rest, **more: (seen.append(robot), train(robot, *rest, **more))[1]
     )
     job = Job("one", "floating_platform", "go_to_pose", 1, small_settings, tmp_path / "run", updates=1)
-    learn(job, ProgressFile(tmp_path / "progress.json"))
+    learn(job, progress_file(tmp_path / "progress.json"))
     assert seen[0].actuators.thrust == 0.8
     kept = tmp_path / "run" / "calibration.yaml"
     assert kept.read_bytes() == in_use.read_bytes()
     use_calibration(kept, "floating_platform")  # as a resumed run does
-    learn(replace(job, updates=2), ProgressFile(tmp_path / "progress.json"))
+    learn(replace(job, updates=2), progress_file(tmp_path / "progress.json"))
     assert kept.read_bytes() == in_use.read_bytes()
     assert load_robot("floating_platform").actuators.thrust == 0.8

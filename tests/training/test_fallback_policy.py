@@ -23,7 +23,7 @@ from training.fallback_policy import fallback_settings
 from training.jobs import Job, learn
 from training.network import load_network
 from training.policies import ShippedPolicy, recipe
-from training.progress import ProgressFile
+from training.progress import progress_file
 from training.run_folder import FALLBACK_FOLDER, NETWORK_FILE, read_run_record, read_start
 from training.settings import FallbackPlan, OnPolicy, RecurrentPpo, load_training_settings
 
@@ -61,7 +61,7 @@ def job_in(folder, settings, **limits):
 
 def learned(folder, settings, **limits):
     folder.mkdir(parents=True, exist_ok=True)
-    return learn(job_in(folder, settings, **limits), ProgressFile(folder / "progress.json"))
+    return learn(job_in(folder, settings, **limits), progress_file(folder / "progress.json"))
 
 
 @pytest.fixture(scope="module")

@@ -73,7 +73,8 @@ def drift(
 
     if through not in WAYS:
         raise UnknownNameError("way", through, WAYS)
-    names = read_names(controllers, "controller", [name for name in CONTROLLERS if name != "classical"])
+    known = [name for name in CONTROLLERS if name != "classical"]
+    names = read_names(controllers, "controller", known, as_given=True)
     require(*(["onnxruntime"] if "policy" in names else []), *([] if through == "batch" else ["mujoco"]))
     request = Request(
         rows=ROWS if rows is None else read_names(rows, "row", ROWS), controllers=names, through=through,

@@ -9,6 +9,7 @@ from rich.table import Table
 from fulmar_bringup.console import console, output, print_result
 from fulmar_bringup.progress import step_bar
 from fulmar_cli.commands.arguments import JsonOption, ScenarioOption, TaskOption, option
+from fulmar_cli.commands.values import read_names
 from fulmar_core.errors import ConfigError, UnknownNameError
 
 DEVICES, LIBRARIES = ("cpu", "cuda"), ("compiled", "numpy", "torch")
@@ -54,7 +55,7 @@ def throughput(
     for kind, name, known in (("device", device, DEVICES), ("library", library, LIBRARIES)):
         if name not in known:
             raise UnknownNameError(kind, name, known)
-    names = config_names("robots") if robots is None else [name.strip() for name in robots.split(",")]
+    names = read_names(robots or "all", "robot", config_names("robots"))
     chosen = [load_robot(name) for name in names]
     the_task, the_scenario = load_task(task), load_scenario(scenario)
     require("mujoco", *([] if library == "numpy" else ["torch"]))

@@ -12,19 +12,21 @@ from fulmar_core.safety.geofence import check_area
 Area = tuple[float, float, float, float]  # x_min, x_max, y_min, y_max [m]
 
 
-def read_names(text: str, family: str, known: Sequence[str]) -> tuple[str, ...]:
-    """Read names with commas between them, in the order of those known; `all` stands for every one.
+def read_names(text: str, family: str, known: Sequence[str], *, as_given: bool = False) -> tuple[str, ...]:
+    """Read names with commas between them, in the order of those known or `as_given`; `all` stands for every one.
 
     Raises:
         UnknownNameError: For the first that is not known.
         ConfigError: There is none.
     """
-    names = {name.strip() for name in text.split(",") if name.strip()}
-    for name in sorted(names - {"all"}):
-        if name not in known:
+    names = list(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
+    for name in names:
+        if name not in (*known, "all"):
             raise UnknownNameError(family, name, known)
     if not names:
         raise ConfigError(f"'{text}' names no {family}; known: {', '.join(known)}, or all.")
+    if as_given and "all" not in names:
+        return tuple(names)
     return tuple(name for name in known if name in names or "all" in names)
 
 

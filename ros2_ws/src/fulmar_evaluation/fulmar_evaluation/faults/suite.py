@@ -97,21 +97,21 @@ def run_faults(robot: str, faults: list[Fault], progress: Callable[[int], None])
         request_of(
             robot, Path(folder) / "bag"
         )  # a robot without a policy is refused once, not by every fault
-    findings = []
+    results = []
     with reserved_domains(1) as (domain,), environment({"ROS_DOMAIN_ID": str(domain)}):
         for count, fault in enumerate(faults, 1):
-            findings.append(_found(robot, fault))
+            results.append(_result_of(robot, fault))
             progress(count)
-    return findings
+    return results
 
 
-def _found(robot: str, fault: Fault) -> FaultResult:
+def _result_of(robot: str, fault: Fault) -> FaultResult:
     """What came of a fault; whatever prevents it is reported, and the others go on."""
     problem = ""
     for _ in range(ATTEMPTS):
         with tempfile.TemporaryDirectory(prefix="fulmar_", ignore_cleanup_errors=True) as folder:
             try:
-                return _finding(fault, *_done(robot, fault, Path(folder)))
+                return _result(fault, *_done(robot, fault, Path(folder)))
             except NothingShown as error:
                 problem = str(error)
             except FulmarError as error:
@@ -123,17 +123,19 @@ def _found(robot: str, fault: Fault) -> FaultResult:
     return FaultResult(fault.name, "", problem, None, None, None, None, passed=False)
 
 
-def _finding(fault: Fault, outcome: Outcome, kept: BagEvidence) -> FaultResult:
-    words = "; ".join(text for text in (outcome.reaction, kept.words and f"bag: {kept.words}") if text)
+def _result(fault: Fault, outcome: Outcome, evidence: BagEvidence) -> FaultResult:
+    words = "; ".join(
+        text for text in (outcome.reaction, evidence.words and f"bag: {evidence.words}") if text
+    )
     return FaultResult(
         fault.name,
         outcome.detected_by,
         words,
         outcome.time_to_safe_s,
         outcome.limit_s,
-        kept.lost,
-        kept.intact,
-        outcome.passed and kept.intact,
+        evidence.lost,
+        evidence.intact,
+        outcome.passed and evidence.intact,
     )
 
 
