@@ -11,6 +11,7 @@ from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Polygon
+from matplotlib.patheffects import withStroke
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
 from fulmar_core.robot import Body
@@ -56,7 +57,10 @@ def log_scale(axis: Axis, marks: dict[float, str] | Sequence[float]) -> None:
 def limit_line(axes: Axes, value: float, label: str = "") -> None:
     """A dashed line at a tolerance, with its name above it."""
     axes.axhline(value, color=INK, linestyle=DASHED, linewidth=1.0)
-    axes.text(0.005, value, label, transform=axes.get_yaxis_transform(), va="bottom", fontsize=8.5, color=INK)
+    text = axes.text(
+        0.005, value, label, transform=axes.get_yaxis_transform(), va="bottom", fontsize=8.5, color=INK
+    )
+    text.set_path_effects([withStroke(linewidth=3.0, foreground="white")])  # readable where a curve passes
 
 
 def bands(axes: Axes, time_s: np.ndarray, quantiles: np.ndarray, colour: str, *, half: bool = True) -> None:
