@@ -21,7 +21,7 @@ AWAY = 3.0  # as far beyond start, goals and obstacles a path is shown, so that 
 
 def draw_paths(runs: Sequence[View]) -> Figure:
     """The first episodes of every pair, moved so that all goals coincide; where a heading counts, turned too."""
-    figure, axes = panels(runs, 3.6, lines=1, sharex=True, sharey=True)
+    figure, axes = panels(runs, 4.2, lines=1, sharex=True, sharey=True)
     for one, run in zip(axes[0], runs, strict=True):
         outcome = run.main
         ways = _about_the_goal(run)
