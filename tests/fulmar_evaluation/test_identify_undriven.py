@@ -37,7 +37,7 @@ def test_what_is_known_is_kept_and_what_the_run_does_not_state_is_named_and_left
     assert done.exit_code == 0, done.exception
     reported = json.loads(done.stdout[done.stdout.index("{") :])
     assert "surge_linear_drag" in reported["untold"]
-    assert "the runs tell nothing of" in done.stderr
+    assert "the runs do not show" in done.stderr
     assert set(load_calibration(out).measured) == set(reported["estimates"]) - set(reported["untold"])
     assert load_calibration(out).mass is not None
 

@@ -105,6 +105,7 @@ class ControllerWires:
         self._publishers = (*self._streams, self._metadata, *self.health.publishers)
         self._write_command = self._command_writer()
         self._newest: bytes | None = None
+        self._action_size = len(robot.actuators.names)
         self._write_action = VectorWriter(robot.actuators.names)
         self._write_health = VectorWriter(robot.actuators.names)
         self._write_observation = VectorWriter(observation_names, "position")
@@ -181,10 +182,14 @@ class ControllerWires:
         flush(self._streams, self._flush_s)
 
     def publish_reasoning(self, observation: np.ndarray, action: np.ndarray, stamp: int) -> None:
-        """Publish the observation and the action of a command, where they have a subscriber."""
+        """Publish the observation and the action of a command, where they have a subscriber.
+
+        An action with another number of values than the robot has actuators fits no message; the reason for which the
+        loop refuses it names its shape.
+        """
         if self._observation.get_subscription_count():
             self._publish(self._observation, self._write_observation.raw(observation, stamp))
-        if self._action.get_subscription_count():
+        if len(action) == self._action_size and self._action.get_subscription_count():
             self._publish(self._action, self._write_action.raw(action, stamp))
 
     @property
