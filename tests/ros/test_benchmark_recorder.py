@@ -29,7 +29,7 @@ def test_lock_step_loses_no_message_of_any_step(ros_domain: RosDomain, tmp_path:
     asked = ("benchmark", "recorder", "--parts", "lockstep", "--lockstep-s", "8", "--out", "bags", "--json")
     figures = json_of(fulmar(*asked, env=ros_domain.env, cwd=tmp_path).stdout)["lockstep"]
     assert figures["failure"] is None
-    assert figures["sent"] == 8 * 10 * 6
+    assert figures["sent"] == 8 * 25 * 6
     assert not any(figures["lost"].values())
 
 

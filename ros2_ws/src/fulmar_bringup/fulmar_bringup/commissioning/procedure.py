@@ -20,7 +20,9 @@ CLICK_S, BETWEEN_CLICKS_S = 0.1, 0.9
 # At most 0.3 s at its level. For valves our value: 1 N on 5.32 kg gives 23 mm/s, some 20 standard errors.
 VALVE_PULSE_S, HOLD_S = 0.12, 0.3
 STILL_S = 1.5  # before the first pulse: what moves by itself
-BETWEEN_S = {"floating": 0.6, "coasting": 1.0, "rolling": 0.6}
+LOOK_BACK_S = 0.8  # before a pulse: motion that the fit takes for the robot's own
+# After a pulse. What rolls must stand when the fit of the next pulse begins; a base slows down for half a second.
+BETWEEN_S = {"floating": 0.6, "coasting": 1.0, "rolling": 1.2}
 # Shares of full thrust of a propeller; each ahead, then astern, until one shows. Propellers push less astern, so one
 # that turns backwards shows at the negative share first, by as much as another at the positive one.
 SHARES = (0.25, 0.34, 0.42, 0.5, 0.65, 0.8, 1.0)
@@ -115,7 +117,7 @@ def _brake(session: Session, robot: Robot, wire: Wire, share: float, *, ahead: f
 def _response(session: Session, robot: Robot, command: np.ndarray, motion: Motion) -> Response:
     pulse = session.pulse(command, _ramp_s(robot, command) + HOLD_S)
     session.rest(BETWEEN_S[motion])
-    (one,) = _responses(session.track(pulse.begin_s - 0.8), [pulse], motion)
+    (one,) = _responses(session.track(pulse.begin_s - LOOK_BACK_S), [pulse], motion)
     return one
 
 
