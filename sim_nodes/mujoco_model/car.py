@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from fulmar_core.actuators.ackermann import Ackermann
-from fulmar_core.planar import PlanarState
+from fulmar_core.planar import PlanarState, PlanarWrench
 from fulmar_core.robot import Robot
 from sim_nodes.mujoco_model.wheels import Chassis
 
@@ -67,7 +67,7 @@ class Car(Chassis):
         data: mujoco.MjData,
         applied: np.ndarray,
         gain: np.ndarray,
-        outside: tuple[float, float, float],
+        outside: PlanarWrench,
     ) -> None:
         """Set steering angles and wheel speeds; see `RobotModel.drive`."""
         speed, steering = applied * gain

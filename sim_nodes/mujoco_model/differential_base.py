@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 
 from fulmar_core.actuators.differential_drive import DifferentialDrive
-from fulmar_core.planar import PlanarState
+from fulmar_core.planar import PlanarState, PlanarWrench
 from fulmar_core.robot import Robot
 from sim_nodes.mujoco_model.wheels import Chassis
 
@@ -53,7 +53,7 @@ class DifferentialBase(Chassis):
         data: mujoco.MjData,
         applied: np.ndarray,
         gain: np.ndarray,
-        outside: tuple[float, float, float],
+        outside: PlanarWrench,
     ) -> None:
         """Set the speeds of the wheels; see `RobotModel.drive`."""
         data.ctrl[:] = self._drive.wheel_speeds(applied * gain)

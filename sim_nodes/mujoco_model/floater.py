@@ -9,7 +9,7 @@ from fulmar_core.actuators.propellers import Propellers
 from fulmar_core.actuators.thrusters import Thrusters
 from fulmar_core.disturbances.world import World
 from fulmar_core.dynamics.hydrodynamics import GRAVITY
-from fulmar_core.planar import PlanarState
+from fulmar_core.planar import PlanarState, PlanarWrench
 from fulmar_core.robot import Robot
 from sim_nodes.mujoco_model.scenery import BODY, add_hull
 from sim_nodes.mujoco_model.water import Water
@@ -111,7 +111,7 @@ class Floater:
         data: mujoco.MjData,
         applied: np.ndarray,
         gain: np.ndarray,
-        outside: tuple[float, float, float],
+        outside: PlanarWrench,
     ) -> None:
         """Set thrusts, the push of the surroundings and the forces of the water; see `RobotModel.drive`."""
         actuators = self._actuators

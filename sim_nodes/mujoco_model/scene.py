@@ -12,7 +12,7 @@ from fulmar_core.actuators.differential_drive import DifferentialDrive
 from fulmar_core.disturbances.world import World
 from fulmar_core.episode import Episode
 from fulmar_core.errors import ConfigError
-from fulmar_core.planar import PlanarState
+from fulmar_core.planar import PlanarState, PlanarWrench
 from fulmar_core.robot import Robot
 from fulmar_core.things import Thing
 from sim_nodes.mujoco_model.car import Car
@@ -108,9 +108,6 @@ def _spec(
         if thing.body is not None:
             add_block(spec, thing.name, thing.body)
     return spec
-
-
-PlanarWrench = tuple[float, float, float]  # force along the world's x and y [N], yaw moment [N·m]
 
 
 class RobotModel(Protocol):

@@ -12,7 +12,7 @@ from fulmar_core.actuators.response import Response
 from fulmar_core.disturbances.world import World
 from fulmar_core.dynamics.hydrodynamics import GRAVITY
 from fulmar_core.dynamics.rolling import SERVO_S
-from fulmar_core.planar import PlanarState
+from fulmar_core.planar import PlanarState, PlanarWrench
 from fulmar_core.robot import Robot
 from sim_nodes.mujoco_model.scenery import BODY, DARK, FLOOR_BIT, add_hull
 
@@ -178,7 +178,7 @@ class Chassis:
         data.qpos[3:7] = turned
         data.qvel[:6] = start.vx, start.vy, 0.0, 0.0, 0.0, start.yaw_rate
 
-    def push(self, data: mujoco.MjData, outside: tuple[float, float, float]) -> None:
+    def push(self, data: mujoco.MjData, outside: PlanarWrench) -> None:
         """Apply the push of the surroundings."""
         fx, fy, torque = outside
         data.xfrc_applied[self._body] = fx, fy, 0.0, 0.0, 0.0, torque

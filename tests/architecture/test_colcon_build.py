@@ -11,18 +11,8 @@ from pathlib import Path
 
 import pytest
 
-PACKAGES = [
-    "fulmar_bags",
-    "fulmar_benchmarks",
-    "fulmar_bringup",
-    "fulmar_cli",
-    "fulmar_core",
-    "fulmar_evaluation",
-    "fulmar_ros",
-    "hardware_drivers",
-    "policy_server",
-    "sim_nodes",
-]
+from tests.architecture.conftest import PACKAGES
+
 PROGRAMS = {
     "fulmar_cli/fulmar": "fulmar_cli.main",
     "fulmar_ros/estimator_node": "fulmar_ros.estimator_node",

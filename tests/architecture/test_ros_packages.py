@@ -15,29 +15,10 @@ import grimp
 import pytest
 from catkin_pkg.package import parse_package
 
-PACKAGES = [
-    "fulmar_bags",
-    "fulmar_benchmarks",
-    "fulmar_bringup",
-    "fulmar_cli",
-    "fulmar_core",
-    "fulmar_evaluation",
-    "fulmar_ros",
-    "hardware_drivers",
-    "policy_server",
-    "sim_nodes",
-]
-MESSAGES = {
-    "diagnostic_msgs",
-    "geometry_msgs",
-    "lifecycle_msgs",
-    "nav_msgs",
-    "rosgraph_msgs",
-    "sensor_msgs",
-    "std_msgs",
-    "std_srvs",
-    "visualization_msgs",
-}
+from fulmar_cli.extras import EXTRAS
+from tests.architecture.conftest import PACKAGES
+
+ROS = set(EXTRAS["ros"])  # rclpy and the packages of messages
 
 
 @pytest.fixture(scope="module")
@@ -88,7 +69,7 @@ def test_every_package_declares_what_it_imports(packages, imports, name):
         for module in modules
         for target in imports.find_modules_directly_imported_by(module)
     }
-    assert imported & (set(PACKAGES) | MESSAGES | {"rclpy"}) - {name} <= declared
+    assert imported & (set(PACKAGES) | ROS) - {name} <= declared
 
 
 @pytest.mark.parametrize("name", PACKAGES)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-SPOKEN = {
+DISPLAY_NAMES = {
     "floating_platform": "floating platform",
     "kingfisher": "Kingfisher",
     "turtlebot2": "Turtlebot2",
@@ -19,9 +19,9 @@ MARKS = {GOOD: " ✓", BAD: " ✗", "": ""}  # behind a cell of that tone
 NOTHING = "–"
 
 
-def spoken(name: str) -> str:
-    """A name for people."""
-    return SPOKEN.get(name, name.replace("_", " "))
+def display_name(name: str) -> str:
+    """Name of a robot or task in tables and reports."""
+    return DISPLAY_NAMES.get(name, name.replace("_", " "))
 
 
 @dataclass(frozen=True)

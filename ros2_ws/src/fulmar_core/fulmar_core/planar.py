@@ -16,6 +16,8 @@ from fulmar_core.arrays import array_namespace
 from fulmar_core.rotation import Array, from_yaw
 from fulmar_core.state import RigidBodyState
 
+PlanarWrench = tuple[float, float, float]  # force along the world's x and y [N], yaw moment [N·m]
+
 
 @dataclass(frozen=True, slots=True)
 class PlanarState:

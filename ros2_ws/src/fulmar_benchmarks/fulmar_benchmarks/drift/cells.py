@@ -8,7 +8,7 @@ from typing import Any
 from fulmar_benchmarks.cells import BAD, GOOD, NOTHING
 from fulmar_benchmarks.drift.targets import DIGITS, FIGURES
 
-NAMES = {"policy": "policy", "lqr": "LQR", "lqr_drift": "LQR of DRIFT", "mpc": "MPC"}
+DISPLAY_NAMES = {"policy": "policy", "lqr": "LQR", "lqr_drift": "LQR of DRIFT", "mpc": "MPC"}
 UNITS = {**{name: "%" for name in FIGURES if name[1] == "T"}, "ALV": "m/s", "AAV": "rad/s", "AAS": ""}
 
 
@@ -33,9 +33,9 @@ class Line:
     kind: str = "ours"
 
 
-def spoken(controller: str) -> str:
-    """A controller for people."""
-    return NAMES.get(controller, controller.replace("_", " "))
+def display_name(controller: str) -> str:
+    """Name of a controller in tables and reports."""
+    return DISPLAY_NAMES.get(controller, controller.replace("_", " "))
 
 
 def pose_lines(document: dict[str, Any]) -> list[Line]:
@@ -50,7 +50,7 @@ def pose_lines(document: dict[str, Any]) -> list[Line]:
             ours = tuple(
                 _ours(entry, figure, tones.get((name, controller, figure), "")) for figure in FIGURES
             )
-            lines.append(Line(name, title, spoken(controller), ours))
+            lines.append(Line(name, title, display_name(controller), ours))
             title = ""
             if entry.get("where_feasible") and share < 1.0:
                 where = entry["where_feasible"]["figures"]
@@ -84,7 +84,7 @@ def path_lines(document: dict[str, Any]) -> list[Line]:
                 Cell(_mean(entry, "path_error_most", 3)),
                 Cell(_mean(entry, "AAS", 2)),
             )
-            lines.append(Line(name, title, spoken(controller), cells))
+            lines.append(Line(name, title, display_name(controller), cells))
             title = ""
         published = row["published"]
         text = f"{published['velocity_error']:.2f} ± {published['velocity_error_std']:.2f}"
@@ -113,7 +113,8 @@ def unmet(document: dict[str, Any]) -> list[str]:
         title = document["rows"][check["row"]]["title"]
         figure = check["figure"].replace("_", " ")
         sentences.append(
-            f"{title}, {spoken(check['controller'])}: {figure} {found}, required {sign} {check['limit']:.{digits}f}"
+            f"{title}, {display_name(check['controller'])}: {figure} {found}, "
+            f"required {sign} {check['limit']:.{digits}f}"
         )
     return sentences
 
@@ -121,7 +122,7 @@ def unmet(document: dict[str, Any]) -> list[str]:
 def missing(document: dict[str, Any]) -> list[str]:
     """Who did not drive, and why; each reason once."""
     found = {
-        f"{spoken(controller)}: {entry['status']}: {entry['reason']}": None
+        f"{display_name(controller)}: {entry['status']}: {entry['reason']}": None
         for row in document["rows"].values()
         for controller, entry in row["controllers"].items()
         if entry["status"] != "judged"

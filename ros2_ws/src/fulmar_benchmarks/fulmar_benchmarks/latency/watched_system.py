@@ -27,7 +27,7 @@ from policy_server.controllers import policies_directory
 ROBOT, TASK = "floating_platform", "go_to_pose"
 STEP_HZ = 50.0  # of the robot's own time: the plant's ticks, and a command for each
 NODES = ("plant", "controller", "recorder")
-SAID_S = 1.5  # until a plant has spoken of what has just been
+REPORT_S = 1.5  # until a plant has reported what just happened
 
 
 class WatchedSystem:
@@ -54,7 +54,7 @@ class WatchedSystem:
     def end_commands(self) -> None:
         """Stop the controller, and let the plant say what came of its commands."""
         self._group.stop("controller")
-        time.sleep(SAID_S)
+        time.sleep(REPORT_S)
 
     def cpu_s(self) -> dict[str, float]:
         """Processor time that each node has used so far [s]."""

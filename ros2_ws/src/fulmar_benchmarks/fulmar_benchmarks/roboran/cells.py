@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from fulmar_benchmarks.cells import BAD, GOOD, NOTHING, Cell, spoken
+from fulmar_benchmarks.cells import BAD, GOOD, NOTHING, Cell, display_name
 
 LAWS = {"lqr": "LQR", "polar": "polar law", "line_of_sight": "line of sight", "pure_pursuit": "pure pursuit"}
 WAYS = {"batch": "batch", "mujoco": "MuJoCo", "ros": "ROS"}
@@ -75,7 +75,7 @@ QUANTITIES = {
 
 def head(entry: dict[str, Any]) -> str:
     """Title of a pair's column."""
-    name = spoken(entry["robot"])
+    name = display_name(entry["robot"])
     if entry["kind"] == "policy":
         return name
     return f"{name}, {entry['kind'] if entry['law'] is None else LAWS.get(entry['law'], 'classical')}"
@@ -177,7 +177,9 @@ def print_tables(document: dict[str, Any], output: Console) -> None:
             wide.print(_table(task, shown))
         for entry in entries:
             if missing(entry):
-                wide.print(f"{spoken(task)}, {missing(entry)}", markup=False, style="yellow", soft_wrap=True)
+                wide.print(
+                    f"{display_name(task)}, {missing(entry)}", markup=False, style="yellow", soft_wrap=True
+                )
     for line in notes(document):
         wide.print(line, markup=False, soft_wrap=True)
     wide.print(conclusion(document), markup=False, soft_wrap=True)
@@ -206,7 +208,7 @@ def notes(document: dict[str, Any]) -> list[str]:
         for way in entry["ways"].values():
             if "bound" in way:
                 seconds = f"1,000 steps are {way['thousand_steps_s']:g} s"
-                seen[spoken(entry["robot"])] = f"{way['bound']}; {seconds} at {way['control_hz']:g} Hz"
+                seen[display_name(entry["robot"])] = f"{way['bound']}; {seconds} at {way['control_hz']:g} Hz"
     lines += [f"bound for {robot}: {rule}." for robot, rule in seen.items()]
     compared = [entry for entry in document["pairs"] if entry["same_at_64_worlds"] is not None]
     if compared:
@@ -218,7 +220,7 @@ def notes(document: dict[str, Any]) -> list[str]:
 
 
 def _table(task: str, entries: list[dict[str, Any]]) -> Table:
-    table = Table(title=spoken(task), title_justify="left")
+    table = Table(title=display_name(task), title_justify="left")
     table.add_column("")
     for entry in entries:
         table.add_column(head(entry), justify="right")

@@ -62,7 +62,7 @@ def roboran(
 
     fulmar benchmark roboran --robots turtlebot2 --tasks go_to_pose --controllers policy,classical
     """
-    from fulmar_benchmarks.cells import spoken
+    from fulmar_benchmarks.cells import display_name
     from fulmar_benchmarks.pairs import KINDS
     from fulmar_benchmarks.roboran.campaign import EPISODES, Request, run_benchmark
     from fulmar_benchmarks.roboran.cells import print_tables
@@ -87,7 +87,7 @@ def roboran(
 
     def name_of(unit: Unit) -> str:
         plan = unit.trial.plan
-        return f"{spoken(plan.robot)}, {spoken(plan.task).lower()}, {plan.controller}, {unit.trial.through}"
+        return f"{display_name(plan.robot)}, {display_name(plan.task).lower()}, {plan.controller}, {unit.trial.through}"
 
     if report:
         from fulmar_benchmarks.roboran.report import write_report

@@ -13,7 +13,7 @@ from fulmar_evaluation.report.style import colours
 from fulmar_evaluation.run_evaluation import RunResult, evaluate_run
 from fulmar_evaluation.run_summary import latencies_ms, summarise
 
-SPOKEN = {
+DISPLAY_NAMES = {
     "lqr": "LQR",
     "mpc": "MPC",
     "lqr_drift": "DRIFT's LQR",
@@ -51,7 +51,7 @@ def views(records: Sequence[RunRecord]) -> list[View]:
         FulmarError: A record names no task or goal.
     """
     controllers = [str(record.info.get("controller", "unknown")) for record in records]
-    labels = [SPOKEN.get(name, name) for name in controllers]
+    labels = [DISPLAY_NAMES.get(name, name) for name in controllers]
     if len(set(labels)) < len(labels):  # the bag's name separates runs of one controller
         labels = [f"{label} ({record.path.name})" for label, record in zip(labels, records, strict=True)]
     return [

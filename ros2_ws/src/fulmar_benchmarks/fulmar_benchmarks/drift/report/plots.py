@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from fulmar_benchmarks.drift.campaign import CampaignResult
-from fulmar_benchmarks.drift.cells import spoken
+from fulmar_benchmarks.drift.cells import display_name
 from fulmar_benchmarks.results import PairResult
 from fulmar_evaluation.report.drawing import (
     ANGLES,
@@ -52,7 +52,11 @@ def views(result: CampaignResult, kind: str) -> dict[str, list[View]]:
     found = {
         name: [
             View(
-                name, row["title"], spoken(controller), colour[controller], result.outcomes[name, controller]
+                name,
+                row["title"],
+                display_name(controller),
+                colour[controller],
+                result.outcomes[name, controller],
             )
             for controller in document["controllers"]
             if (name, controller) in result.outcomes
@@ -176,7 +180,7 @@ def _mark(axes: Axes, y: float, entry: dict[str, Any], figure: str, colour: str,
 
 def _key(names: list[str], shade: list[str]) -> list[Line2D]:
     lines = [
-        Line2D([], [], color=colour, marker="o", linestyle="", label=spoken(name))
+        Line2D([], [], color=colour, marker="o", linestyle="", label=display_name(name))
         for name, colour in zip(names, shade, strict=True)
     ]
     return [

@@ -14,11 +14,11 @@ from fulmar_benchmarks.drift.cells import (
     PATH_HEADS,
     Cell,
     Line,
+    display_name,
     missing,
     path_lines,
     pose_heads,
     pose_lines,
-    spoken,
     unmet,
 )
 from fulmar_benchmarks.drift.report.path_plots import draw_paths, draw_starts
@@ -49,7 +49,7 @@ def write_report(result: CampaignResult, out: Path) -> Path:
 
 def _parts(result: CampaignResult) -> list[Part]:
     document = result.document
-    who = " and ".join(spoken(name) for name in document["controllers"])
+    who = " and ".join(display_name(name) for name in document["controllers"])
     poses, paths = pose_lines(document), path_lines(document)
     parts: list[Part] = [
         *faint(f"{who} on the floating platform, thesis chapter 3, Tables 3.5 and 3.6"),

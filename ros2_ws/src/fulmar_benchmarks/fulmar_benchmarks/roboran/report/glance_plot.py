@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
-from fulmar_benchmarks.cells import spoken
+from fulmar_benchmarks.cells import display_name
 from fulmar_benchmarks.roboran.cells import head
 from fulmar_benchmarks.roboran.report.view import ROBOT_COLOURS
 from fulmar_evaluation.report.drawing import WIDTH, key, ring
@@ -38,7 +38,7 @@ def draw_glance(document: dict[str, Any]) -> Figure:
     at, ticks, labels = 0.0, [], []
     for task, entries in groups:
         share = entries[0]["judged_figure"] == "share_of_bound"
-        title = spoken(task) + (", share of the bound" if share else ", success")
+        title = display_name(task) + (", share of the bound" if share else ", success")
         _write(axes, at, title, fontweight="bold")
         for entry in entries:
             at += 1.0

@@ -9,7 +9,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from fulmar_benchmarks.cells import MARKS, spoken
+from fulmar_benchmarks.cells import MARKS, display_name
 from fulmar_benchmarks.roboran.campaign import CampaignResult
 from fulmar_benchmarks.roboran.cells import conclusion, head, missing, notes, rows
 from fulmar_benchmarks.roboran.report.glance_plot import draw_glance
@@ -45,7 +45,7 @@ def write_report(result: CampaignResult, out: Path) -> Path:
 def _parts(result: CampaignResult) -> list[Part]:
     document = result.document
     tasks = dict.fromkeys(entry["task"] for entry in document["pairs"])
-    robots = ", ".join(spoken(robot) for robot in dict.fromkeys(e["robot"] for e in document["pairs"]))
+    robots = ", ".join(display_name(robot) for robot in dict.fromkeys(e["robot"] for e in document["pairs"]))
     caption = """
     The further right, the better. A filled dot is our success in the core's batch, a diamond the same in MuJoCo,
     where nothing was trained; both should lie right of the upright stroke, which is what is required. The grey ring
@@ -56,12 +56,12 @@ def _parts(result: CampaignResult) -> list[Part]:
             f"{robots}: learned and classical controllers on the tasks of the El-Hariry thesis, chapter 4"
         ),
         headline(conclusion(document)),
-        "<nav>" + "".join(f'<a href="#{task}">{escape(spoken(task))}</a>' for task in tasks) + "</nav>",
+        "<nav>" + "".join(f'<a href="#{task}">{escape(display_name(task))}</a>' for task in tasks) + "</nav>",
         Plot("At a glance", caption, draw_glance(document), "at_a_glance"),
         *faint(*notes(document)),
     ]
     for task in tasks:
-        parts.append(f'<h2 id="{task}">{escape(spoken(task))}</h2>')
+        parts.append(f'<h2 id="{task}">{escape(display_name(task))}</h2>')
         parts += _table(task, [entry for entry in document["pairs"] if entry["task"] == task])
         parts += _plots(result, task)
     return [
