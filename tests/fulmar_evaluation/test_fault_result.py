@@ -19,28 +19,28 @@ from fulmar_core.topics import ODOMETRY
 from fulmar_evaluation.faults.fault import stopped
 from fulmar_evaluation.faults.fault_environment import USUAL, request_of
 from fulmar_evaluation.faults.live_system import LiveSystem
-from fulmar_evaluation.faults.observer import Statement, bag_evidence, first_complaint
+from fulmar_evaluation.faults.observer import HealthStatus, bag_evidence, first_problem
 
 BAG = Path(__file__).parents[1] / "replay/bags/floating_platform_go_to_pose_lqr"
 FAULT_S = 100.0
 
 
-def word(received_s: float, text: str, who: str = "plant") -> Statement:
-    return Statement(received_s, who, "ok" if text == "running" else "error", text, {})
+def word(received_s: float, text: str, who: str = "plant") -> HealthStatus:
+    return HealthStatus(received_s, who, "ok" if text == "running" else "error", text, {})
 
 
 def test_what_was_wrong_before_a_fault_is_not_noticed_by_it_whatever_its_figures():
     standing = [word(99.5, "3 commands refused"), word(100.5, "4 commands refused")]
-    assert first_complaint(standing, FAULT_S) is None
-    found = first_complaint([*standing, word(100.6, "no command for 400 ms")], FAULT_S)
+    assert first_problem(standing, FAULT_S) is None
+    found = first_problem([*standing, word(100.6, "no command for 400 ms")], FAULT_S)
     assert found is not None
     assert found.text == "no command for 400 ms"
 
 
 def test_the_same_words_of_another_node_or_after_good_ones_are_new():
-    assert first_complaint([word(99.5, "stale", "estimator"), word(100.5, "stale")], FAULT_S) is not None
+    assert first_problem([word(99.5, "stale", "estimator"), word(100.5, "stale")], FAULT_S) is not None
     again = [word(99.0, "stale"), word(99.5, "running"), word(100.5, "stale")]
-    assert first_complaint(again, FAULT_S) is not None
+    assert first_problem(again, FAULT_S) is not None
 
 
 @pytest.mark.parametrize("robot", ["floating_platform", "turtlebot2", "kingfisher"])
@@ -51,7 +51,7 @@ def test_whether_a_robot_stopped_in_time_can_be_reported_in_json(robot: str, lat
     at_s = since_s + live.silenced_s + late_s
     live.observer = MagicMock(
         applied_since=lambda _: [(at_s - 0.02, True), (at_s, False)],
-        complaint_since=lambda _: word(at_s, "no command"),
+        problem_since=lambda _: word(at_s, "no command"),
     )
     reported = json.loads(json.dumps(asdict(stopped(live, since_s, live.silenced_s))))
     assert reported["passed"] is (late_s < 0.0)

@@ -30,7 +30,7 @@ from fulmar_core.topics import (
 )
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 
-Answer = tuple[bool, str]  # whether it was done, and what was said
+Answer = tuple[bool, str]  # whether it was done, and the answer of the service
 SAY_S = 0.05  # between two messages
 STAY_S = 1.0  # at least so long, for robots that are found after the first
 MISS_S = 3.0  # for a robot whose e-stop node is not found, or whose topic has no subscriber
@@ -108,8 +108,8 @@ class _Robot:
         """The result."""
         if self._asked is None or not self._asked[1].done():
             return Stopped(self._space, self._reached, None)
-        said = self._asked[1].result()
-        return Stopped(self._space, self._reached, (said.success, said.message))
+        response = self._asked[1].result()
+        return Stopped(self._space, self._reached, (response.success, response.message))
 
 
 def spaces_with(node: Node, service: str) -> set[str]:

@@ -100,8 +100,11 @@ class Operator:
             if answered or time.monotonic() > until:
                 break
             time.sleep(ASK_S)
-        said = {name: future.result() for name, future in futures.items() if future.done()}
-        return {name: (said[name].success, said[name].message) if name in said else None for name in clients}
+        answers = {name: future.result() for name, future in futures.items() if future.done()}
+        return {
+            name: (answers[name].success, answers[name].message) if name in answers else None
+            for name in clients
+        }
 
     def stop_all(self, robot: str | None) -> list[Stopped]:
         """Stop every robot, or one; see `stop_robots`."""
@@ -111,9 +114,9 @@ class Operator:
         """Reset the e-stop of every robot, or of one, by namespace; see `robots_to_reset`."""
         with_node, without = robots_to_reset(self._node, robot, find_s=FIND_S)
         services = {space: f"{space}/{ESTOP_RESET}" for space in sorted(with_node)}
-        said = self.ask_all(list(services.values()))
+        answers = self.ask_all(list(services.values()))
         came = {
-            space: said[name] or (False, "its e-stop node does not answer")
+            space: answers[name] or (False, "its e-stop node does not answer")
             for space, name in services.items()
         }
         return came | {space: release_without_node(self._node, space) for space in sorted(without)}
@@ -163,10 +166,10 @@ class Operator:
             time.sleep(LOOK_S)
         before, until, asked_s = status.get("swap_requests"), time.monotonic() + answer_s, 0.0
         while True:
-            said, now_s = status.get("swap", ""), time.monotonic()
-            taken = status.get("swap_requests") != before and folder in said
-            if taken and said.startswith(("done", "refused")):
-                return said
+            swap, now_s = status.get("swap", ""), time.monotonic()
+            taken = status.get("swap_requests") != before and folder in swap
+            if taken and swap.startswith(("done", "refused")):
+                return swap
             if now_s > until:
                 raise RunFailed(f"the controller of '{robot}' did not answer within {answer_s:g} s.")
             if not taken and now_s - asked_s > ASK_AGAIN_S:

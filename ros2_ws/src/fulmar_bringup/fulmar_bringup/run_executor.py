@@ -182,10 +182,10 @@ def _wait_for_end(
     limit_s = 30.0 + 1.5 * plan.duration_s / plan.rate + (plan.duration_s if plan.lockstep else 0.0)
 
     def failed() -> bool:
-        said = overseer.plant.message
-        held = said.startswith(HOLDS) and not end_on_estop
+        message = overseer.plant.message
+        held = message.startswith(HOLDS) and not end_on_estop
         # Before the controller acts, a late command changes nothing; one that hangs or dies is noticed all the same.
-        waits = said.startswith(NO_COMMAND) and overseer.controller.values.get("mode") == "armed"
+        waits = message.startswith(NO_COMMAND) and overseer.controller.values.get("mode") == "armed"
         return overseer.plant.level == "error" and not (held or waits)
 
     def running() -> None:

@@ -71,7 +71,7 @@ def _row(cell: Cell, seconds: float, folder: Path) -> dict[str, Any]:
             began_s, before = time.monotonic(), system.cpu_s()
             system.wait(seconds + REPORT_S)
             took_s, after = time.monotonic() - began_s, system.cpu_s()
-            plant, controller = system.said()
+            plant, controller = system.reports()
     except RunFailed as error:
         return {"failure": str(error)}
     return {
@@ -87,8 +87,8 @@ def _row(cell: Cell, seconds: float, folder: Path) -> dict[str, Any]:
     }
 
 
-def _spread(said: Any, name: str) -> dict[str, float | None]:
-    texts = {key: said.get(f"{name}_{key}", "") for key in ("p50", "p99", "max")}
+def _spread(report: Any, name: str) -> dict[str, float | None]:
+    texts = {key: report.get(f"{name}_{key}", "") for key in ("p50", "p99", "max")}
     return {key: float(text) if text else None for key, text in texts.items()}
 
 

@@ -65,8 +65,8 @@ class WatchedSystem:
         """Memory that each node occupies."""
         return {name: process.memory_info().rss for name, process in self._processes.items()}
 
-    def said(self) -> tuple[Mapping[str, str], Mapping[str, str]]:
-        """What plant and controller said last."""
+    def reports(self) -> tuple[Mapping[str, str], Mapping[str, str]]:
+        """Last health figures of plant and controller."""
         return dict(self._overseer.plant.values), dict(self._overseer.controller.values)
 
 

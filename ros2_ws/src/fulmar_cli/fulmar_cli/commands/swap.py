@@ -37,11 +37,11 @@ def swap(
         checked_name(robot)
     with operator() as person:
         sent = str(folder.absolute())
-        said = person.say_swap(robot, sent, find_s=FIND_S, answer_s=LOAD_S)
-    done = said.startswith("done")
+        answer = person.say_swap(robot, sent, find_s=FIND_S, answer_s=LOAD_S)
+    done = answer.startswith("done")
     if as_json:
-        print_json({"robot": robot, "policy": sent, "done": done, "said": said})
+        print_json({"robot": robot, "policy": sent, "done": done, "said": answer})
     else:
-        write_line(said)
+        write_line(answer)
     if not done:
         raise typer.Exit(FAILED)

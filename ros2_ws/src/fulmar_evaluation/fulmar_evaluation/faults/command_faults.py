@@ -111,8 +111,8 @@ def cable_lossy(live: LiveSystem) -> Outcome:
     since_s = live.until_it_moves()
     live.hosts.cable.quality = LOSSY
     time.sleep(DRIVES_S)
-    said = f"driven for {DRIVES_S:g} s without a pause"
-    return went_on(live, since_s, detected_by="", reaction=said, correct=True)
+    reaction = f"driven for {DRIVES_S:g} s without a pause"
+    return went_on(live, since_s, detected_by="", reaction=reaction, correct=True)
 
 
 def _without_two_hosts(_robot: Robot) -> str:

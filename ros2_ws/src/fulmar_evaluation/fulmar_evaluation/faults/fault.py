@@ -66,10 +66,10 @@ def stopped(live: LiveSystem, since_s: float, limit_s: float) -> Outcome:
         raise NothingShown("nothing moved when the fault was done, so it shows nothing")
     safe = [received_s for received_s, moves in applied if not moves and received_s > unsafe[-1]]
     time_s = safe[0] - since_s if safe else None
-    wait_for(lambda: observer.complaint_since(since_s) is not None, WORDS_S)
-    word = observer.complaint_since(since_s)
-    passed = time_s is not None and time_s <= limit_s and word is not None
-    return Outcome(word.who if word else "", word.text if word else "", passed, time_s, limit_s)
+    wait_for(lambda: observer.problem_since(since_s) is not None, WORDS_S)
+    status = observer.problem_since(since_s)
+    passed = time_s is not None and time_s <= limit_s and status is not None
+    return Outcome(status.who if status else "", status.text if status else "", passed, time_s, limit_s)
 
 
 def went_on(
@@ -91,8 +91,8 @@ def went_on(
         correct: Whether that is what had to be said.
         recorder_away: As of `Outcome`.
     """
-    words = live.observer.statements_since(since_s - WORDS_S)  # with one from before, to compare with
-    trips = {word.values.get("watchdog_trips", "") for word in words if word.who == "plant"}
+    statuses = live.observer.statuses_since(since_s - WORDS_S)  # with one from before, to compare with
+    trips = {status.values.get("watchdog_trips", "") for status in statuses if status.who == "plant"}
     moved = any(moves for _, moves in live.observer.applied_since(since_s))
     wrong = [] if moved else ["the robot stood still"]
     wrong += (

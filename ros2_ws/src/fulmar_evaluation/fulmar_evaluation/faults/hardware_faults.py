@@ -48,19 +48,21 @@ def bearing_late(live: LiveSystem) -> Outcome:
     off_s = next((received_s for received_s, on in air if not on), None)
     on_s = next((received_s for received_s, on in air if on), math.inf)
     first_s = next((received_s for received_s, moves in observer.applied_since(0.0) if moves), math.inf)
-    said = next((word for word in observer.statements_since(0.0) if word.text == BEARING_OFF), None)
-    if not moved or off_s is None or said is None:
+    closed = next((status for status in observer.statuses_since(0.0) if status.text == BEARING_OFF), None)
+    if not moved or off_s is None or closed is None:
         return Outcome(
-            "", "no valve opened" if not moved else "nothing said that the air bearing is off", False
+            "", "no valve opened" if not moved else "no node reported that the air bearing is off", False
         )
     if first_s < on_s - APART_S:
-        return Outcome(said.who, f"valves opened {on_s - first_s:.2f} s before the air bearing was on", False)
+        return Outcome(
+            closed.who, f"valves opened {on_s - first_s:.2f} s before the air bearing was on", False
+        )
     reached = wait_for(lambda: distance[0] < REACHED_M, WAY_S)
     words = (
-        f"{said.text} for {on_s - off_s:.1f} s, and no valve opens; then the goal is "
+        f"{closed.text} for {on_s - off_s:.1f} s, and no valve opens; then the goal is "
         f"{'reached' if reached else f'missed by {distance[0]:.2f} m'}"
     )
-    return Outcome(said.who, words, passed=reached)
+    return Outcome(closed.who, words, passed=reached)
 
 
 def _without_bearing(robot: Robot) -> str:

@@ -136,8 +136,8 @@ def _jump(live: LiveSystem, by_ns: int) -> Outcome:
     goes_on = mode == "active" and any(
         moved for _, moved in live.observer.applied_since(since_s + EPOCH_S / 2.0)
     )
-    said = f"epoch {epoch} begins; {'goes on' if goes_on else mode}"
-    return Outcome("controller" if reported else "", said, reported and goes_on)
+    reaction = f"epoch {epoch} begins; {'goes on' if goes_on else mode}"
+    return Outcome("controller" if reported else "", reaction, reported and goes_on)
 
 
 def _until_mid_way(live: LiveSystem) -> float:
@@ -156,8 +156,8 @@ def _stamped(by_ns: int) -> Injection:
 
 def _epoch(live: LiveSystem, since_s: float) -> tuple[str, str]:
     """The epoch that the controller has reported since then, and what it was doing in it."""
-    words = [word for word in live.observer.statements_since(since_s) if "epoch" in word.values]
-    return (words[-1].values["epoch"], words[-1].values["mode"]) if words else ("", "silent")
+    statuses = [status for status in live.observer.statuses_since(since_s) if "epoch" in status.values]
+    return (statuses[-1].values["epoch"], statuses[-1].values["mode"]) if statuses else ("", "silent")
 
 
 INPUT_FAULTS = (

@@ -28,8 +28,8 @@ NUMBER = re.compile(r"\d+(\.\d+)?")
 
 
 @dataclass(frozen=True)
-class Statement:
-    """Something that a node said of itself."""
+class HealthStatus:
+    """Health that a node published."""
 
     received_s: float  # monotonic clock [s]
     who: str  # plant, controller, estimator, estop
@@ -38,21 +38,21 @@ class Statement:
     values: dict[str, str]
 
     @property
-    def complaint(self) -> tuple[str, str] | None:
-        """Who says that what is wrong, whatever its figures; None if nothing is."""
+    def problem(self) -> tuple[str, str] | None:
+        """The node and its problem, without figures; None where it reports no problem."""
         return None if self.level == "ok" else (self.who, NUMBER.sub("#", self.text))
 
 
 class RunObserver:
-    """Listens, from a node that spins in a thread of its own."""
+    """Records applied commands and health, in a node that spins in a thread of its own."""
 
     def __init__(self, node: Node, robot: Robot, wire: Wire = ACTUATORS_STATE) -> None:
-        """Subscribe to what actuators do, on a wire, and to the health of every node."""
+        """Subscribe to the applied command, on a wire, and to the health of every node."""
         self.wire = wire
         self._safe = robot.actuators.safe_command
         self._lock = threading.Lock()
         self._applied: list[tuple[float, int, bool]] = []  # received [s], stamp [ns], whether it moves
-        self._words: list[Statement] = []
+        self._statuses: list[HealthStatus] = []
         listen = node.create_subscription
         listen(JointState, wire.name, self._on_applied, subscriber_qos(wire, reliable=True, depth=DEPTH))
         for health in (DIAGNOSTICS, STATUS):
@@ -71,8 +71,8 @@ class RunObserver:
             for status in message.status:
                 values = {pair.key: pair.value for pair in status.values}
                 who = status.name.partition(": ")[2]
-                self._words.append(
-                    Statement(now_s, who, levels.get(status.level, "error"), status.message, values)
+                self._statuses.append(
+                    HealthStatus(now_s, who, levels.get(status.level, "error"), status.message, values)
                 )
 
     def moves(self) -> bool:
@@ -91,21 +91,21 @@ class RunObserver:
             times = np.array([received_s for received_s, _, _ in self._applied], dtype=float)
             return times, np.array([stamp for _, stamp, _ in self._applied], dtype=np.int64)
 
-    def statements_since(self, since_s: float) -> list[Statement]:
-        """What was said from then on."""
+    def statuses_since(self, since_s: float) -> list[HealthStatus]:
+        """Health received since a time."""
         with self._lock:
-            return [word for word in self._words if word.received_s >= since_s]
+            return [status for status in self._statuses if status.received_s >= since_s]
 
-    def complaint_since(self, since_s: float) -> Statement | None:
-        """The first thing that a node said from then on which was wrong, and not its last word before."""
-        return first_complaint(self.statements_since(0.0), since_s)
+    def problem_since(self, since_s: float) -> HealthStatus | None:
+        """The first new problem since a time; see `first_problem`."""
+        return first_problem(self.statuses_since(0.0), since_s)
 
 
-def first_complaint(words: list[Statement], since_s: float) -> Statement | None:
-    """The first thing that is wrong from a time on, and was not some node's last word before it."""
-    standing = {word.who: word.complaint for word in words if word.received_s < since_s}.values()
-    new = (word for word in words if word.received_s >= since_s and word.complaint is not None)
-    return next((word for word in new if word.complaint not in standing), None)
+def first_problem(statuses: list[HealthStatus], since_s: float) -> HealthStatus | None:
+    """The first problem since a time, without those that stood already."""
+    standing = {status.who: status.problem for status in statuses if status.received_s < since_s}.values()
+    new = (status for status in statuses if status.received_s >= since_s and status.problem is not None)
+    return next((status for status in new if status.problem not in standing), None)
 
 
 def wait_for(condition: Callable[[], bool], timeout_s: float) -> bool:

@@ -69,8 +69,8 @@ def _hand(live: LiveSystem, number: signal.Signals) -> Outcome:
 
 
 def _commanded_by(live: LiveSystem) -> str:
-    words = [word for word in live.observer.statements_since(0.0) if word.who == "plant"]
-    return words[-1].values.get("commanded_by", "") if words else ""
+    statuses = [status for status in live.observer.statuses_since(0.0) if status.who == "plant"]
+    return statuses[-1].values.get("commanded_by", "") if statuses else ""
 
 
 @contextmanager

@@ -71,9 +71,9 @@ def bundle_refused(live: LiveSystem) -> Outcome:
         time.sleep(STAYS_S)
         applied = live.observer.applied_since(began_s)
         stands = bool(applied) and not any(moves for _, moves in applied)
-        said = live.group.last_words("controller").replace(live.plan.policy, "the bundle")
+        reaction = live.group.last_words("controller").replace(live.plan.policy, "the bundle")
         who = "controller" if ended else ""
-        return Outcome(who, said, ended and stands, 0.0 if stands else None, limit_s=0.0)
+        return Outcome(who, reaction, ended and stands, 0.0 if stands else None, limit_s=0.0)
     return Outcome("", "the controller took the bundle", False)
 
 
@@ -81,10 +81,12 @@ def bundle_refused_with_fallback(live: LiveSystem) -> Outcome:
     """The bundle is damaged and a classical controller stands in for it: it drives, and says why."""
     since_s = live.until_it_moves()
     time.sleep(STAYS_S)
-    words = [word for word in live.observer.statements_since(since_s) if word.who == "controller"]
-    why = words[-1].values.get("fell_back", "") if words else ""
-    said = why.replace(live.plan.policy, "the bundle")
-    return went_on(live, since_s, detected_by="controller" if why else "", reaction=said, correct=bool(why))
+    statuses = [status for status in live.observer.statuses_since(since_s) if status.who == "controller"]
+    why = statuses[-1].values.get("fell_back", "") if statuses else ""
+    reaction = why.replace(live.plan.policy, "the bundle")
+    return went_on(
+        live, since_s, detected_by="controller" if why else "", reaction=reaction, correct=bool(why)
+    )
 
 
 POLICY_FAULTS = (
@@ -122,19 +124,19 @@ def _offer(live: LiveSystem, folder: Path, *, wanted: str) -> Outcome:
         since_s = live.until_it_moves()
         publisher.publish(String(data=str(folder)))
 
-        def said() -> str:
-            answers = [word.values.get("swap", "") for word in live.observer.statements_since(since_s)]
+        def answer() -> str:
+            answers = [status.values.get("swap", "") for status in live.observer.statuses_since(since_s)]
             return next((text for text in reversed(answers) if str(folder) in text), "")
 
-        reported = wait_for(lambda: said().startswith(("done", "refused")), ANSWER_S)
+        reported = wait_for(lambda: answer().startswith(("done", "refused")), ANSWER_S)
         time.sleep(GOES_ON_S)
     finally:
         node.destroy_node()
-    answer = said().replace(str(folder), "the bundle")
+    reaction = answer().replace(str(folder), "the bundle")
     return went_on(
         live,
         since_s,
         detected_by="controller" if reported else "",
-        reaction=answer,
-        correct=answer.startswith(wanted),
+        reaction=reaction,
+        correct=reaction.startswith(wanted),
     )

@@ -16,11 +16,11 @@ from fulmar_core.topics import MOCAP
 from fulmar_evaluation.faults.fault import STAYS_S, WORDS_S, Fault, Outcome, stopped, went_on
 from fulmar_evaluation.faults.fault_environment import FaultEnvironment, lost
 from fulmar_evaluation.faults.live_system import LiveSystem
-from fulmar_evaluation.faults.observer import Statement, wait_for
+from fulmar_evaluation.faults.observer import HealthStatus, wait_for
 
 ESTOP_S = TIMEOUT_NS / 1e9
 PAUSE_S = 2.0
-COMPLAINT_S = 10.0  # a recorder looks at its disk now and then
+PROBLEM_S = 10.0  # a recorder looks at its disk now and then
 
 
 def controller_killed(live: LiveSystem) -> Outcome:
@@ -84,13 +84,13 @@ def _plant(live: LiveSystem, number: signal.Signals) -> Outcome:
     live.send("plant", number)
     limit_s = live.watchdog_s + live.beat_s + live.tick_s
     time.sleep(limit_s + STAYS_S)
-    wait_for(lambda: live.observer.complaint_since(since_s) is not None, WORDS_S)
-    word = live.observer.complaint_since(since_s)
+    wait_for(lambda: live.observer.problem_since(since_s) is not None, WORDS_S)
+    status = live.observer.problem_since(since_s)
     last_s = (
         max((received_s for received_s, _ in live.observer.applied_since(since_s)), default=since_s) - since_s
     )
-    passed = word is not None and last_s <= limit_s
-    return Outcome(word.who if word else "", word.text if word else "", passed, last_s, limit_s)
+    passed = status is not None and last_s <= limit_s
+    return Outcome(status.who if status else "", status.text if status else "", passed, last_s, limit_s)
 
 
 def goals_killed(live: LiveSystem) -> Outcome:
@@ -98,8 +98,8 @@ def goals_killed(live: LiveSystem) -> Outcome:
     since_s = live.until_it_moves()
     live.send("goals", signal.SIGKILL)
     time.sleep(PAUSE_S)
-    who, said = _launcher_on(live, "goals")
-    return went_on(live, since_s, detected_by=who, reaction=said, correct=bool(who))
+    who, reaction = _launcher_on(live, "goals")
+    return went_on(live, since_s, detected_by=who, reaction=reaction, correct=bool(who))
 
 
 def recorder_killed(live: LiveSystem) -> Outcome:
@@ -109,9 +109,9 @@ def recorder_killed(live: LiveSystem) -> Outcome:
     live.send("recorder", signal.SIGKILL)
     away_s = time.monotonic()
     time.sleep(PAUSE_S)
-    who, said = _launcher_on(live, "recorder")
+    who, reaction = _launcher_on(live, "recorder")
     return went_on(
-        live, since_s, detected_by=who, reaction=said, correct=bool(who), recorder_away=(away_s, math.inf)
+        live, since_s, detected_by=who, reaction=reaction, correct=bool(who), recorder_away=(away_s, math.inf)
     )
 
 
@@ -135,15 +135,15 @@ def disk_full(live: LiveSystem) -> Outcome:
     recorder = live.group.process("recorder")
     recorder.rlimit(psutil.RLIMIT_FSIZE, (0, recorder.rlimit(psutil.RLIMIT_FSIZE)[1]))
     away_s = time.monotonic()
-    wait_for(lambda: _complaint(live, since_s) is not None, COMPLAINT_S)
-    word = _complaint(live, since_s)
-    said = f"{word.text}; control goes on" if word else "control goes on"
+    wait_for(lambda: _problem(live, since_s) is not None, PROBLEM_S)
+    status = _problem(live, since_s)
+    reaction = f"{status.text}; control goes on" if status else "control goes on"
     return went_on(
         live,
         since_s,
-        detected_by=word.who if word else "",
-        reaction=said,
-        correct=word is not None,
+        detected_by=status.who if status else "",
+        reaction=reaction,
+        correct=status is not None,
         recorder_away=(away_s, math.inf),
     )
 
@@ -156,9 +156,9 @@ def _launcher_on(live: LiveSystem, name: str) -> tuple[str, str]:
     return "launcher", f"{ended.text}; control goes on"
 
 
-def _complaint(live: LiveSystem, since_s: float) -> Statement | None:
-    words = [word for word in live.observer.statements_since(since_s) if word.who == "recorder"]
-    return next((word for word in words if word.level != "ok"), None)
+def _problem(live: LiveSystem, since_s: float) -> HealthStatus | None:
+    statuses = [status for status in live.observer.statuses_since(since_s) if status.who == "recorder"]
+    return next((status for status in statuses if status.level != "ok"), None)
 
 
 PLAIN: tuple[Callable[[LiveSystem], Outcome], ...] = (
