@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from fulmar_core.planar import PlanarState, rigid_of
+from fulmar_core.planar import PlanarState
 from fulmar_core.rotation import wrap_angle
 from fulmar_core.state import RigidBodyState
 
@@ -58,7 +58,7 @@ class WheelOdometry:
         self._left, self._right, self._gyro, self._time_s = left, right, gyro, time_s
         c, s = math.cos(self._heading), math.sin(self._heading)
         values = (self._x, self._y, self._heading, speed * c, speed * s, yaw_rate)
-        return rigid_of(PlanarState(*(np.asarray(value) for value in values)))
+        return PlanarState(*(np.asarray(value) for value in values)).to_rigid()
 
 
 def _rolled(counts: int) -> int:

@@ -7,7 +7,7 @@ import numpy as np
 from fulmar_core.backend import Sample
 from fulmar_core.episode import Episode
 from fulmar_core.motion import move
-from fulmar_core.planar import PlanarState, rigid_of
+from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
 from fulmar_core.things import Poses, Thing, push_things
 from sim_nodes.one_world import OneWorld
@@ -29,13 +29,13 @@ class MockBackend:
         self._poses: Poses = {
             thing.name: np.array([episode.goal.things[thing.name]], dtype=float) for thing in self._things
         }
-        self._world.reset(episode, rigid_of(self._state[0]), seed=seed, number=number)
+        self._world.reset(episode, self._state[0].to_rigid(), seed=seed, number=number)
         return self._sample()
 
     def step(self, command: np.ndarray, ticks: int = 1) -> Sample:
         """Apply a command; see `Backend.step`."""
         world, before = self._world, self._state
-        world.begin(np.asarray(command, dtype=float), ticks, rigid_of(before[0]))
+        world.begin(np.asarray(command, dtype=float), ticks, before[0].to_rigid())
         self._state = move(
             self.robot,
             before,
@@ -52,7 +52,7 @@ class MockBackend:
     def stand(self, ticks: int = 1) -> Sample:
         """Let time pass for a body that nothing moves; see `CanStand.stand`."""
         zero = np.zeros(1)
-        self._world.begin(np.array(self.robot.actuators.safe_command), ticks, rigid_of(self._state[0]))
+        self._world.begin(np.array(self.robot.actuators.safe_command), ticks, self._state[0].to_rigid())
         self._state = PlanarState(self._state.x, self._state.y, self._state.yaw, zero, zero, zero)
         return self._sample()
 
@@ -63,5 +63,5 @@ class MockBackend:
         """Nothing to release."""
 
     def _sample(self) -> Sample:
-        truth = rigid_of(self._state[0])
+        truth = self._state[0].to_rigid()
         return Sample(truth, None, truth, {name: pose[0] for name, pose in self._poses.items()})

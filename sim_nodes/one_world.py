@@ -12,7 +12,7 @@ from fulmar_core.disturbances.world import FIELDS, World, outside_wrench, push_i
 from fulmar_core.dynamics.free_body import Wrench
 from fulmar_core.episode import Episode
 from fulmar_core.motion import actuation_of
-from fulmar_core.planar import PlanarState, planar_of
+from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import from_yaw, multiply
 from fulmar_core.sensors.odometer import Odometer
@@ -98,7 +98,9 @@ class OneWorld:
 
     def _push(self, truth: RigidBodyState, ticks: int) -> Wrench:
         dt = self._robot.timing.physics_dt
-        return outside_wrench(planar_of(truth)[None], self.world, np.array([self._ticks * dt]), ticks * dt)
+        return outside_wrench(
+            PlanarState.from_rigid(truth)[None], self.world, np.array([self._ticks * dt]), ticks * dt
+        )
 
     def _noise(self) -> np.ndarray | None:
         if not self.world.action_noise[0]:
@@ -121,7 +123,7 @@ class OneWorld:
     def _measure(self, truth: RigidBodyState) -> RigidBodyState:
         if not (self._noisy or self._blurred):
             return truth
-        true = planar_of(truth)
+        true = PlanarState.from_rigid(truth)
         steps = np.array([self._measured])
         self._measured += 1
         batch = self._odometer.measure(true[None], self.world, self._numbers, self._repeats, steps)

@@ -11,7 +11,7 @@ from fulmar_core.controllers.controller import Inputs
 from fulmar_core.goal import Goal, goal_in_float64
 from fulmar_core.health.actuator_estimator import ActuatorEstimate
 from fulmar_core.observation import Observer
-from fulmar_core.planar import COLUMNS, PlanarState
+from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import Task
@@ -38,7 +38,9 @@ def inputs_at(
         estimates: Of an actuator estimator.
         stamp_ns: Of the measurement [ns].
     """
-    one = PlanarState(*(np.atleast_1d(np.asarray(getattr(state, name), dtype=float)) for name in COLUMNS))
+    one = PlanarState(
+        *(np.atleast_1d(np.asarray(getattr(state, name), dtype=float)) for name in PlanarState.COLUMNS)
+    )
     count = len(one.x)
     goals = goal_in_float64(goal if np.ndim(goal.done) else goal[None])
     if len(goals.done) != count:

@@ -6,7 +6,7 @@ import numpy as np
 
 from fulmar_core.disturbances.scenario import Scenario, load_scenario
 from fulmar_core.paths import config_names
-from fulmar_core.planar import COLUMNS
+from fulmar_core.planar import PlanarState
 from fulmar_core.robot import load_robot
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import load_task
@@ -37,4 +37,6 @@ def run(simulation, steps, **kwargs):
 
 
 def differing(one, other):
-    return {name for name in COLUMNS if not np.array_equal(getattr(one, name), getattr(other, name))}
+    return {
+        name for name in PlanarState.COLUMNS if not np.array_equal(getattr(one, name), getattr(other, name))
+    }

@@ -18,7 +18,7 @@ from fulmar_core.controllers.controller import Controller
 from fulmar_core.controllers.lqr import Lqr, LqrWeights
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.goal import Goal, goal_at, goal_in_float64
-from fulmar_core.planar import PlanarState, at_rest, rigid_of
+from fulmar_core.planar import PlanarState, at_rest
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.rotation import from_yaw, rotate_inverse
 from fulmar_core.simulation import BatchSimulation
@@ -104,8 +104,8 @@ def write_run(folder: Path, plan: Plan = Plan()) -> Path:
         if task.goal_topic == "goal_velocity" and simulation.goal.done[0] != given:
             given = float(simulation.goal.done[0])
             bag.goal(task.goal_topic, simulation.goal[0], now_ns)
-        bag.odometry("ground_truth/odom", rigid_of(simulation.truth[0]), time_s, now_ns)
-        bag.odometry("odom", rigid_of(simulation.measured[0]), time_s, now_ns)
+        bag.odometry("ground_truth/odom", simulation.truth[0].to_rigid(), time_s, now_ns)
+        bag.odometry("odom", simulation.measured[0].to_rigid(), time_s, now_ns)
         for name, pose in simulation.things.items():
             bag.thing(name, pose[0], time_s, now_ns)
         if tick % substeps == 0 and not plan.silence_s[0] <= time_s < plan.silence_s[1]:

@@ -18,7 +18,7 @@ from fulmar_core.disturbances.world import FIELDS, World
 from fulmar_core.errors import ConfigError
 from fulmar_core.goal import Goal
 from fulmar_core.learning_step import observed_step
-from fulmar_core.planar import COLUMNS, PlanarState
+from fulmar_core.planar import PlanarState
 from fulmar_core.simulation import BatchSimulation
 
 # Parts beside the mutable state: the command, and the cost of the actuators' effort.
@@ -151,7 +151,7 @@ def _laid_as(tensor: torch.Tensor, like: torch.Tensor) -> torch.Tensor:
 Moving = dict[str, Any]  # as of `MutableState.mutable_state`, with dictionaries in it
 Parts = dict[str, Any]  # the same without; what was in a dictionary has a name of two words
 
-_RECORDS = {PlanarState: COLUMNS, World: FIELDS}
+_RECORDS = {PlanarState: PlanarState.COLUMNS, World: FIELDS}
 _LEAVES_OF = {Goal: Goal.arrays, **{kind: attrgetter(*names) for kind, names in _RECORDS.items()}}
 
 

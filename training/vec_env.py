@@ -17,7 +17,6 @@ from fulmar_core.disturbances.scenario import Scenario
 from fulmar_core.episode import episode_steps
 from fulmar_core.goal import goal_in_float64
 from fulmar_core.observation import shares
-from fulmar_core.planar import in_float64
 from fulmar_core.robot import Robot
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.symmetry import Mirror, Symmetry
@@ -199,7 +198,7 @@ class BatchVecEnv(VecEnv):
         observation, previous = (
             np.asarray(part, dtype=float) for part in (simulation.observe(), simulation.command)
         )
-        state, goal = in_float64(simulation.measured), goal_in_float64(simulation.goal)
+        state, goal = simulation.measured.in_float64(), goal_in_float64(simulation.goal)
         return Inputs(state, goal, observation, previous, None, 0, simulation.control_dt)
 
     def _valves(self, choice: WrenchChoice, shares: np.ndarray) -> np.ndarray:

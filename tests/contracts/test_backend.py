@@ -12,7 +12,7 @@ from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import Episode, draw_episode
 from fulmar_core.goal import goal_at
 from fulmar_core.paths import config_names
-from fulmar_core.planar import PlanarState, planar_of, rigid_of
+from fulmar_core.planar import PlanarState
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 from sim_nodes.mock_backend import MockBackend
@@ -72,7 +72,7 @@ def test_it_speaks_for_its_robot(backend):
 
 def test_a_reset_begins_at_the_given_state(backend):
     episode = episode_of(backend.robot)
-    truth, start = backend.reset(episode, seed=1).truth, rigid_of(episode.start)
+    truth, start = backend.reset(episode, seed=1).truth, episode.start.to_rigid()
     for name in ("position_in_world", "quat_xyzw", "velocity_in_world", "angular_velocity_in_body"):
         # A chassis leans by a thousandth on its casters.
         np.testing.assert_allclose(getattr(truth, name), getattr(start, name), rtol=0, atol=2e-3)
@@ -137,14 +137,14 @@ def test_it_moves_by_commands(backend):
     command = command_of(robot)
     if robot.actuators.kind == "thrusters":
         command = np.array([1.0, 0, 0, 0, 0, 0, 0, 1.0])
-    begun = planar_of(backend.reset(episode_of(robot), seed=1).truth)
-    state = planar_of(backend.step(command, 100).truth)
+    begun = PlanarState.from_rigid(backend.reset(episode_of(robot), seed=1).truth)
+    state = PlanarState.from_rigid(backend.step(command, 100).truth)
     assert np.hypot(state.x - begun.x, state.y - begun.y) > 0.1
 
 
 def test_without_a_command_it_stays(backend):
-    begun = planar_of(backend.reset(episode_of(backend.robot), seed=1).truth)
-    state = planar_of(backend.step(backend.robot.actuators.safe_command, 100).truth)
+    begun = PlanarState.from_rigid(backend.reset(episode_of(backend.robot), seed=1).truth)
+    state = PlanarState.from_rigid(backend.step(backend.robot.actuators.safe_command, 100).truth)
     np.testing.assert_allclose([state.x, state.y, state.yaw], [begun.x, begun.y, begun.yaw], atol=1e-3)
 
 

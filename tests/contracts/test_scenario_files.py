@@ -13,7 +13,7 @@ from fulmar_core.disturbances.world import FIELDS
 from fulmar_core.episode import draw_episodes
 from fulmar_core.metrics import episode_metrics
 from fulmar_core.paths import config_names
-from fulmar_core.planar import COLUMNS
+from fulmar_core.planar import PlanarState
 from fulmar_core.robot import load_robot
 from fulmar_core.rollout import roll_out_in_batch
 from fulmar_core.tasks import load_task
@@ -150,7 +150,7 @@ def test_every_condition_starts_from_the_same_places_3_to_4_m_away_at_rest():
         for name in (*ROWS, *OTHERS)
     ]
     for each in drawn[1:]:
-        for column in COLUMNS:
+        for column in PlanarState.COLUMNS:
             np.testing.assert_array_equal(getattr(each.start, column), getattr(drawn[0].start, column))
         np.testing.assert_array_equal(each.goal.current, drawn[0].goal.current)
     start, goal = drawn[0].start, drawn[0].goal.current

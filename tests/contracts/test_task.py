@@ -15,7 +15,7 @@ from fulmar_core.dynamics.contact import outline_of
 from fulmar_core.goal import Goal
 from fulmar_core.observation import Observer
 from fulmar_core.paths import config_names
-from fulmar_core.planar import COLUMNS, PlanarState
+from fulmar_core.planar import PlanarState
 from fulmar_core.robot import load_robot
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import ShippedTask, load_task
@@ -38,7 +38,7 @@ def on_the_way(task, robot):
     """States and goals as they come along in an episode: some way off the start, with some targets done."""
     start, goal = draw(task, robot)
     rng = np.random.default_rng(3)
-    state = PlanarState(*(getattr(start, name) + rng.normal(size=COUNT) for name in COLUMNS))
+    state = PlanarState(*(getattr(start, name) + rng.normal(size=COUNT) for name in PlanarState.COLUMNS))
     done = rng.integers(0, goal.targets.shape[1], COUNT).astype(float)
     return start, state, replace(goal, done=done)
 
@@ -58,7 +58,7 @@ def test_every_kind_of_task_has_a_file():
 def test_what_is_drawn_is_finite_at_rest_and_within_the_geofence(task, robot, training):
     start, goal = draw(task, robot, training=training, count=300)
     for value in (
-        *(getattr(start, name) for name in COLUMNS),
+        *(getattr(start, name) for name in PlanarState.COLUMNS),
         *goal.arrays(),
     ):
         assert value.dtype == np.float64

@@ -48,7 +48,7 @@ def test_what_was_asked_for_and_who_did_it_come_along(reached):
     record = read_run(reached)
     assert record.info["goal"] == [0.0, 0.0, 0.0]
     assert record.controller["controller"] == "lqr"
-    assert [goal.targets.tolist() for goal in record.goals] == [[[0.0, 0.0, 0.0]]]
+    assert [goal.targets.tolist() for goal in record.goals] == [[[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]]]
     assert record.last_health("plant").values["watchdog_trips"] == "0"
     assert record.last_health("controller").values["mode"] == "active"
     assert record.last_health("nobody") is None

@@ -11,7 +11,7 @@ from fulmar_core.goal import goal_at, stack_goals
 from fulmar_core.health.applied import AppliedHistory
 from fulmar_core.health.filters import HealthSettings
 from fulmar_core.observation import Observer
-from fulmar_core.planar import COLUMNS, PlanarState
+from fulmar_core.planar import PlanarState
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 
@@ -173,7 +173,7 @@ def test_a_step_at_rest_answers_with_the_safe_command_without_the_controller():
 
 def test_inputs_of_an_unknown_state_and_goal_are_not_a_number():
     inputs = unknown_inputs(loop_of(Scripted()), 7 * S)
-    assert all(np.isnan(getattr(inputs.state, name)).all() for name in COLUMNS)
+    assert all(np.isnan(getattr(inputs.state, name)).all() for name in PlanarState.COLUMNS)
     assert np.isnan(inputs.observation).all() and np.isnan(inputs.goal.current).all()
     assert inputs.observation.shape == (1, len(Observer(BASE, WAYPOINTS).names))
     assert (inputs.previous.tolist(), inputs.stamp_ns) == ([[0.0, 0.0]], 7 * S)

@@ -9,7 +9,7 @@ import pytest
 
 from fulmar_core.counter_rng import START
 from fulmar_core.disturbances.scenario import Actuation, Kick, Push, Sensing, Wave, load_scenario
-from fulmar_core.planar import COLUMNS
+from fulmar_core.planar import PlanarState
 from fulmar_core.sensors.odometer import Channel
 from fulmar_core.simulation import ACTUATOR_NOISE
 from tests.simulations import BASE, PLATFORM, ROBOTS, STILL, build, differing, run
@@ -28,7 +28,7 @@ ACTS = {
 @pytest.mark.parametrize("robot", [PLATFORM, ROBOTS["kingfisher"]], ids=lambda robot: robot.name)
 def test_what_disturbs_the_motion_moves_the_truth_and_leaves_the_sensors_perfect(robot, act):
     calm, moved = run(build(STILL, robot), 10), run(build(replace(STILL, **ACTS[act]), robot), 10)
-    assert differing(calm.truth, moved.truth) == set(COLUMNS)
+    assert differing(calm.truth, moved.truth) == set(PlanarState.COLUMNS)
     assert not differing(moved.truth, moved.measured)
 
 
@@ -41,7 +41,7 @@ def test_what_disturbs_the_sensors_leaves_the_truth_alone(sensing):
     scenario = replace(STILL, sensor_noise=True)
     calm, moved = run(build(scenario), 10), run(build(replace(scenario, sensing=sensing)), 10)
     assert not differing(calm.truth, moved.truth)
-    assert differing(calm.measured, moved.measured) == set(COLUMNS)
+    assert differing(calm.measured, moved.measured) == set(PlanarState.COLUMNS)
 
 
 def test_biases_of_a_robot_s_sensors_are_worn_for_a_whole_episode():

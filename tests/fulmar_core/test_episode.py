@@ -11,7 +11,7 @@ from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.disturbances.world import FIELDS
 from fulmar_core.episode import draw_episode, draw_episodes, episode_steps
 from fulmar_core.errors import ConfigError
-from fulmar_core.planar import COLUMNS
+from fulmar_core.planar import PlanarState
 from fulmar_core.robot import load_robot
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import load_task
@@ -21,7 +21,7 @@ ROBOT, TASK, RANDOMISED = (
     load_task("go_to_pose"),
     load_scenario("randomised"),
 )
-PARTS = (("start", COLUMNS), ("goal", ("targets", "done", "obstacles")), ("world", FIELDS))
+PARTS = (("start", PlanarState.COLUMNS), ("goal", ("targets", "done", "obstacles")), ("world", FIELDS))
 
 
 def draw(numbers, *, seed=7, scenario=RANDOMISED, task=TASK, **kwargs):

@@ -14,7 +14,7 @@ from fulmar_core.safety.fallback import ControllerSwitch, Standby
 from fulmar_core.safety.geofence import OUT_OF_BOUNDS
 from fulmar_core.safety.input_gate import JUMP_M, Measurement
 from fulmar_core.tasks import load_task
-from tests.states import planar_state
+from tests.states import planar_state, received_targets
 
 S, MS = 1_000_000_000, 1_000_000
 ROBOT = load_robot("turtlebot2")
@@ -81,7 +81,7 @@ class Bench:
         return decision, step.command[0].tolist()
 
     def give(self, goal=GOAL, stamp_ns=7):
-        return self.guard.take_goal(goal, stamp_ns, self.now_ns)
+        return self.guard.take_goal(received_targets(goal, self.guard.loop.task), stamp_ns, self.now_ns)
 
 
 def test_it_acts_once_it_is_active_and_has_odometry_and_a_goal():
@@ -275,7 +275,7 @@ def test_obstacles_and_block_are_waited_for_and_named():
     pusher = Bench(task="push_block")
     pusher.give()
     assert pusher.step()[0].reason == "no place of the block yet"
-    pusher.guard.take_thing("block", np.array([1.0, 0.5, 0.0]), pusher.now_ns)
+    pusher.guard.take_thing("block", np.array([1.0, 0.5, 0.0, 0.0, 0.0, 0.0, 1.0]), pusher.now_ns)
     assert pusher.step()[1] == list(GENTLE)
     np.testing.assert_array_equal(pusher.guard.loop.goal.things["block"], [[1.0, 0.5, 0.0]])
 

@@ -7,16 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fulmar_core.planar import (
-    COLUMNS,
-    PlanarState,
-    at_rest,
-    planar_of,
-    rigid_of,
-    stack_planar,
-    to_body,
-    wrapped,
-)
+from fulmar_core.planar import PlanarState, at_rest, to_body, wrapped
 from tests.states import planar_state
 
 
@@ -26,13 +17,13 @@ def crowd(count=20, seed=1):
 
 def test_the_planar_part_of_a_rigid_state_is_what_went_in():
     state = crowd()
-    back = planar_of(rigid_of(state))
-    for name in COLUMNS:
+    back = PlanarState.from_rigid(state.to_rigid())
+    for name in PlanarState.COLUMNS:
         np.testing.assert_allclose(getattr(back, name), getattr(state, name), rtol=0, atol=1e-12)
 
 
 def test_a_rigid_state_made_from_a_planar_one_does_not_leave_the_plane():
-    rigid = rigid_of(crowd())
+    rigid = crowd().to_rigid()
     assert not rigid.position_in_world[:, 2].any()
     assert not rigid.velocity_in_world[:, 2].any()
     assert not rigid.quat_xyzw[:, :2].any()
@@ -40,8 +31,10 @@ def test_a_rigid_state_made_from_a_planar_one_does_not_leave_the_plane():
 
 
 def test_a_rigid_state_is_read_without_a_batch_axis_too():
-    state = planar_of(planar_state(1.0, 2.0, 0.5, vx=0.1, vy=0.2, yaw_rate=0.3))
-    assert [float(getattr(state, name)) for name in COLUMNS] == pytest.approx([1.0, 2.0, 0.5, 0.1, 0.2, 0.3])
+    state = PlanarState.from_rigid(planar_state(1.0, 2.0, 0.5, vx=0.1, vy=0.2, yaw_rate=0.3))
+    assert [float(getattr(state, name)) for name in PlanarState.COLUMNS] == pytest.approx(
+        [1.0, 2.0, 0.5, 0.1, 0.2, 0.3]
+    )
 
 
 def test_what_lies_ahead_of_a_body_that_looks_north_lies_north():
@@ -69,7 +62,7 @@ def test_writing_and_picking_touch_the_asked_worlds_alone():
     state, other = crowd(5), crowd(2, seed=2)
     before = state[np.arange(5)]
     state.write([1, 3], other)
-    for name in COLUMNS:
+    for name in PlanarState.COLUMNS:
         np.testing.assert_array_equal(getattr(state, name)[[1, 3]], getattr(other, name))
         np.testing.assert_array_equal(getattr(state, name)[[0, 2, 4]], getattr(before, name)[[0, 2, 4]])
 
@@ -82,6 +75,6 @@ def test_a_body_at_rest_does_not_move():
 
 def test_states_stack_along_any_new_axis():
     states = [crowd(4, seed=i) for i in range(3)]
-    assert stack_planar(states).x.shape == (3, 4)
-    assert stack_planar(states, axis=-1).x.shape == (4, 3)
-    np.testing.assert_array_equal(stack_planar(states)[1].vy, states[1].vy)
+    assert PlanarState.stack(states).x.shape == (3, 4)
+    assert PlanarState.stack(states, axis=-1).x.shape == (4, 3)
+    np.testing.assert_array_equal(PlanarState.stack(states)[1].vy, states[1].vy)

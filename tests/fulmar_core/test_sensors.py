@@ -9,7 +9,7 @@ import pytest
 
 from fulmar_core.counter_rng import WORLD, Draws
 from fulmar_core.disturbances.scenario import draw_world, load_scenario
-from fulmar_core.planar import COLUMNS, PlanarState
+from fulmar_core.planar import PlanarState
 from fulmar_core.robot import load_robot
 from fulmar_core.sensors.odometer import Channel, Odometer, OdometrySpec
 
@@ -55,7 +55,7 @@ class Bench:
         else:
             first = self.odometer.first(truth, self.world, self.numbers, self.repeats)
             measured = self.odometer.restart(truth, only, first)
-        return np.stack([getattr(measured, name) for name in COLUMNS])
+        return np.stack([getattr(measured, name) for name in PlanarState.COLUMNS])
 
 
 def first(spec, count=MANY, **kwargs):
@@ -163,7 +163,7 @@ def test_a_heading_s_error_of_scale_and_limit_are_of_the_angle_and_not_of_all_tu
     turned = 20 * np.pi + 0.5  # as a batch counts it, which MuJoCo does not
     for channel in (Channel(scale_std=0.1), Channel(limit=3.2)):
         spec, world = OdometrySpec(heading=channel), worlds(2, sensor_scale=1.0)
-        truth = PlanarState(*(np.full(2, turned if name == "yaw" else 0.0) for name in COLUMNS))
+        truth = PlanarState(*(np.full(2, turned if name == "yaw" else 0.0) for name in PlanarState.COLUMNS))
         odometer = Odometer(spec, seed=3, period=DT)
         begun = np.zeros(2, int)
         measured = odometer.measure(truth, world, np.arange(2), begun, begun)

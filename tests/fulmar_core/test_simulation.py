@@ -9,7 +9,7 @@ import pytest
 
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.observation import Observer
-from fulmar_core.planar import COLUMNS, at_rest
+from fulmar_core.planar import PlanarState, at_rest
 from fulmar_core.robot import load_robot
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import load_task
@@ -21,8 +21,11 @@ EACH_ROBOT = pytest.mark.parametrize("robot", ROBOTS.values(), ids=ROBOTS)
 def everything(simulation, index=...):
     """All that can be seen of some worlds."""
     return {
-        **{f"true {name}": getattr(simulation.truth, name)[index].copy() for name in COLUMNS},
-        **{f"measured {name}": getattr(simulation.measured, name)[index].copy() for name in COLUMNS},
+        **{f"true {name}": getattr(simulation.truth, name)[index].copy() for name in PlanarState.COLUMNS},
+        **{
+            f"measured {name}": getattr(simulation.measured, name)[index].copy()
+            for name in PlanarState.COLUMNS
+        },
         **{name: getattr(simulation.goal, name)[index].copy() for name in ("targets", "done", "obstacles")},
         "command": simulation.command[index].copy(),
         "observation": simulation.observe()[index].copy(),
@@ -52,7 +55,7 @@ def test_robots_that_are_put_where_others_are_go_on_as_those():
     for command in commands(others, 20, seed=2):
         others.step(command)
         these.step(command)
-    for name in COLUMNS:
+    for name in PlanarState.COLUMNS:
         np.testing.assert_allclose(
             getattr(these.truth, name), getattr(others.truth, name), rtol=1e-5, atol=1e-5
         )
@@ -136,7 +139,7 @@ def test_what_was_handed_out_before_a_step_and_a_reset_stays_as_it_was(scenario)
     simulation = run(build(load_scenario(scenario)), 2)
     kept, copies = (simulation.truth, simulation.measured, simulation.command), everything(simulation)
     run(simulation, 1).reset(range(5))
-    for name in COLUMNS:
+    for name in PlanarState.COLUMNS:
         np.testing.assert_array_equal(getattr(kept[0], name), copies[f"true {name}"])
         np.testing.assert_array_equal(getattr(kept[1], name), copies[f"measured {name}"])
     np.testing.assert_array_equal(kept[2], copies["command"])
@@ -148,7 +151,7 @@ def test_readings_and_commands_that_were_handed_out_outlast_a_reset(steps):
     kept, command = simulation.measured, simulation.command
     copies = everything(simulation)
     simulation.reset([1, 3])
-    for name in COLUMNS:
+    for name in PlanarState.COLUMNS:
         np.testing.assert_array_equal(getattr(kept, name), copies[f"measured {name}"])
     np.testing.assert_array_equal(command, copies["command"])
 

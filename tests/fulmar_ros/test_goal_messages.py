@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from geometry_msgs.msg import PoseArray
+from geometry_msgs.msg import PoseArray, PoseStamped, TwistStamped
 from nav_msgs.msg import Odometry
 from visualization_msgs.msg import Marker, MarkerArray
 
@@ -19,6 +19,7 @@ from fulmar_bags.message_reader import (
     stamp_ns,
 )
 from fulmar_core.goal import goal_at
+from fulmar_core.planar import PlanarState
 from fulmar_core.robot_name import frames_of
 from fulmar_ros.goal_messages import goal_message, obstacles_message
 
@@ -30,15 +31,29 @@ COURSE = ((1.0, -2.0, 0.5), (0.0, 3.0, -3.0), (4.0, 4.0, 0.0))
 def test_a_goal_comes_back_as_it_was(topic):
     targets = COURSE if topic == "goal_path" else COURSE[:1]
     message = goal_message(goal_at(*targets), topic, 1_500_000_000)
-    goal, problem = goal_of(message)
+    found, problem = goal_of(message)
     assert problem == ""
-    np.testing.assert_allclose(goal.targets, targets)
+    np.testing.assert_allclose(PlanarState.targets_of(found), targets)
     assert stamp_ns(message.header.stamp) == 1_500_000_000
 
 
 def test_a_point_has_no_heading():
-    goal, _ = goal_of(goal_message(goal_at(COURSE[0]), "goal_point", 0))
-    assert goal.targets.tolist() == [[1.0, -2.0, 0.0]]
+    found, _ = goal_of(goal_message(goal_at(COURSE[0]), "goal_point", 0))
+    assert found.tolist() == [[1.0, -2.0, 0.0, 0.0, 0.0, 0.0, 1.0]]
+    assert PlanarState.targets_of(found).tolist() == [[1.0, -2.0, 0.0]]
+
+
+def test_a_goal_is_received_in_six_degrees_of_freedom():
+    pose = PoseStamped()
+    pose.header.frame_id = "odom"
+    p, q = pose.pose.position, pose.pose.orientation
+    p.x, p.y, p.z, q.x, q.y, q.z, q.w = 1.0, 2.0, 3.0, 0.5, -0.5, 0.5, 0.5
+    assert goal_of(pose)[0].tolist() == [[1.0, 2.0, 3.0, 0.5, -0.5, 0.5, 0.5]]
+    twist = TwistStamped()
+    twist.header.frame_id = "base_link"
+    v, w = twist.twist.linear, twist.twist.angular
+    v.x, v.y, v.z, w.x, w.y, w.z = 0.1, 0.2, 0.3, 0.4, 0.5, 0.6
+    assert goal_of(twist)[0].tolist() == [[0.1, 0.2, 0.3, 0.4, 0.5, 0.6]]
 
 
 def test_of_many_targets_a_point_is_the_one_that_counts():
@@ -130,9 +145,9 @@ def test_a_named_robot_takes_obstacles_and_odometry_with_its_prefix_and_without(
 def test_an_array_of_poses_is_the_same_goal_as_the_path_of_these_poses():
     path = goal_message(goal_at((1.0, 2.0, 0.3), (3.0, 4.0, -0.5)), "goal_path", 7)
     array = PoseArray(header=path.header, poses=[stamped.pose for stamped in path.poses])
-    goal, problem = goal_of(array)
+    found, problem = goal_of(array)
     assert problem == ""
-    np.testing.assert_array_equal(goal.targets, goal_of(path)[0].targets)
+    np.testing.assert_array_equal(found, goal_of(path)[0])
     assert "0 waypoints" in goal_of(PoseArray(header=path.header))[1]
     array.header.frame_id = "map"
     assert "must be 'odom'" in goal_of(array)[1]

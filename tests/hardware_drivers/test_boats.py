@@ -17,7 +17,7 @@ import pytest
 from pymavlink import mavutil
 
 from fulmar_core.errors import ConfigError, DeviceError
-from fulmar_core.planar import planar_of
+from fulmar_core.planar import PlanarState
 from fulmar_core.robot import load_robot
 from hardware_drivers.driver_backend import backend_of
 from hardware_drivers.kingfisher_driver import KingfisherDriver
@@ -92,7 +92,7 @@ def test_the_propellers_turn_as_commanded_each_on_its_side(bench, driver):
 def test_odometry_follows_the_boat_in_ros_frames(bench, driver):
     for command in ((1.0, 1.0), (0.3, 1.0), (0.0, 0.0)):
         sample = drive(driver, command, 1.2)
-    found, true = planar_of(sample.odometry), planar_of(bench.sample.truth)
+    found, true = PlanarState.from_rigid(sample.odometry), PlanarState.from_rigid(bench.sample.truth)
     assert np.hypot(true.x - START[0], true.y - START[1]) > 0.2
     assert np.hypot(found.x - true.x, found.y - true.y) < 0.1  # a tenth of a second old
     assert abs(np.remainder(found.yaw - true.yaw + np.pi, 2 * np.pi) - np.pi) < np.radians(3.0)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from fulmar_core.errors import DeviceError
-from fulmar_core.planar import planar_of
+from fulmar_core.planar import PlanarState
 from hardware_drivers.driver_backend import backend_of
 from hardware_drivers.kobuki_driver import KobukiDriver
 from hardware_drivers.settings import Kobuki
@@ -70,7 +70,7 @@ def drive(driver, command, seconds):
 def test_odometry_follows_the_base_through_an_arc(bench, driver):
     for command in ((0.4, 0.0), (0.3, 0.8), (-0.3, -0.5), (0.0, 0.0)):
         sample = drive(driver, command, 1.0)
-    found, true = planar_of(sample.odometry), planar_of(bench.sample.truth)
+    found, true = PlanarState.from_rigid(sample.odometry), PlanarState.from_rigid(bench.sample.truth)
     assert np.hypot(true.x - START[0], true.y - START[1]) > 0.2
     assert np.hypot(found.x - true.x, found.y - true.y) < 0.02
     assert abs(np.remainder(found.yaw - true.yaw + np.pi, 2 * np.pi) - np.pi) < np.radians(1.0)

@@ -12,7 +12,7 @@ from fulmar_core.episode import Episode, draw_episode
 from fulmar_core.goal import goal_at
 from fulmar_core.observation import slewed
 from fulmar_core.paths import config_names
-from fulmar_core.planar import PlanarState, planar_of
+from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Rolling, load_robot
 from fulmar_core.rollout import roll_out_in_backends, roll_out_in_batch
 from fulmar_core.simulation import BatchSimulation
@@ -54,7 +54,7 @@ def drive(robot, episode, command_at, seconds):
         wanted = robot.actuators.limited(np.asarray(command_at(k * dt), dtype=float))
         command = slewed(wanted, command, robot, dt)
         for backend, path in zip(backends, paths, strict=True):
-            state = planar_of(backend.step(command, substeps).truth)
+            state = PlanarState.from_rigid(backend.step(command, substeps).truth)
             path.append([state.x, state.y, state.yaw, *state.velocity_in_body, state.yaw_rate])
     return tuple(np.array(path) for path in paths)
 
@@ -243,7 +243,7 @@ def test_odometry_errs_in_mujoco_as_in_the_batch_number_by_number(scenario):
     ]
     for _ in range(20):
         for i, sample in enumerate(samples):
-            measured = planar_of(sample.odometry)
+            measured = PlanarState.from_rigid(sample.odometry)
             assert measured.x == pytest.approx(simulation.measured.x[i], abs=1e-3)
             assert measured.vy == pytest.approx(simulation.measured.vy[i], abs=1e-3)
             assert measured.yaw_rate == pytest.approx(simulation.measured.yaw_rate[i], abs=1e-3)

@@ -17,13 +17,14 @@ from fulmar_core.episode import draw_episodes
 from fulmar_core.goal import goal_in_float64
 from fulmar_core.guarded_loop import GuardedLoop
 from fulmar_core.paths import config_names
-from fulmar_core.planar import COLUMNS, PlanarState, rigid_of
+from fulmar_core.planar import PlanarState
 from fulmar_core.robot import load_robot
 from fulmar_core.safety.fallback import ControllerSwitch, Standby
 from fulmar_core.safety.input_gate import Measurement
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import load_task
 from sim_nodes.mock_backend import MockBackend
+from tests.states import received_targets
 
 ROBOT, SCENARIO = load_robot("turtlebot2"), load_scenario("nominal")
 SEED, EPISODES, STEPS, STRIDE = 3, 3, 120, 0.12  # m a step
@@ -54,7 +55,7 @@ def measurements(task):
     """Odometry from target to target, of each episode and step, in single precision as the batch has it."""
     episode, rng = drawn(task), np.random.default_rng(5)
     shape = (STEPS, EPISODES)
-    columns = {name: np.zeros(shape) for name in COLUMNS}
+    columns = {name: np.zeros(shape) for name in PlanarState.COLUMNS}
     if task.goal_topic != "goal_velocity":
         for world in range(EPISODES):
             targets = episode.goal.targets[world]
@@ -69,7 +70,7 @@ def measurements(task):
     return PlanarState(
         *(
             (columns[name] + rng.normal(0.0, noise.get(name, 0.0), shape)).astype(np.float32)
-            for name in COLUMNS
+            for name in PlanarState.COLUMNS
         )
     )
 
@@ -101,7 +102,7 @@ class ReplayedBackend(MockBackend):
 
     def _given(self, sample):
         step = min(self._control_step, STEPS - 1)
-        return replace(sample, odometry=rigid_of(exact(self._series[step, self._number])))
+        return replace(sample, odometry=exact(self._series[step, self._number]).to_rigid())
 
 
 class Recorder:
@@ -120,7 +121,7 @@ class Recorder:
 
 
 def exact(state):
-    return PlanarState(*(np.asarray(getattr(state, name), dtype=float) for name in COLUMNS))
+    return PlanarState(*(np.asarray(getattr(state, name), dtype=float) for name in PlanarState.COLUMNS))
 
 
 def in_training(task, series, monkeypatch):
@@ -172,12 +173,12 @@ def in_the_node(task, series, monkeypatch):
         if task.goal_topic == "goal_velocity":
             for i, target in enumerate(goal.targets):
                 one = replace(goal, targets=target[None])
-                guard.take_goal(one, round(S * (1.0 + i * task.step_s)), S)
+                guard.take_goal(received_targets(one, task), round(S * (1.0 + i * task.step_s)), S)
         else:
-            guard.take_goal(goal, 1, S)
+            guard.take_goal(received_targets(goal, task), 1, S)
         for step in range(STEPS):
             now_ns = round(S * (1.0 + step * DT))
-            seen = Measurement(now_ns, "odom", "base_link", rigid_of(exact(series[step, world])))
+            seen = Measurement(now_ns, "odom", "base_link", exact(series[step, world]).to_rigid())
             assert guard.take(seen, now_ns)
             decision, inputs = guard.begin_step(seen, now_ns)
             assert decision.may_act, decision.reason

@@ -9,7 +9,7 @@ import pytest
 
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.paths import config_names
-from fulmar_core.planar import COLUMNS
+from fulmar_core.planar import PlanarState
 from fulmar_core.robot import load_robot
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import load_task
@@ -40,7 +40,7 @@ def trajectory(robot, task, library, dtype, device=None):
         simulation.step(command if library is np else torch.as_tensor(command, device=device))
         if k % 17 == 9:
             simulation.reset([1, 3, 5 + k % 4])
-        columns = [getattr(simulation.truth, name) for name in COLUMNS]
+        columns = [getattr(simulation.truth, name) for name in PlanarState.COLUMNS]
         for values in (*columns, simulation.observe()):
             if library is not np:
                 assert values.dtype == kind

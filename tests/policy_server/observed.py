@@ -8,7 +8,7 @@ import numpy as np
 
 from fulmar_core.controllers.controller import Inputs
 from fulmar_core.goal import Goal
-from fulmar_core.planar import COLUMNS, PlanarState
+from fulmar_core.planar import PlanarState
 
 
 def inputs_seeing(observations: Any) -> Inputs:
@@ -17,5 +17,5 @@ def inputs_seeing(observations: Any) -> Inputs:
     count = len(rows)
     unknown = np.full(count, np.nan)
     goal = Goal(np.full((count, 1, 3), np.nan), unknown, np.zeros((count, 0, 3)))
-    state = PlanarState(*(unknown for _ in COLUMNS))
+    state = PlanarState(*(unknown for _ in PlanarState.COLUMNS))
     return Inputs(state, goal, rows, np.zeros((count, 0)), None, 0, np.nan)

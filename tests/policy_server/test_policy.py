@@ -16,7 +16,7 @@ from fulmar_core.goal import goal_at
 from fulmar_core.health.actuator_estimator import ActuatorEstimate
 from fulmar_core.health.thruster_health import Health
 from fulmar_core.observation import Observer
-from fulmar_core.planar import COLUMNS, at_rest
+from fulmar_core.planar import PlanarState, at_rest
 from fulmar_core.policy_bundle import (
     GOLDEN,
     NETWORK,
@@ -97,7 +97,7 @@ def test_a_network_whose_passport_names_disturbances_acts_on_the_estimate(distur
     moved = at_rest(np.array([0.3, -0.2]), np.array([0.1, 0.0]), np.array([0.5, 2.0]))
     push, alive = np.array([[0.2, 0.0, -0.1], [0.0, 0.4, 0.0]]), np.ones((2, 8))
     alive[1, 3] = 0.0
-    motion = np.stack([getattr(moved, name) for name in COLUMNS], axis=-1)
+    motion = np.stack([getattr(moved, name) for name in PlanarState.COLUMNS], axis=-1)
     health = Health(alive, alive, motion, push, np.zeros(2, dtype=bool))
     given = inputs_at(
         ROBOT,

@@ -23,7 +23,7 @@ from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import draw_episode, episode_steps
 from fulmar_core.observation import Observer
 from fulmar_core.paths import config_names
-from fulmar_core.planar import planar_of
+from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot, Rolling, load_robot
 from fulmar_core.rollout import roll_out_in_backends
 from fulmar_core.tasks import Task, load_task
@@ -125,7 +125,7 @@ def check_pair(robot: Robot, task: Task, make: Callable[[Robot, Task], Controlle
 
             def on_step(sample: Sample, command: np.ndarray, way: list[Any] = ways[number]) -> None:
                 assert sample.truth is not None
-                truth = planar_of(sample.truth)
+                truth = PlanarState.from_rigid(sample.truth)
                 way.append((float(truth.x), float(truth.y), *command))
 
             plant.run_episode(episode, number=number, seed=SEED, steps=steps, on_step=on_step)

@@ -8,7 +8,7 @@ import pytest
 from fulmar_core.dynamics.hydrodynamics import GRAVITY
 from fulmar_core.errors import SafetyError
 from fulmar_core.paths import config_names
-from fulmar_core.planar import COLUMNS, planar_of
+from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Rolling, load_robot
 
 mujoco = pytest.importorskip("mujoco")
@@ -50,8 +50,8 @@ def test_a_reset_puts_every_robot_where_it_was_asked_to_be(name, episode):
     start = moving(robot)
     sample = MujocoBackend(robot, sensor_noise=False).reset(episode(robot, start=start), seed=0)
     for part in (sample.truth, sample.odometry):
-        state = planar_of(part)
-        np.testing.assert_allclose([getattr(state, c) for c in COLUMNS], start, rtol=0, atol=1e-6)
+        state = PlanarState.from_rigid(part)
+        np.testing.assert_allclose([getattr(state, c) for c in PlanarState.COLUMNS], start, rtol=0, atol=1e-6)
         assert part.position_in_world[2] == pytest.approx(0.0, abs=1e-9)
         np.testing.assert_allclose(
             part.quat_xyzw[:2], 0.0, atol=2e-3

@@ -14,7 +14,7 @@ from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import Episode, draw_episode
 from fulmar_core.goal import goal_at
 from fulmar_core.health.applied import AppliedHistory
-from fulmar_core.planar import at_rest, planar_of
+from fulmar_core.planar import PlanarState, at_rest
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 from sim_nodes.mock_backend import MockBackend
@@ -42,7 +42,7 @@ def episode(start):
 
 
 def place(sample):
-    truth = planar_of(sample.truth)
+    truth = PlanarState.from_rigid(sample.truth)
     return np.array([truth.x, truth.y, truth.yaw], dtype=float)
 
 
@@ -114,7 +114,7 @@ def drive(lqr, backend, sample, seconds):
     for tick in range(round(TICKS_A_SECOND * seconds)):
         before = command
         if tick % ticks == 0:
-            command = loop.step(planar_of(sample.measured)[None], tick * tick_ns).command[0]
+            command = loop.step(PlanarState.from_rigid(sample.measured)[None], tick * tick_ns).command[0]
         sample = backend.step(before)
         applied.add(tick * tick_ns, sample.applied)
     return float(np.hypot(*place(sample)[:2])), loop.estimate.health

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fulmar_core.paths import config_names
-from fulmar_core.planar import planar_of
+from fulmar_core.planar import PlanarState
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 from fulmar_core.tasks.obstacles import TOUCH, clearance
@@ -41,7 +41,7 @@ def test_an_obstacle_holds_a_robot_up_and_touching_is_seen_by_the_task_s_measure
     backend.reset(episode(robot, obstacles=AHEAD), seed=0)
     gaps = []
     for _ in range(60):
-        state = planar_of(backend.step(ahead(robot), 10).truth)
+        state = PlanarState.from_rigid(backend.step(ahead(robot), 10).truth)
         gaps.append(float(clearance(state, AHEAD, robot)))
     assert min(gaps) < TOUCH  # it came there, where collision checks count it
     assert min(gaps) > -0.015  # it was not let in

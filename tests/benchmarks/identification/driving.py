@@ -20,7 +20,7 @@ from fulmar_core.disturbances.world import World
 from fulmar_core.dynamics.hydrodynamics import GRAVITY
 from fulmar_core.episode import Episode, draw_episode
 from fulmar_core.goal import stack_goals
-from fulmar_core.planar import PlanarState, at_rest, planar_of, stack_planar
+from fulmar_core.planar import PlanarState, at_rest
 from fulmar_core.robot import Robot
 from fulmar_core.state import RigidBodyState
 from fulmar_core.tasks import load_task
@@ -203,7 +203,7 @@ def drive(machine: Machine, leg: Leg, nominal: Robot, folder: Path, *, seed: int
         measured(sample.measured, 0.0)
         for tick in range(round(duration_s / dt)):
             if tick % substeps == 0:
-                state = stack_planar([planar_of(sample.measured)])
+                state = PlanarState.stack([PlanarState.from_rigid(sample.measured)])
                 command = loop.step(state, round(1e9 * tick * dt)).command[0]
                 bag.joints(ACTUATORS_STATE.name, command, tick * dt, _log_ns(tick * dt))
             sample = backend.step(command)
@@ -246,7 +246,7 @@ def _settled(machine: Machine, command: np.ndarray) -> PlanarState:
         sample = backend.step(command)
     backend.close()
     assert sample.truth is not None
-    return planar_of(sample.truth)
+    return PlanarState.from_rigid(sample.truth)
 
 
 def _world(machine: Machine, leg: Leg, nominal: World) -> World:

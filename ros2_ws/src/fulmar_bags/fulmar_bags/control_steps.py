@@ -15,7 +15,8 @@ from fulmar_bags.recorded_estop import estop_messages
 from fulmar_bags.wire_reader import ABSENT, Received, WireReader
 from fulmar_core.controller_settings import ControllerSettings
 from fulmar_core.errors import BagError, ConfigError
-from fulmar_core.goal import PoseTuple, goal_at
+from fulmar_core.goal import PoseTuple
+from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.robot_name import Frames
 from fulmar_core.safety.geofence import NO_AREA
@@ -319,7 +320,8 @@ def _first_of(stamps: np.ndarray, wanted: np.ndarray) -> np.ndarray:
 
 def _given(pose: PoseTuple, log_ns: int) -> Received:
     """A goal in the place of those in the bag."""
-    return Received(log_ns, 0, goal_at((pose[0], pose[1], float(np.deg2rad(pose[2])))))
+    target = np.array((pose[0], pose[1], float(np.deg2rad(pose[2]))))
+    return Received(log_ns, 0, PlanarState.rigid_targets(target, twists=False)[None])
 
 
 def answers_within(steps_ns: np.ndarray, commands_ns: np.ndarray) -> np.ndarray:

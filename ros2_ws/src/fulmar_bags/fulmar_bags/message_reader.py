@@ -12,9 +12,7 @@ from typing import Any
 import numpy as np
 
 from fulmar_core.errors import shortened
-from fulmar_core.goal import Goal, goal_at
 from fulmar_core.robot_name import PLAIN, Frames
-from fulmar_core.rotation import yaw_of
 from fulmar_core.safety.input_gate import Measurement
 from fulmar_core.state import RigidBodyState
 
@@ -55,39 +53,42 @@ def measurement_of(message: Any, frames: Frames = PLAIN) -> Measurement:
     return Measurement(stamp_ns(message.header.stamp), frame, child_frame, state)
 
 
-def goal_of(message: Any, frames: Frames = PLAIN) -> tuple[Goal | None, str]:
-    """Read a goal.
+def goal_of(message: Any, frames: Frames = PLAIN) -> tuple[np.ndarray | None, str]:
+    """Read the targets of a goal, in six degrees of freedom; `Task.goal_of` makes a goal of them.
 
     Args:
         message: From any goal topic.
         frames: Of the robot; a message may leave their prefix out.
 
     Returns:
-        The goal without a batch axis and an empty text, or None and what is wrong with the message.
+        Poses in the world, shape (k, 7), or one twist in the body's frame, shape (1, 6), and an empty text; or None and
+        what is wrong with the message. A place has no attitude: its quaternion is (0, 0, 0, 1).
     """
     frame = BODY_FRAME if hasattr(message, "twist") else FRAME
     if frames.plain(message.header.frame_id) != frame:
         return None, f"goal frame is '{shortened(message.header.frame_id)}', must be '{frame}'"
+    targets: list[tuple[float, ...]] = []
     if hasattr(message, "twist"):
-        targets = [(message.twist.linear.x, message.twist.linear.y, message.twist.angular.z)]
+        v, w = message.twist.linear, message.twist.angular
+        targets.append((v.x, v.y, v.z, w.x, w.y, w.z))
     elif hasattr(message, "point"):
-        targets = [(message.point.x, message.point.y, 0.0)]
+        targets.append((message.point.x, message.point.y, message.point.z, 0.0, 0.0, 0.0, 1.0))
     else:
         poses = message.poses if hasattr(message, "poses") else [message]
         if not 0 < len(poses) <= MOST_WAYPOINTS:
             return None, f"goal has {len(poses)} waypoints, must have 1 to {MOST_WAYPOINTS}"
-        targets = []
         for pose in poses:
-            target, problem = _planar(getattr(pose, "pose", pose))  # stamped in a path, not in an array
+            target, problem = _pose(getattr(pose, "pose", pose))  # stamped in a path, not in an array
             if target is None:
                 return None, f"goal {problem}"
             targets.append(target)
     if not np.isfinite(targets).all():
         return None, "goal holds a value that is not finite"
-    return goal_at(*targets), ""
+    return np.array(targets, dtype=float), ""
 
 
-def _planar(pose: Any) -> tuple[tuple[float, float, float] | None, str]:
+def _pose(pose: Any) -> tuple[tuple[float, ...] | None, str]:
+    """Place and unit quaternion, seven numbers."""
     p, q = pose.position, pose.orientation
     quat = np.array([q.x, q.y, q.z, q.w])
     if not (np.isfinite(quat).all() and np.isfinite((p.x, p.y, p.z)).all()):
@@ -95,7 +96,7 @@ def _planar(pose: Any) -> tuple[tuple[float, float, float] | None, str]:
     norm = math.sqrt(float(quat @ quat))
     if abs(norm - 1.0) > 0.01:
         return None, f"quaternion has norm {norm:.3f}, must be 1"
-    return (p.x, p.y, float(yaw_of(quat / norm))), ""
+    return (p.x, p.y, p.z, *(quat / norm).tolist()), ""
 
 
 def obstacles_of(message: Any, frames: Frames = PLAIN) -> tuple[np.ndarray | None, str]:
@@ -122,8 +123,8 @@ def obstacles_of(message: Any, frames: Frames = PLAIN) -> tuple[np.ndarray | Non
 
 
 def thing_of(message: Any, frames: Frames = PLAIN) -> tuple[np.ndarray | None, str]:
-    """Where a message says that a thing is, shape (3,) [m, m, rad], or None and why it says nothing; as `goal_of`."""
+    """Pose that a message gives of a thing, shape (7,) as of `goal_of`, or None and why it gives none."""
     if frames.plain(message.header.frame_id) != FRAME:
         return None, f"frame is '{shortened(message.header.frame_id)}', must be '{FRAME}'"
-    pose, problem = _planar(message.pose)
+    pose, problem = _pose(message.pose)
     return None if pose is None else np.array(pose), problem

@@ -79,7 +79,7 @@ class Places:
     """Where one thing of the task was over time."""
 
     stamp_s: np.ndarray  # (n,) [s]
-    pose: np.ndarray  # (n, 3) in the world [m, m, rad]
+    pose: np.ndarray  # (n, 7) in the world: x, y, z [m] and quaternion (x, y, z, w)
 
     def __len__(self) -> int:
         """Number of samples."""
@@ -92,7 +92,7 @@ class GivenGoal:
 
     stamp_s: float  # [s]
     log_s: float  # [s]
-    targets: np.ndarray  # (k, 3) as in `fulmar_core.goal.Goal`
+    targets: np.ndarray  # poses (k, 7), or one twist (1, 6); see `message_reader.goal_of`
 
 
 @dataclass(frozen=True)
@@ -204,7 +204,7 @@ def _record(bag: Bag, info: dict[str, Any]) -> RunRecord:
         odom=_motion(_measured(reader)),
         applied=_actuation(reader.vectors(ACTUATORS_STATE)),
         commanded=_actuation(reader.vectors(command)),
-        goals=tuple(GivenGoal(g.stamp_ns / NS, g.log_ns / NS, g.value.targets) for g in reader.goals(task)),
+        goals=tuple(GivenGoal(g.stamp_ns / NS, g.log_ns / NS, g.value) for g in reader.goals(task)),
         obstacles=obstacles[-1].value if obstacles else np.zeros((0, 3)),
         things={name: _places(poses) for name, poses in things.items() if poses},
         controller=next((text for text in reversed(texts) if text), {}),

@@ -159,7 +159,11 @@ class Supervisor:
         self._sent = []
         for part, stamp in parts:
             self.controller.values.pop("goal_refused", None)  # of earlier goals
-            self._sent.append(goal_message(part, self._task.goal_topic, stamp, self._plan.frames))
+            self._sent.append(
+                goal_message(
+                    part, self._task.goal_topic, stamp, self._plan.frames, form=self._task.state_type
+                )
+            )
             self._goal.publish(self._sent[-1])
             if not self._before_silence(partial(self._has, stamp), stamps_ns, alive):
                 return False
@@ -207,7 +211,7 @@ class Supervisor:
         )
         self._publish_obstacles(goal, time_ns)
         self._sent = [
-            goal_message(part, self._task.goal_topic, stamp, self._plan.frames)
+            goal_message(part, self._task.goal_topic, stamp, self._plan.frames, form=self._task.state_type)
             for part, stamp in self._timed(goal, time_ns)
         ]
         for message in self._sent:

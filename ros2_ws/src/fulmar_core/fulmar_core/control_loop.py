@@ -11,9 +11,9 @@ from fulmar_core.goal import Goal
 from fulmar_core.health.actuator_estimator import ActuatorEstimate, ActuatorEstimator
 from fulmar_core.health.applied import Applied, AppliedHistory
 from fulmar_core.observation import Observer, slewed
-from fulmar_core.planar import COLUMNS, PlanarState, in_float64
 from fulmar_core.robot import Robot
 from fulmar_core.safety.command_gate import command_problem
+from fulmar_core.state import State
 from fulmar_core.tasks import Task
 
 NEVER_NS = 1 << 62  # no pause is that long
@@ -94,11 +94,11 @@ class ControlLoop:
         self._controller.reset()
         self._forget_estimates()
 
-    def step(self, measured: PlanarState, stamp_ns: int) -> Step:
+    def step(self, measured: State, stamp_ns: int) -> Step:
         """Do one control step; see `inputs` and `act`."""
         return self.act(self.inputs(measured, stamp_ns))
 
-    def inputs(self, measured: PlanarState, stamp_ns: int) -> Inputs:
+    def inputs(self, measured: State, stamp_ns: int) -> Inputs:
         """Advance the goal by a measurement, and observe.
 
         Args:
@@ -111,7 +111,7 @@ class ControlLoop:
         if stamp_ns - self.answered_ns > self._pause_ns:
             self.previous = self._safe
             self.reset()
-        state = in_float64(measured)
+        state = measured.in_float64()
         goal = self._advanced(state, stamp_ns)
         self._estimate(state, stamp_ns)
         observation = np.asarray(self.observer(state, goal, self.previous), dtype=float)
@@ -140,7 +140,7 @@ class ControlLoop:
         """Answer a measurement with the safe command, without asking the controller [ns]."""
         self.previous, self.answered_ns = self._safe, stamp_ns
 
-    def _advanced(self, state: PlanarState, stamp_ns: int) -> Goal:
+    def _advanced(self, state: State, stamp_ns: int) -> Goal:
         """The goal with those targets done that a measurement reaches."""
         assert self.goal is not None, "a control step needs a goal"
         if self._began_ns is None:
@@ -162,7 +162,7 @@ class ControlLoop:
             self._estimator.reset()
         self.estimate, self._estimated_ns = None, -1
 
-    def _estimate(self, state: PlanarState, stamp_ns: int) -> None:
+    def _estimate(self, state: State, stamp_ns: int) -> None:
         """Update the estimate by what moved the robot since the last one."""
         passed_ns = stamp_ns - self._estimated_ns
         if self._estimator is None or passed_ns == 0:  # by the clock, one measurement may serve twice
@@ -179,8 +179,7 @@ class ControlLoop:
 
 def unknown_inputs(loop: ControlLoop, stamp_ns: int) -> Inputs:
     """Inputs of one robot whose state and goal are not known: NaN."""
-    unknown = np.full(1, np.nan)
-    state = PlanarState(*(unknown for _ in COLUMNS))
+    state = loop.task.state_type.unknown()
     things = {thing.name: np.full((1, 3), np.nan) for thing in loop.task.things}
     goal = Goal(np.full((1, 1, 3), np.nan), np.zeros(1), np.zeros((1, 0, 3)), things)
     observation = np.full((1, len(loop.observer.names)), np.nan)

@@ -6,6 +6,7 @@ Episode i of a seed is the same in the core's batch, in MuJoCo and through ROS, 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Generic
 
 import numpy as np
 
@@ -14,16 +15,16 @@ from fulmar_core.disturbances.scenario import Scenario, draw_world
 from fulmar_core.disturbances.world import World
 from fulmar_core.errors import ConfigError
 from fulmar_core.goal import Goal
-from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
+from fulmar_core.state import S
 from fulmar_core.tasks import Task
 
 
 @dataclass(frozen=True, slots=True)
-class Episode:
+class Episode(Generic[S]):
     """Where an episode starts, what it is about, and in which world; or many episodes at once."""
 
-    start: PlanarState
+    start: S
     goal: Goal
     world: World
 

@@ -4,22 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Generic
 
 import numpy as np
 
 from fulmar_core.counter_rng import Keys, write_keys
 from fulmar_core.disturbances.world import World
 from fulmar_core.goal import Goal
-from fulmar_core.planar import PlanarState
 from fulmar_core.rotation import Array
 from fulmar_core.sensors.odometer import FirstReading
+from fulmar_core.state import S
 
 
 @dataclass(frozen=True, slots=True)
-class Beginning:
+class Beginning(Generic[S]):
     """Everything that is settled before the first step of an episode of each world."""
 
-    start: PlanarState
+    start: S
     goal: Goal
     world: World
     noise_keys: Keys  # of what actuators do wrong
@@ -75,6 +76,6 @@ class UpcomingEpisodes:
             assert len(missing) == len(self._ready)
             self._next = drawn
         else:
-            index = missing if isinstance(drawn.start.x, np.ndarray) else missing.tolist()
+            index = missing if isinstance(drawn.start.like, np.ndarray) else missing.tolist()
             self._next.write(index, drawn)
         self._ready[:] = True

@@ -14,12 +14,12 @@ from fulmar_core.controllers.controller import Inputs
 from fulmar_core.goal import Goal
 from fulmar_core.health.applied import AppliedHistory
 from fulmar_core.mission import Mission
-from fulmar_core.planar import PlanarState, planar_of
 from fulmar_core.robot import Robot
 from fulmar_core.safety.arbiter import Decision, Flags, arbitrate
 from fulmar_core.safety.fallback import ControllerSwitch, Standby
 from fulmar_core.safety.geofence import OUT_OF_BOUNDS, outside, unreachable
 from fulmar_core.safety.input_gate import InputGate, Measurement
+from fulmar_core.state import State
 from fulmar_core.tasks import Task
 
 ENDED = "the e-stop stopped this goal"
@@ -91,7 +91,7 @@ class GuardedLoop:
         )
         self.mission = Mission(self.loop, streamed=settings.goals_streamed)
         self.newest: Measurement | None = None
-        self._newest_state: PlanarState  # of `newest`, shapes (1,)
+        self._newest_state: State  # of `newest`, shapes (1,)
         self.acted = 0
         self.refusal = Refusal()
         self._settings, self._estop = settings, estop
@@ -147,8 +147,9 @@ class GuardedLoop:
             self._bearing = on
             self._change(bearing_off=not on)
 
-    def take_goal(self, goal: Goal, stamp_ns: int, now_ns: int) -> str:
-        """Take a goal; none outside the robot's area, and none while a received e-stop holds."""
+    def take_goal(self, targets: np.ndarray, stamp_ns: int, now_ns: int) -> str:
+        """Take a goal as of `Task.goal_of`; none outside the robot's area, and none while a received e-stop holds."""
+        goal = self.loop.task.goal_of(targets)
         with self._lock:
             beyond = self._beyond(goal)
             if beyond:
@@ -182,9 +183,9 @@ class GuardedLoop:
             self._follow_mission()
 
     def take_thing(self, name: str, pose: np.ndarray, stamp_ns: int) -> None:
-        """Take the pose of a thing of the task, shape (3,) [m, m, rad]."""
+        """Take the pose of a thing of the task, shape (7,)."""
         with self._lock:
-            self.mission.see_thing(name, pose, stamp_ns)
+            self.mission.see_thing(name, self.loop.task.state_type.targets_of(pose), stamp_ns)
             self._follow_mission()
 
     def take(self, measurement: Measurement, now_ns: int) -> bool:
@@ -195,7 +196,7 @@ class GuardedLoop:
                 self._change(input_problem=problem)
                 return False
             self.newest, self._newest_epoch = measurement, self._gate.epoch
-            self._newest_state = planar_of(measurement.state)[None]
+            self._newest_state = self._state_of(measurement)
             self.mission.turn_to(measurement.stamp_ns)
             self._follow_mission(
                 last_input_ns=now_ns, input_problem="", outside=self._flags.outside or self._outside()
@@ -260,8 +261,12 @@ class GuardedLoop:
             self.loop.reset()
 
     def _inputs(self, measurement: Measurement) -> Inputs:
-        state = self._newest_state if measurement is self.newest else planar_of(measurement.state)[None]
+        state = self._newest_state if measurement is self.newest else self._state_of(measurement)
         return self.loop.inputs(state, measurement.stamp_ns)
+
+    def _state_of(self, measurement: Measurement) -> State:
+        """What the task takes of a measurement, shapes (1,)."""
+        return self.loop.task.state_type.from_rigid(measurement.state)[None]
 
     def _follow_switch(self, before: Standby) -> bool:
         changed = self.switch.current is not before

@@ -7,10 +7,10 @@ from array_api_compat import device
 from fulmar_core.arrays import array_namespace, is_numpy, sum_of
 from fulmar_core.goal import Goal
 from fulmar_core.observation import shares
-from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
 from fulmar_core.simulation import BatchSimulation
+from fulmar_core.state import State
 from fulmar_core.tasks import Task
 
 
@@ -18,8 +18,8 @@ def learning_step(
     robot: Robot,
     task: Task,
     *,
-    before: PlanarState,
-    after: PlanarState,
+    before: State,
+    after: State,
     goal: Goal,
     ended: Goal,
     previous: Array,
@@ -47,8 +47,8 @@ def learning_step(
     penalty = task.penalty(after, goal, robot)
     if penalty is not None:
         reward = reward - penalty
-    xp = array_namespace(after.x)
-    over = xp.zeros(after.x.shape, dtype=xp.bool, device=device(after.x))
+    xp = array_namespace(after.like)
+    over = xp.zeros(after.like.shape, dtype=xp.bool, device=device(after.like))
     away = task.distance_from_goal(after, ended)
     if away is not None:
         over = away > robot.limits.geofence

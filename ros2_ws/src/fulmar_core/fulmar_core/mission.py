@@ -11,7 +11,7 @@ import numpy as np
 
 from fulmar_core.control_loop import ControlLoop
 from fulmar_core.goal import Goal, stack_goals
-from fulmar_core.planar import PlanarState
+from fulmar_core.state import State
 
 # A stamp further ahead is of another clock, as a person's beside a simulation's.
 LONGEST_AHEAD_NS = 600_000_000_000
@@ -166,7 +166,7 @@ class Mission:
         seen = sum(seen_ns == stamp_ns for _, seen_ns in self._things.values())
         return seen < len(self._task.things) or (self._streamed and self.goal_stamp_ns != stamp_ns)
 
-    def distance(self, state: PlanarState) -> float:
+    def distance(self, state: State) -> float:
         """Distance from the current target [m]; 0 where the task has none, infinite before one is known.
 
         Args:
@@ -177,7 +177,7 @@ class Mission:
         distance = self._task.distance_from_goal(state, self._loop.goal)
         return 0.0 if distance is None else float(distance[0])
 
-    def within_tolerance(self, state: PlanarState) -> bool:
+    def within_tolerance(self, state: State) -> bool:
         """Whether a state lies within the task's tolerance of the current target.
 
         Args:

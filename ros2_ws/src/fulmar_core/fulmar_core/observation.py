@@ -7,9 +7,9 @@ from array_api_compat import device
 
 from fulmar_core.arrays import array_namespace, clip, is_numpy
 from fulmar_core.goal import Goal
-from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
+from fulmar_core.state import State
 from fulmar_core.tasks import Task
 
 
@@ -27,7 +27,7 @@ class Observer:
         own = tuple(f"previous_{name}" for name in robot.actuators.names) if self._remembers else ()
         self.names: tuple[str, ...] = (*task.observation_names, *own)
 
-    def __call__(self, state: PlanarState, goal: Goal, previous_command: Array) -> Array:
+    def __call__(self, state: State, goal: Goal, previous_command: Array) -> Array:
         """Observe.
 
         Args:
@@ -39,8 +39,8 @@ class Observer:
             Terms in the order of `names`, shape (..., n).
         """
         terms = self._task.observe(state, goal)
-        xp = array_namespace(state.x)
-        shape = state.x.shape
+        xp = array_namespace(state.like)
+        shape = state.like.shape
         columns = [
             term if getattr(term, "shape", None) == shape else xp.broadcast_to(xp.asarray(term), shape)
             for term in terms

@@ -5,23 +5,24 @@ One array for each quantity, so that thousands of worlds lie side by side in mem
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
-from functools import partial
-from operator import attrgetter, itemgetter
-from typing import Any
+from dataclasses import dataclass
+from typing import ClassVar, Self
 
 import numpy as np
 
 from fulmar_core.arrays import array_namespace
-from fulmar_core.rotation import Array, from_yaw
-from fulmar_core.state import RigidBodyState
+from fulmar_core.rotation import Array, from_yaw, yaw_of
+from fulmar_core.state import POSE, RigidBodyState, State
 
 PlanarWrench = tuple[float, float, float]  # force along the world's x and y [N], yaw moment [N·m]
 
 
 @dataclass(frozen=True, slots=True)
-class PlanarState:
-    """Pose and motion of one body in the plane, or of many; every array has the shape (...,)."""
+class PlanarState(State):
+    """Pose and motion of one body in the plane, or of many; every array has the shape (...,).
+
+    Targets are poses (x [m], y [m], yaw [rad]), or twists (ahead [m/s], to the left [m/s], turn rate [rad/s]).
+    """
 
     x: Array  # in the world [m]
     y: Array  # in the world [m]
@@ -30,14 +31,65 @@ class PlanarState:
     vy: Array  # along the world's y [m/s]
     yaw_rate: Array  # [rad/s]
 
-    def __getitem__(self, index: Any) -> PlanarState:
-        """Pick worlds out of a batch."""
-        return PlanarState(*map(itemgetter(index), _columns(self)))
+    COLUMNS: ClassVar[tuple[str, ...]] = ("x", "y", "yaw", "vx", "vy", "yaw_rate")
 
-    def write(self, index: Any, other: PlanarState) -> None:
-        """Overwrite some worlds of a batch in place, as a reset does."""
-        for name in COLUMNS:
-            getattr(self, name)[index] = getattr(other, name)
+    def columns(self) -> tuple[Array, ...]:
+        """Every array, in the order of `COLUMNS`."""
+        return self.x, self.y, self.yaw, self.vx, self.vy, self.yaw_rate
+
+    @classmethod
+    def from_rigid(cls, state: RigidBodyState) -> Self:
+        """The planar part of a rigid-body state."""
+        position, velocity = state.position_in_world, state.velocity_in_world
+        return cls(
+            position[..., 0],
+            position[..., 1],
+            state.yaw,
+            velocity[..., 0],
+            velocity[..., 1],
+            state.angular_velocity_in_body[..., 2],
+        )
+
+    def to_rigid(self) -> RigidBodyState:
+        """The same with z, roll, pitch and their rates zero."""
+        xp = array_namespace(self.x)
+        zero = xp.zeros_like(self.x)
+        return RigidBodyState(
+            xp.stack((self.x, self.y, zero), axis=-1),
+            from_yaw(self.yaw),
+            xp.stack((self.vx, self.vy, zero), axis=-1),
+            xp.stack((zero, zero, self.yaw_rate), axis=-1),
+        )
+
+    @classmethod
+    def targets_of(cls, rigid: Array) -> Array:
+        """Place and heading of poses, shape (..., 7); or what twists, shape (..., 6), have in the plane."""
+        turn = yaw_of(rigid[..., 3:]) if rigid.shape[-1] == POSE else rigid[..., 5]
+        return array_namespace(rigid).stack((rigid[..., 0], rigid[..., 1], turn), axis=-1)
+
+    @classmethod
+    def rigid_targets(cls, targets: Array, *, twists: bool) -> Array:
+        """Poses, shape (..., 7), or twists, shape (..., 6), of targets in the plane, shape (..., 3)."""
+        xp = array_namespace(targets)
+        x, y, turn = (targets[..., i] for i in range(3))
+        zero = xp.zeros_like(x)
+        if twists:
+            return xp.stack((x, y, zero, zero, zero, turn), axis=-1)
+        return xp.concat((xp.stack((x, y, zero), axis=-1), from_yaw(turn)), axis=-1)
+
+    @property
+    def pose(self) -> Array:
+        """Where it is, as a target, shape (..., 3)."""
+        return array_namespace(self.x).stack((self.x, self.y, self.yaw), axis=-1)
+
+    def distance_to(self, target: Array) -> Array:
+        """Distance from the place of a target, shape (...,) [m]."""
+        dx, dy = target[..., 0] - self.x, target[..., 1] - self.y
+        return array_namespace(dx).sqrt(dx * dx + dy * dy)
+
+    def logged(self) -> dict[str, Array]:
+        """Place, heading, speed and turn rate."""
+        return {"x": self.x, "y": self.y, "yaw": self.yaw, "speed": self.speed, "yaw_rate": self.yaw_rate}
 
     @property
     def speed(self) -> Array:
@@ -48,11 +100,6 @@ class PlanarState:
     def velocity_in_body(self) -> tuple[Array, Array]:
         """Velocity ahead and to the left [m/s]."""
         return to_body(self.yaw, self.vx, self.vy)
-
-
-COLUMNS = tuple(f.name for f in fields(PlanarState))
-_columns = attrgetter(*COLUMNS)
-_float64 = partial(np.asarray, dtype=float)
 
 
 def to_body(yaw: Array, x: Array, y: Array) -> tuple[Array, Array]:
@@ -72,38 +119,3 @@ def at_rest(x: Array, y: Array, yaw: Array) -> PlanarState:
     """A body that stands still at a pose, shapes (...,) [m, m, rad]."""
     zero = array_namespace(x).zeros_like(x)
     return PlanarState(x, y, yaw, zero, zero, zero)
-
-
-def in_float64(state: PlanarState) -> PlanarState:
-    """The same state as NumPy arrays of float64."""
-    return PlanarState(*map(_float64, _columns(state)))
-
-
-def planar_of(state: RigidBodyState) -> PlanarState:
-    """The planar part of a rigid-body state."""
-    position, velocity = state.position_in_world, state.velocity_in_world
-    return PlanarState(
-        position[..., 0],
-        position[..., 1],
-        state.yaw,
-        velocity[..., 0],
-        velocity[..., 1],
-        state.angular_velocity_in_body[..., 2],
-    )
-
-
-def rigid_of(state: PlanarState) -> RigidBodyState:
-    """The rigid-body state of a planar one: z, roll, pitch and their rates are zero."""
-    xp = array_namespace(state.x)
-    zero = xp.zeros_like(state.x)
-    return RigidBodyState(
-        xp.stack((state.x, state.y, zero), axis=-1),
-        from_yaw(state.yaw),
-        xp.stack((state.vx, state.vy, zero), axis=-1),
-        xp.stack((zero, zero, state.yaw_rate), axis=-1),
-    )
-
-
-def stack_planar(states: list[PlanarState], axis: int = 0) -> PlanarState:
-    """Join states of one shape along a new axis, as NumPy."""
-    return PlanarState(*(np.stack([getattr(s, name) for s in states], axis=axis) for name in COLUMNS))

@@ -15,10 +15,10 @@ from fulmar_core.disturbances.scenario import Scenario
 from fulmar_core.episode import draw_episodes, episode_steps
 from fulmar_core.goal import Goal, goal_in_float64
 from fulmar_core.metrics import TargetCounter, Trajectories, TrajectoryLog, join
-from fulmar_core.planar import PlanarState, planar_of, stack_planar
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
 from fulmar_core.simulation import BatchSimulation
+from fulmar_core.state import State
 from fulmar_core.tasks import Task
 from fulmar_core.things import Poses
 
@@ -138,7 +138,9 @@ def roll_out_in_backends(
                 backend.reset(drawn[i], seed=seed, number=each)
                 for i, (backend, each) in enumerate(zip(backends, numbers, strict=False))
             ]
-            worlds = _Backends(backends, samples, robot.timing.substeps(controller.control_hz))
+            worlds = _Backends(
+                backends, samples, robot.timing.substeps(controller.control_hz), task.state_type
+            )
             runs.append(_roll_out(controller, robot, task, worlds, drawn.goal, further))
     return join(runs)
 
@@ -147,12 +149,12 @@ class _Worlds(Protocol):
     """Worlds that are stepped side by side: the core's batch, or as many simulators."""
 
     @property
-    def measured(self) -> PlanarState:
+    def measured(self) -> State:
         """Odometry now, shapes (worlds,)."""
         ...
 
     @property
-    def truth(self) -> PlanarState:
+    def truth(self) -> State:
         """True state now, shapes (worlds,)."""
         ...
 
@@ -187,8 +189,10 @@ def _roll_out(
 class _Backends:
     """Simulators that are stepped side by side."""
 
-    def __init__(self, backends: list[Backend], samples: list[Sample], substeps: int) -> None:
-        self._backends, self._substeps = backends, substeps
+    def __init__(
+        self, backends: list[Backend], samples: list[Sample], substeps: int, form: type[State]
+    ) -> None:
+        self._backends, self._substeps, self._form = backends, substeps, form
         self._take(samples)
 
     def move(self, command: Array) -> None:
@@ -197,6 +201,7 @@ class _Backends:
         self._take([backend.step(each, self._substeps) for backend, each in stepped])
 
     def _take(self, samples: list[Sample]) -> None:
-        self.measured = stack_planar([planar_of(sample.measured) for sample in samples])
-        self.truth = stack_planar([planar_of(sample.truth) for sample in samples if sample.truth is not None])
+        form = self._form
+        self.measured = form.stack([form.from_rigid(sample.measured) for sample in samples])
+        self.truth = form.stack([form.from_rigid(each.truth) for each in samples if each.truth is not None])
         self.things = {name: np.stack([each.things[name] for each in samples]) for name in samples[0].things}

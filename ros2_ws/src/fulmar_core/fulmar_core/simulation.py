@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Generic
 
 import numpy as np
 from array_api_compat import is_numpy_namespace
@@ -19,17 +19,17 @@ from fulmar_core.goal import Goal
 from fulmar_core.motion import actuation_of, control_step, may_be_off_centre, may_open_late
 from fulmar_core.mutable_state import MutableState
 from fulmar_core.observation import Observer, slewed
-from fulmar_core.planar import COLUMNS, PlanarState
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
 from fulmar_core.sensors.odometer import Odometer
+from fulmar_core.state import S
 from fulmar_core.tasks import Task
 from fulmar_core.things import Poses, push_things
 
 ACTUATOR_NOISE = 3  # stream of random numbers, beside those of `counter_rng`
 
 
-class BatchSimulation(MutableState):
+class BatchSimulation(MutableState, Generic[S]):
     """Worlds that step together; each is reset by itself.
 
     Attributes:
@@ -44,8 +44,8 @@ class BatchSimulation(MutableState):
         "_repeats", "_steps", "_noise_keys",
     )  # fmt: skip
 
-    truth: PlanarState
-    measured: PlanarState
+    truth: S
+    measured: S
     goal: Goal
     world: World
 
@@ -139,7 +139,7 @@ class BatchSimulation(MutableState):
         self.command[index] = self._safe[:, 0]
         self.measured = self._odometer.restart(self.truth, index, coming.reading)
 
-    def put(self, state: PlanarState, goal: Goal, command: Array) -> None:
+    def put(self, state: S, goal: Goal, command: Array) -> None:
         """Put every world's robot somewhere else, for drives that begin under way.
 
         Args:
@@ -147,7 +147,7 @@ class BatchSimulation(MutableState):
             goal: What it shall do.
             command: What its actuators do, within their limits, shape (worlds, n).
         """
-        self.truth = PlanarState(*(self._real(getattr(state, name)) for name in COLUMNS))
+        self.truth = state.mapped(self._real)
         self.goal = goal.mapped(self._real)
         self.command = self._real(command)
         self._actuation.hold(self._xp.asarray(self.command.T, copy=True))
@@ -236,7 +236,7 @@ class BatchSimulation(MutableState):
         reading = self._odometer.first(start, world, numbers, repeated)
         return Beginning(start, goal, world, self._actuator_keys(numbers, repeated), reading)
 
-    def _draw_parts(self, worlds: np.ndarray, repeats: np.ndarray) -> tuple[PlanarState, Goal, World]:
+    def _draw_parts(self, worlds: np.ndarray, repeats: np.ndarray) -> tuple[S, Goal, World]:
         drawn = draw_episodes(
             self.robot,
             self.task,
@@ -247,7 +247,7 @@ class BatchSimulation(MutableState):
             training=self.training,
         )
         return (
-            PlanarState(*(self._real(getattr(drawn.start, name)) for name in COLUMNS)),
+            drawn.start.mapped(self._real),
             drawn.goal.mapped(self._side_by_side),
             World(*(self._real(getattr(drawn.world, name)) for name in FIELDS)).packed(),
         )

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from fulmar_core.goal import Goal, stack_goals
-from fulmar_core.planar import PlanarState, stack_planar
 from fulmar_core.robot import Robot
+from fulmar_core.state import State
 from fulmar_core.tasks import Task
 from fulmar_core.things import Poses
 
@@ -62,7 +62,7 @@ class TrajectoryLog:
         self._robot, self._task, self._control_dt = robot, task, control_dt
         self._columns: dict[str, list[np.ndarray]] = {name: [] for name in COLUMNS}
 
-    def add(self, truth: PlanarState, goal: Goal, command: np.ndarray) -> None:
+    def add(self, truth: State, goal: Goal, command: np.ndarray) -> None:
         """Note one control step.
 
         Args:
@@ -73,7 +73,7 @@ class TrajectoryLog:
         for name, kept in self._kept(truth, goal, command):
             self._columns[name].append(kept)
 
-    def add_episode(self, truths: list[PlanarState], goals: list[Goal], commands: list[np.ndarray]) -> None:
+    def add_episode(self, truths: Sequence[State], goals: list[Goal], commands: list[np.ndarray]) -> None:
         """Note all control steps of one episode at once, which costs little more than one of them.
 
         Args:
@@ -83,15 +83,15 @@ class TrajectoryLog:
         """
         each = [goals[0]] if all(goal is goals[0] for goal in goals) else goals
         counted = stack_goals(each)[np.zeros(len(goals), dtype=int)] if len(each) == 1 else stack_goals(each)
-        for name, kept in self._kept(stack_planar(truths), counted, np.stack(commands)):
+        for name, kept in self._kept(self._task.state_type.stack(truths), counted, np.stack(commands)):
             self._columns[name].extend(kept)
 
-    def _kept(self, state: PlanarState, goal: Goal, command: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
+    def _kept(self, state: State, goal: Goal, command: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
         values = _step_columns(self._robot, self._task, state, goal)
         values["shares"] = np.asarray(command) / self._robot.actuators.scale
         for name in COLUMNS:
             value = np.asarray(values[name])
-            shape = value.shape if name == "shares" else np.shape(state.x)
+            shape = value.shape if name == "shares" else np.shape(state.like)
             kept = np.empty(shape, bool if value.dtype == bool else np.float32)
             kept[...] = value
             yield name, kept
@@ -106,21 +106,17 @@ class TrajectoryLog:
         return Trajectories(**arrays, control_dt=self._control_dt)
 
 
-def _step_columns(robot: Robot, task: Task, state: PlanarState, goal: Goal) -> dict[str, np.ndarray]:
+def _step_columns(robot: Robot, task: Task, state: State, goal: Goal) -> dict[str, np.ndarray]:
     errors, touching = task.errors(state, goal), task.collides(state, goal, robot)
     unasked, none = np.asarray(np.nan), np.asarray(False)
     away = task.distance_from_goal(state, goal)
     far = none if away is None else np.asarray(away > robot.limits.geofence)
     return {
-        "x": state.x,
-        "y": state.y,
-        "yaw": state.yaw,
+        **state.logged(),
         "position_error": unasked if errors.position is None else errors.position,
         "heading_error": unasked if errors.heading is None else errors.heading,
         "velocity_error": unasked if errors.velocity is None else errors.velocity,
         "yaw_rate_error": unasked if errors.yaw_rate is None else errors.yaw_rate,
-        "speed": state.speed,
-        "yaw_rate": state.yaw_rate,
         "goals": goal.done,
         "touching": none if touching is None else touching,
         "outside": far,
@@ -134,7 +130,7 @@ class TargetCounter:
         self._task, self._dt, self._steps = task.evaluated, control_dt, 0
         self.goal = goal
 
-    def update(self, truth: PlanarState, things: Poses | None = None) -> Goal:
+    def update(self, truth: State, things: Poses | None = None) -> Goal:
         """The goal after one more control step, by the true state at its end.
 
         Args:

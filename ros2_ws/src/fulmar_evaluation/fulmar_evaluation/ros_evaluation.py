@@ -35,9 +35,9 @@ from fulmar_core.errors import LockstepError, RunFailed
 from fulmar_core.goal import Goal
 from fulmar_core.metrics import TargetCounter, Trajectories, TrajectoryLog, join, select
 from fulmar_core.path_task import evaluated_task
-from fulmar_core.planar import PlanarState, planar_of
 from fulmar_core.process import end_with
 from fulmar_core.robot import load_robot
+from fulmar_core.state import State
 from fulmar_ros.plant_node import PlantNode
 from fulmar_ros.runtime import SWITCH_INTERVAL_S, settle_memory, spinning
 from sim_nodes.sim_node import make_backend
@@ -237,7 +237,7 @@ def _episodes(
         # The same instant twice would be the same goal: the clock moves on between episodes.
         plant.clock.advance(control_dt)
         counter = TargetCounter(task, episode.goal, control_dt)
-        truths: list[PlanarState] = []
+        truths: list[State] = []
         goals: list[Goal] = []
         commands: list[np.ndarray] = []
 
@@ -245,12 +245,12 @@ def _episodes(
             sample: Sample,
             command: np.ndarray,
             counter: TargetCounter = counter,
-            truths: list[PlanarState] = truths,
+            truths: list[State] = truths,
             goals: list[Goal] = goals,
             commands: list[np.ndarray] = commands,
         ) -> None:
             assert sample.truth is not None
-            truths.append(planar_of(sample.truth))
+            truths.append(task.state_type.from_rigid(sample.truth))
             goals.append(counter.update(truths[-1], sample.things))
             commands.append(np.array(command))
 

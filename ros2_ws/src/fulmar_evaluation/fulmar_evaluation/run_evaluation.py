@@ -22,8 +22,9 @@ from fulmar_core.metrics import (
     successes,
 )
 from fulmar_core.mission import LONGEST_AHEAD_NS, SLACK_NS
-from fulmar_core.planar import PlanarState, planar_of
+from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot, load_robot
+from fulmar_core.state import State
 from fulmar_core.tasks import Task, load_recorded_task
 from fulmar_core.trajectories import COLUMNS
 
@@ -110,11 +111,14 @@ def evaluate_run(record: RunRecord) -> RunResult | None:
     if len(motion) < 2 or motion.stamp_s[-1] <= motion.stamp_s[0]:
         return None
     task = load_recorded_task(_text(record, "task"), record.path)
-    goals = _goals(record, task)
+    goals = [replace(goal, targets=task.state_type.targets_of(goal.targets)) for goal in _goals(record, task)]
     robot = load_robot(_text(record, "robot"))
     time_s, samples = _even(motion)
-    states = planar_of(motion.states)
-    things = {name: _at(places, motion.stamp_s[samples]) for name, places in record.things.items()}
+    form = task.state_type
+    states = form.from_rigid(motion.states)
+    things = {
+        name: form.targets_of(_at(places, motion.stamp_s[samples])) for name, places in record.things.items()
+    }
     newest = _newest(record, task, goals)[samples]
     goal = _goals_at(task, goals, newest, record.obstacles, states[samples], states[0], things, time_s[0])
     # Steps one after another have the shape of episodes side by side.
@@ -176,7 +180,11 @@ def _goals(record: RunRecord, task: Task) -> list[GivenGoal]:
         raise BagError(
             f"{record.path}: holds no goal on {task.goal_topic}, and its run information has {asked!r} for one."
         ) from None
-    return [GivenGoal(-np.inf, -np.inf, np.array([[x, y, np.deg2rad(heading_deg)]]))]
+    target = PlanarState.rigid_targets(
+        np.array([[x, y, np.deg2rad(heading_deg)]]), twists=task.goal_topic == "goal_velocity"
+    )
+    twists = task.goal_topic == "goal_velocity"
+    return [GivenGoal(-np.inf, -np.inf, PlanarState.rigid_targets(target, twists=twists))]
 
 
 def _newest(record: RunRecord, task: Task, given: list[GivenGoal]) -> np.ndarray:
@@ -207,14 +215,14 @@ def _goals_at(
     given: list[GivenGoal],
     newest: np.ndarray,
     obstacles: np.ndarray,
-    states: PlanarState,
-    first: PlanarState,
+    states: State,
+    first: State,
     things: dict[str, np.ndarray],
     dt: float,
 ) -> Goal:
     """The goal that counts at each step: its current target alone, shape (n,)."""
     # A thing without a message counts as being where the robot is.
-    unseen = np.stack((states.x, states.y, states.yaw), axis=-1)
+    unseen = states.pose
     things = {thing.name: unseen for thing in task.things} | things
     counted: list[Goal] = []
     number, before, counter = -1, 0.0, None
@@ -235,7 +243,7 @@ def _goals_at(
 
 
 def _at(places: Places, stamp_s: np.ndarray) -> np.ndarray:
-    """Where a thing is at some times, shape (n, 3) [m, m, rad]."""
+    """Where a thing is at some times, shape (n, 7)."""
     return places.pose[np.clip(np.searchsorted(places.stamp_s, stamp_s + 1e-6, side="right") - 1, 0, None)]
 
 

@@ -211,9 +211,9 @@ class ControllerNode(LifecycleNode):
         self.wires.publish_metadata(self._guarded.switch.current.metadata)
 
     def _on_goal(self, message: GoalMessage) -> None:
-        goal, problem = goal_of(message, self._frames)
-        if goal is not None:
-            problem = self._guarded.take_goal(goal, stamp_ns(message.header.stamp), time.monotonic_ns())
+        targets, problem = goal_of(message, self._frames)
+        if targets is not None:
+            problem = self._guarded.take_goal(targets, stamp_ns(message.header.stamp), time.monotonic_ns())
         if problem:
             self.get_logger().warning(f"goal refused: {problem}")
         self._publish_status()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TypeAlias
 
 import numpy as np
@@ -10,8 +11,9 @@ from nav_msgs.msg import Path
 from visualization_msgs.msg import Marker, MarkerArray
 
 from fulmar_core.goal import Goal
+from fulmar_core.planar import PlanarState
 from fulmar_core.robot_name import PLAIN, Frames
-from fulmar_core.rotation import from_yaw
+from fulmar_core.state import State
 from fulmar_ros.convert import stamp_of
 
 GoalMessage: TypeAlias = PointStamped | PoseStamped | Path | PoseArray | TwistStamped
@@ -24,7 +26,9 @@ TYPES: dict[str, type] = {
 }
 
 
-def goal_message(goal: Goal, topic: str, time_ns: int, frames: Frames = PLAIN) -> GoalMessage:
+def goal_message(
+    goal: Goal, topic: str, time_ns: int, frames: Frames = PLAIN, *, form: type[State] = PlanarState
+) -> GoalMessage:
     """A goal as the message of its topic.
 
     Args:
@@ -32,6 +36,7 @@ def goal_message(goal: Goal, topic: str, time_ns: int, frames: Frames = PLAIN) -
         topic: One of `TYPES`.
         time_ns: When it was given; controllers report it back [ns].
         frames: Of the robot.
+        form: State type of the task that the goal is for.
 
     Returns:
         The message, in frame `odom`; velocities in `base_link`.
@@ -39,29 +44,31 @@ def goal_message(goal: Goal, topic: str, time_ns: int, frames: Frames = PLAIN) -
     if topic == "goal_path":
         path = Path()
         path.header.frame_id, path.header.stamp = frames.odom, stamp_of(time_ns)
-        path.poses = [_pose(target, time_ns, frames) for target in np.asarray(goal.targets)]
+        path.poses = [
+            _pose(target, time_ns, frames)
+            for target in form.rigid_targets(np.asarray(goal.targets), twists=False).tolist()
+        ]
         return path
-    target = np.asarray(goal.current)
+    target = form.rigid_targets(np.asarray(goal.current), twists=topic == "goal_velocity").tolist()
     if topic == "goal_velocity":
         twist = TwistStamped()
         twist.header.frame_id, twist.header.stamp = frames.base, stamp_of(time_ns)
-        twist.twist.linear.x, twist.twist.linear.y = float(target[0]), float(target[1])
-        twist.twist.angular.z = float(target[2])
+        v, w = twist.twist.linear, twist.twist.angular
+        v.x, v.y, v.z, w.x, w.y, w.z = target
         return twist
     if topic == "goal_point":
         point = PointStamped()
         point.header.frame_id, point.header.stamp = frames.odom, stamp_of(time_ns)
-        point.point.x, point.point.y = float(target[0]), float(target[1])
+        point.point.x, point.point.y, point.point.z = target[:3]
         return point
     return _pose(target, time_ns, frames)
 
 
-def _pose(target: np.ndarray, time_ns: int, frames: Frames) -> PoseStamped:
+def _pose(target: Sequence[float], time_ns: int, frames: Frames) -> PoseStamped:
     pose = PoseStamped()
     pose.header.frame_id, pose.header.stamp = frames.odom, stamp_of(time_ns)
-    pose.pose.position.x, pose.pose.position.y = float(target[0]), float(target[1])
-    q = pose.pose.orientation
-    q.x, q.y, q.z, q.w = from_yaw(np.asarray(target[2])).tolist()
+    p, q = pose.pose.position, pose.pose.orientation
+    p.x, p.y, p.z, q.x, q.y, q.z, q.w = target
     return pose
 
 

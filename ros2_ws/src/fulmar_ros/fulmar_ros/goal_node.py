@@ -21,7 +21,7 @@ from fulmar_core.goal import Goal
 from fulmar_core.goal_files import GoalFile, load_goals
 from fulmar_core.goal_sequence import STANDSTILL, goal_sequence
 from fulmar_core.paths import config_names
-from fulmar_core.planar import planar_of
+from fulmar_core.planar import PlanarState
 from fulmar_core.robot import load_robot
 from fulmar_core.safety.geofence import OUT_OF_BOUNDS
 from fulmar_core.safety.input_gate import InputGate, Measurement
@@ -135,7 +135,7 @@ class GoalNode(Node):
                 return
             was_done = self._sequence.done
             self._resume(measurement)
-            goal = self._sequence.step(planar_of(measurement.state), self._time_ns / 1e9)
+            goal = self._sequence.step(PlanarState.from_rigid(measurement.state), self._time_ns / 1e9)
             self._publish_progress()
             if self._is_due(goal):
                 self._publish_goal(goal, measurement.stamp_ns)

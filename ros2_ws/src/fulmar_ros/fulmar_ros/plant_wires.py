@@ -19,7 +19,7 @@ from std_msgs.msg import Bool, String
 from std_srvs.srv import Trigger
 
 from fulmar_core.backend import Sample
-from fulmar_core.planar import at_rest, rigid_of
+from fulmar_core.planar import at_rest
 from fulmar_core.process import CONTROL_PRIORITY, take_priority_with_helpers
 from fulmar_core.robot import Robot
 from fulmar_core.safety.actuator_guard import ActuatorGuard
@@ -260,7 +260,7 @@ class PlantWires:
         if name not in self._things:
             wire = thing_wire(name)
             self._things[name] = self._node.create_publisher(PoseStamped, wire.name, self._qos(wire))
-        self._publish(self._things[name], self._write_pose.write(rigid_of(at_rest(*pose)), time_ns))
+        self._publish(self._things[name], self._write_pose.write(at_rest(*pose).to_rigid(), time_ns))
 
     def publish_truth(self, sample: Sample, time_ns: int) -> None:
         """Publish the true state, if the backend knows it and it has a subscriber."""

@@ -3,24 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Generic, Protocol
 
 import numpy as np
 
 from fulmar_core.goal import Goal
 from fulmar_core.health.actuator_estimator import ActuatorEstimate
 from fulmar_core.health.filters import HealthSettings
-from fulmar_core.planar import PlanarState
+from fulmar_core.state import S
 
 
 @dataclass(frozen=True, slots=True)
-class Inputs:
+class Inputs(Generic[S]):
     """Inputs of one control step, of n robots side by side; a node controls one, n = 1.
 
     Arrays are NumPy's, of float64. Lengths are in metres, angles in radians, and the frame is the odometry's.
     """
 
-    state: PlanarState  # as measured, shapes (n,)
+    state: S  # as measured, shapes (n,)
     goal: Goal  # with every target; `goal.current` (n, 3) is the one that counts now
     observation: np.ndarray  # terms of the task and the robot, in the order of `Observer.names`, shape (n, k)
     previous: np.ndarray  # command of the step before, after every limit, shape (n, m)

@@ -20,7 +20,7 @@ from fulmar_core.actuators.thrusters import Thrusters
 from fulmar_core.errors import ConfigError
 from fulmar_core.health.applied import Applied
 from fulmar_core.health.filters import HealthSettings, HoldDetector, PushFilter
-from fulmar_core.planar import COLUMNS, PlanarState
+from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
 
 MOST_LOST = 2
@@ -91,7 +91,9 @@ class ThrusterHealth:
         Returns:
             What is believed now.
         """
-        seen = np.stack([np.asarray(getattr(measured, name), dtype=float) for name in COLUMNS], axis=-1)
+        seen = np.stack(
+            [np.asarray(getattr(measured, name), dtype=float) for name in PlanarState.COLUMNS], axis=-1
+        )
         if self._state is None or self._state.shape[:-2] != seen.shape[:-1]:
             self._begin(seen)
         elif applied is None:

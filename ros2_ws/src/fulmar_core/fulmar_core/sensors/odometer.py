@@ -20,7 +20,7 @@ from fulmar_core.counter_rng import (
 )
 from fulmar_core.disturbances.world import World
 from fulmar_core.mutable_state import MutableState
-from fulmar_core.planar import COLUMNS, PlanarState
+from fulmar_core.planar import PlanarState
 from fulmar_core.rotation import Array, wrap_angle
 
 
@@ -257,9 +257,9 @@ class Odometer(MutableState):
 
 def _columns(state: PlanarState) -> Array:
     """What is measured, shape (6, n)."""
-    return array_namespace(state.x).stack([getattr(state, name) for name in COLUMNS])
+    return array_namespace(state.x).stack([getattr(state, name) for name in PlanarState.COLUMNS])
 
 
 def _state(columns: Array) -> PlanarState:
     """The state of such columns; its arrays are their rows."""
-    return PlanarState(*(columns[i] for i in range(len(COLUMNS))))
+    return PlanarState(*(columns[i] for i in range(len(PlanarState.COLUMNS))))

@@ -14,4 +14,6 @@ class Reading:
 
     value: Any  # of the sensor's own type, without a batch axis; see the sensor's file
     stamp_ns: int | None = None  # when it was measured, on the plant's clock; None: with its sample [ns]
-    covariance: np.ndarray | None = None  # of the value, about the axes that the sensor's file names; None: unknown
+    covariance: np.ndarray | None = (
+        None  # of the value, about the axes that the sensor's file names; None: unknown
+    )

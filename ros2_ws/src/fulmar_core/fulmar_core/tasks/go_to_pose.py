@@ -49,7 +49,7 @@ class PoseReward:
 
 
 @dataclass(frozen=True)
-class GoToPose(Task):
+class GoToPose(Task[PlanarState]):
     """Go to a pose in the plane; the goal arrives on `goal_pose`."""
 
     kind: Literal["go_to_pose"]

@@ -49,7 +49,7 @@ class PositionReward:
 
 
 @dataclass(frozen=True)
-class GoToPosition(Task):
+class GoToPosition(Task[PlanarState]):
     """Go to a position in the plane; the goal arrives on `goal_point`."""
 
     kind: Literal["go_to_position"]

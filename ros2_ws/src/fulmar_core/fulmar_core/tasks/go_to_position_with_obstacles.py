@@ -31,7 +31,7 @@ FINE_WAY_TERMS = ("fine_way_x_in_body", "fine_way_y_in_body", "way_length")
 
 
 @dataclass(frozen=True)
-class GoToPositionWithObstacles(Task):
+class GoToPositionWithObstacles(Task[PlanarState]):
     """Go to a position around discs; the goal arrives on `goal_point`, the discs on `obstacles`."""
 
     kind: Literal["go_to_position_with_obstacles"]

@@ -20,7 +20,7 @@ from fulmar_core.counter_rng import START, Draws
 from fulmar_core.errors import ConfigError, TaskError, did_you_mean
 from fulmar_core.goal import Goal
 from fulmar_core.own_class import construct, load_class, one_line, settings_beside, source_of
-from fulmar_core.planar import COLUMNS, PlanarState
+from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
 from fulmar_core.tasks.task import Task
@@ -101,7 +101,7 @@ def load_own_task(path: str) -> OwnTask:
 
 
 @dataclass(frozen=True)
-class OwnTask(Task):
+class OwnTask(Task[PlanarState]):
     """A user's object behind the interface of tasks: whatever it does wrong becomes one line.
 
     Attributes:
@@ -146,7 +146,7 @@ class OwnTask(Task):
         if not (isinstance(found, tuple) and [type(part) for part in found] == [PlanarState, Goal]):
             raise self._wrong("draw", f"returned {_kind(found)}, it must be a PlanarState and a Goal")
         state, goal = found
-        for name in COLUMNS:
+        for name in PlanarState.COLUMNS:
             value = getattr(state, name)
             if np.shape(value) != (draws.worlds,):
                 raise self._wrong(

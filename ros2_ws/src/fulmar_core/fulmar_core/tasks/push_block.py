@@ -42,7 +42,7 @@ class PushReward:
 
 
 @dataclass(frozen=True)
-class PushBlock(Task):
+class PushBlock(Task[PlanarState]):
     """Push a block to a place; that arrives on `goal_point`, where the block is on `block/pose`."""
 
     kind: Literal["push_block"]

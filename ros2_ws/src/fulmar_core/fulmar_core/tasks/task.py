@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Generic, Self
 
 from fulmar_core.counter_rng import Draws
-from fulmar_core.goal import Goal
+from fulmar_core.goal import Goal, goal_at
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
-from fulmar_core.tasks.terms import Errors, Tolerance, pose_errors
+from fulmar_core.state import S, State
+from fulmar_core.tasks.terms import Errors, Tolerance
 from fulmar_core.things import Thing
 
 
-class Task(ABC):
+class Task(ABC, Generic[S]):
     """Observation, reward, errors and tolerance of one task; free of side effects.
 
     Every array has the leading shape of the state that it goes with.
@@ -26,6 +27,7 @@ class Task(ABC):
         episode_s: Length of an episode [s].
         tolerance: What counts as success.
         required: Targets that make an episode a success; None where a closing window does.
+        state_type: Form of the states that its methods take.
     """
 
     kind: str
@@ -34,6 +36,7 @@ class Task(ABC):
     episode_s: float
     tolerance: Tolerance
     required: int | None = None
+    state_type: type[State] = PlanarState
 
     # A class, a property or a field has these two: dataclasses would take a property of this class for a default.
     if TYPE_CHECKING:
@@ -76,12 +79,20 @@ class Task(ABC):
         """The task with the errors that evaluations use."""
         return self
 
-    def check(self, robot: Robot) -> None:  # noqa: B027 - shipped tasks are checked by their tests
+    def check(self, robot: Robot) -> None:
         """Refuse a task that does not work with a robot, before anything moves.
 
         Raises:
             TaskError: A member of a user's own task raises, or returns what no task returns.
         """
+
+    def goal_of(self, targets: Array) -> Goal:
+        """The goal of one robot from targets that were received.
+
+        Args:
+            targets: Poses in the world, shape (k, 7), or twists in the body's frame, shape (k, 6).
+        """
+        return goal_at(*self.state_type.targets_of(targets))
 
     def fitted(self, robot: Robot) -> Self:
         """The task for a robot: how near it has to come may depend on how well it knows its place."""
@@ -92,15 +103,15 @@ class Task(ABC):
         return goal
 
     @abstractmethod
-    def draw(self, draws: Draws, robot: Robot, *, training: bool) -> tuple[PlanarState, Goal]:
+    def draw(self, draws: Draws, robot: Robot, *, training: bool) -> tuple[S, Goal]:
         """Draw starts and goals, as NumPy float64, leading shape (worlds,)."""
 
     @abstractmethod
-    def observe(self, state: PlanarState, goal: Goal) -> tuple[Array, ...]:
+    def observe(self, state: S, goal: Goal) -> tuple[Array, ...]:
         """Terms in the order of `observation_names`, each of shape (...,)."""
 
     @abstractmethod
-    def reward(self, before: PlanarState, after: PlanarState, goal: Goal, ended: Goal) -> Array:
+    def reward(self, before: S, after: S, goal: Goal, ended: Goal) -> Array:
         """Reward of one control step, shape (...,); actuators cost extra.
 
         Args:
@@ -111,34 +122,34 @@ class Task(ABC):
         """
 
     @abstractmethod
-    def errors(self, state: PlanarState, goal: Goal) -> Errors:
+    def errors(self, state: S, goal: Goal) -> Errors:
         """How far a state is from the current target."""
 
-    def begun(self, goal: Goal, state: PlanarState) -> Goal:
+    def begun(self, goal: Goal, state: S) -> Goal:
         """A goal that was received, for a robot that is somewhere, before its first step."""
         return goal
 
-    def advance(self, goal: Goal, state: PlanarState, time_s: Array) -> Goal:
+    def advance(self, goal: Goal, state: S, time_s: Array) -> Goal:
         """The goal after a measurement: targets may be done, or their time may be over. By default it stays."""
         return goal
 
-    def counted(self, goal: Goal, state: PlanarState, time_s: Array) -> Goal:
+    def counted(self, goal: Goal, state: S, time_s: Array) -> Goal:
         """As `advance`, for evaluations: a target counts within the tolerance."""
         return self.advance(goal, state, time_s)
 
-    def collides(self, state: PlanarState, goal: Goal, robot: Robot) -> Array | None:
+    def collides(self, state: S, goal: Goal, robot: Robot) -> Array | None:
         """Whether a state touches something it must not, shape (...,); None where nothing stands about."""
         return None
 
-    def penalty(self, state: PlanarState, goal: Goal, robot: Robot) -> Array | None:
+    def penalty(self, state: S, goal: Goal, robot: Robot) -> Array | None:
         """What a state costs a learner beside the reward, shape (...,); None: nothing."""
         return None
 
-    def distance_from_goal(self, state: PlanarState, goal: Goal) -> Array | None:
+    def distance_from_goal(self, state: S, goal: Goal) -> Array | None:
         """What the geofence limits, shape (...,) [m]: by default the way to the current target.
 
         None where targets are no places.
         """
         if self.goal_topic == "goal_velocity":
             return None
-        return pose_errors(state, goal.current, heading=False).position
+        return state.distance_to(goal.current)

@@ -33,7 +33,7 @@ class VelocityReward:
 
 
 @dataclass(frozen=True)
-class TrackVelocities(Task):
+class TrackVelocities(Task[PlanarState]):
     """Track a velocity in the body's frame; the target arrives on `goal_velocity`.
 
     Targets are drawn from what the robot can do: up to its speeds, and no faster a turn than its sideways acceleration

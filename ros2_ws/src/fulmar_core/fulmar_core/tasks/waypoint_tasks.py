@@ -60,7 +60,7 @@ class WaypointReward:
 
 
 @dataclass(frozen=True, kw_only=True)
-class WaypointTask(Task):
+class WaypointTask(Task[PlanarState]):
     """Pass targets in their order; they arrive on `goal_path`. Each kind says where its targets lie."""
 
     name: str
