@@ -101,7 +101,7 @@ def test_a_goal_point_is_a_goal_too(tmp_path):
 
     bag = write_run(tmp_path / "bag", Plan(task="go_to_position", duration_s=1.0, goal=(1.0, 2.0, 0.0)))
     (goal,) = read_run(bag).goals
-    assert goal.targets.tolist() == [[1.0, 2.0, 0.0]]
+    assert goal.targets.tolist() == [[1.0, 2.0, 0.0, 0.0, 0.0, 0.0, 1.0]]
 
 
 def test_a_goal_on_a_topic_that_the_task_does_not_receive_is_left_out_and_named(tmp_path):
@@ -113,7 +113,7 @@ def test_a_goal_on_a_topic_that_the_task_does_not_receive_is_left_out_and_named(
         bag.write(f"/floating_platform/{wire}", serialize_message(message), log_ns=1)
     bag.close()
     record = read_run(tmp_path / "bag")
-    assert [goal.targets.tolist() for goal in record.goals] == [[[0.1, 0.0, 0.0]]]
+    assert [goal.targets.tolist() for goal in record.goals] == [[[0.1, 0.0, 0.0, 0.0, 0.0, 0.0]]]
     assert record.warnings == (
         "1 messages of /floating_platform/goal_pose are left out: no goals of the task 'track_velocities'.",
     )

@@ -78,7 +78,7 @@ def test_a_ring_says_that_the_run_time_is_not_evaluated(bag):
 def test_a_robot_that_left_its_area_moves_no_more_without_a_new_goal_as_in_the_node(bag):
     course = control_steps_of(bag)
     x = course.odometry.pose[course.sample, 0]
-    limit = 0.5 * float(course.goals[0].value.current[0] + x.min())  # between the goal and the overshoot
+    limit = 0.5 * float(course.goals[0].value[0, 0] + x.min())  # between the goal and the overshoot
     _, answers = again(guarded(bag, area=[limit, 1e6, -1e6, 1e6]))
     inside = x >= limit
     assert inside[np.argmin(inside) :].any()  # it would have come back

@@ -246,7 +246,7 @@ def test_a_goal_that_is_repeated_with_its_stamp_is_the_same_goal(reached):
 def test_a_velocity_is_evaluated_against_the_target_of_its_time(tmp_path):
     plan = Plan(**{**DRIVEN, "robot": "turtlebot2", "task": "track_velocities"}, duration_s=30.0)
     record = read_run(write_run(tmp_path / "bag", plan))
-    assert [goal.targets.shape for goal in record.goals] == [(1, 3)] * 3
+    assert [goal.targets.shape for goal in record.goals] == [(1, 6)] * 3
     result, summary = evaluate_run(record), summarise(record)
     assert result.run.goals[0, [0, -1]].tolist() == [0.0, 2.0]
     assert 0.0 < summary["velocity_error_m_s"] < 0.2
@@ -270,7 +270,7 @@ def test_of_a_block_its_own_place_counts_and_not_the_robot_s(tmp_path):
     record = read_run(write_run(tmp_path / "bag", plan))
     stamps = record.truth.stamp_s
     x, y = record.goals[0].targets[0, :2]
-    block = Places(stamps, np.tile([x + 0.03, y + 0.04, 0.0], (len(stamps), 1)))
+    block = Places(stamps, np.tile([x + 0.03, y + 0.04, 0.0, 0.0, 0.0, 0.0, 1.0], (len(stamps), 1)))
     info = {**record.info, "task": "push_block"}
     summary = summarise(dataclasses.replace(record, info=info, things={"block": block}))
     assert summary["final_position_error_m"] == pytest.approx(0.05, abs=1e-6)
