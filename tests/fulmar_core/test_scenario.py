@@ -291,7 +291,8 @@ def test_a_world_of_a_batch_is_picked_written_and_cast_whole():
     assert many.mass[1] == other.mass[0]
     assert many.gain[:, 1].tolist() == other.gain[:, 0].tolist()
     assert many.mass[2] == one.mass
-    assert {getattr(many.astype(np.float32), name).dtype for name in FIELDS} == {np.dtype(np.float32)}
+    cast = many.mapped(lambda array: array.astype(np.float32))
+    assert {getattr(cast, name).dtype for name in FIELDS} == {np.dtype(np.float32)}
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -162,8 +163,8 @@ class ControlLoop:
             self._estimator.reset()
         self.estimate, self._estimated_ns = None, -1
 
-    def _estimate(self, state: State, stamp_ns: int) -> None:
-        """Update the estimate by what moved the robot since the last one."""
+    def _estimate(self, state: Any, stamp_ns: int) -> None:
+        """Update the estimate of a robot in the plane by what moved it since the last one."""
         passed_ns = stamp_ns - self._estimated_ns
         if self._estimator is None or passed_ns == 0:  # by the clock, one measurement may serve twice
             return

@@ -10,8 +10,9 @@ from typing import Generic
 
 import numpy as np
 
+from fulmar_core.batch_dynamics import dynamics_of
 from fulmar_core.counter_rng import START, WORLD, Draws
-from fulmar_core.disturbances.scenario import Scenario, draw_world
+from fulmar_core.disturbances.scenario import Scenario
 from fulmar_core.disturbances.world import World
 from fulmar_core.errors import ConfigError
 from fulmar_core.goal import Goal
@@ -75,7 +76,7 @@ def draw_episodes(
     numbers = np.asarray(numbers)
     repeats = np.zeros_like(numbers) if repeats is None else repeats
     start, goal = task.draw(Draws(seed, numbers, repeats, START), robot, training=training)
-    world = draw_world(robot, scenario, Draws(seed, numbers, repeats, WORLD))
+    world = dynamics_of(robot, scenario).draw_world(Draws(seed, numbers, repeats, WORLD))
     return Episode(start, goal, world)
 
 

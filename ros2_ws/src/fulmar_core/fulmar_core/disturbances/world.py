@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from typing import Any
-
-import numpy as np
 
 from fulmar_core.arrays import array_namespace
 from fulmar_core.planar import PlanarState
@@ -95,9 +94,9 @@ class World:
         assert self._packing is not None and other._packing is not None
         self._packing[0][..., index] = other._packing[0][..., index]
 
-    def astype(self, dtype: Any) -> World:
-        """Copy in another NumPy floating type."""
-        return World(*(np.array(getattr(self, name), dtype=dtype) for name in FIELDS))
+    def mapped(self, change: Callable[[Array], Array]) -> World:
+        """The world with every array changed; not packed."""
+        return World(*(change(getattr(self, name)) for name in FIELDS))
 
 
 FIELDS = tuple(f.name for f in fields(World) if f.init)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Generic
 
 import numpy as np
 from array_api_compat import device
@@ -20,8 +21,8 @@ from fulmar_core.counter_rng import (
 )
 from fulmar_core.disturbances.world import World
 from fulmar_core.mutable_state import MutableState
-from fulmar_core.planar import PlanarState
 from fulmar_core.rotation import Array, wrap_angle
+from fulmar_core.state import S
 
 
 @dataclass(frozen=True)
@@ -85,7 +86,7 @@ class FirstReading:
         write_keys(self.keys, index, other.keys)
 
 
-class Odometer(MutableState):
+class Odometer(MutableState, Generic[S]):
     """Measures a batch of worlds, once every `period` seconds; remembers what it held back."""
 
     MUTABLE = ("_past", "_held", "_keys")
@@ -127,12 +128,12 @@ class Odometer(MutableState):
 
     def measure(
         self,
-        truth: PlanarState,
+        truth: S,
         world: World,
         numbers: Array,
         repeats: Array,
         steps: Array,
-    ) -> PlanarState:
+    ) -> S:
         """What is reported now; no world may have begun anew since the last call but by `restart`.
 
         Args:
@@ -147,8 +148,8 @@ class Odometer(MutableState):
         """
         if self._perfect:
             return truth
-        xp = array_namespace(truth.x)
-        columns = _columns(truth)
+        xp = array_namespace(truth.like)
+        columns = self._columns(truth)
         if self._keys is None:
             self._keys = world_keys(self._seed, numbers, repeats, NOISE)
         bits = words(self._keys, steps, self._words)
@@ -162,17 +163,17 @@ class Odometer(MutableState):
         if self._held is not None:
             reading = xp.where(lost & (steps != 0), self._held, reading)
         self._held = reading
-        return _state(reading)
+        return self._state(truth, reading)
 
-    def first(self, truth: PlanarState, world: World, numbers: Array, repeats: Array) -> FirstReading:
+    def first(self, truth: S, world: World, numbers: Array, repeats: Array) -> FirstReading:
         """First measurement of episodes that are to begin; arguments as in `measure`. Changes nothing."""
         keys = world_keys(self._seed, numbers, repeats, NOISE)
-        columns = _columns(truth)
+        columns = self._columns(truth)
         if not self._perfect:
             columns = self._disturbed(columns, world, words(keys, 0, self._words))
         return FirstReading(columns, keys)
 
-    def restart(self, truth: PlanarState, which: Array, first: FirstReading) -> PlanarState:
+    def restart(self, truth: S, which: Array, first: FirstReading) -> S:
         """Forget the past of some worlds, in whose place `first` is reported.
 
         Args:
@@ -191,7 +192,7 @@ class Odometer(MutableState):
         self._held = array_namespace(self._held).asarray(self._held, copy=True)
         for old in (self._held, *self._past):
             old[:, which] = first.columns[:, which]
-        return _state(self._held)
+        return self._state(truth, self._held)
 
     @property
     def _perfect(self) -> bool:
@@ -254,12 +255,12 @@ class Odometer(MutableState):
             chosen = xp.where(back == age, old, chosen)
         return chosen
 
+    @staticmethod
+    def _columns(state: S) -> Array:
+        """What is measured, shape (6, n)."""
+        return array_namespace(state.like).stack(state.columns())
 
-def _columns(state: PlanarState) -> Array:
-    """What is measured, shape (6, n)."""
-    return array_namespace(state.x).stack([getattr(state, name) for name in PlanarState.COLUMNS])
-
-
-def _state(columns: Array) -> PlanarState:
-    """The state of such columns; its arrays are their rows."""
-    return PlanarState(*(columns[i] for i in range(len(PlanarState.COLUMNS))))
+    @staticmethod
+    def _state(truth: S, columns: Array) -> S:
+        """A state in the form of the true one; its arrays are rows of the columns."""
+        return type(truth)(*(columns[i] for i in range(columns.shape[0])))
