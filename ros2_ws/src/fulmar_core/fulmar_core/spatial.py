@@ -1,0 +1,124 @@
+"""Motion in space: what free flyers, their tasks and their controllers compute with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, Self
+
+from fulmar_core.arrays import array_namespace
+from fulmar_core.attitude import Quaternion, Vector, length, minus, turn_back
+from fulmar_core.rotation import Array
+from fulmar_core.state import RigidBodyState, State
+
+
+@dataclass(frozen=True, slots=True)
+class SpatialState(State):
+    """Pose and motion of one rigid body in space, or of many; every array has the shape (...,).
+
+    Targets are poses (x, y, z [m], quaternion x, y, z, w), or twists in the body's frame (three velocities [m/s], three
+    turn rates [rad/s]).
+    """
+
+    x: Array  # in the world [m]
+    y: Array  # in the world [m]
+    z: Array  # in the world [m]
+    qx: Array  # attitude of the body in the world, a unit quaternion [-]
+    qy: Array
+    qz: Array
+    qw: Array
+    vx: Array  # along the world's x [m/s]
+    vy: Array  # along the world's y [m/s]
+    vz: Array  # along the world's z [m/s]
+    wx: Array  # turn rate about the body's x [rad/s]
+    wy: Array  # about the body's y [rad/s]
+    wz: Array  # about the body's z [rad/s]
+
+    COLUMNS: ClassVar[tuple[str, ...]] = (
+        "x", "y", "z", "qx", "qy", "qz", "qw", "vx", "vy", "vz", "wx", "wy", "wz",
+    )  # fmt: skip
+
+    def columns(self) -> tuple[Array, ...]:
+        """Every array, in the order of `COLUMNS`."""
+        return (*self.position, *self.quat, *self.velocity, *self.rate)
+
+    @property
+    def position(self) -> Vector:
+        """In the world [m]."""
+        return self.x, self.y, self.z
+
+    @property
+    def quat(self) -> Quaternion:
+        """Attitude of the body in the world (x, y, z, w)."""
+        return self.qx, self.qy, self.qz, self.qw
+
+    @property
+    def velocity(self) -> Vector:
+        """Along the world's axes [m/s]."""
+        return self.vx, self.vy, self.vz
+
+    @property
+    def rate(self) -> Vector:
+        """Turn rate about the body's axes [rad/s]."""
+        return self.wx, self.wy, self.wz
+
+    @property
+    def velocity_in_body(self) -> Vector:
+        """Velocity along the body's axes [m/s]."""
+        return turn_back(self.quat, self.velocity)
+
+    @classmethod
+    def from_rigid(cls, state: RigidBodyState) -> Self:
+        """The same thirteen numbers."""
+        parts = (
+            state.position_in_world,
+            state.quat_xyzw,
+            state.velocity_in_world,
+            state.angular_velocity_in_body,
+        )
+        return cls(*(part[..., i] for part in parts for i in range(part.shape[-1])))
+
+    def to_rigid(self) -> RigidBodyState:
+        """The same thirteen numbers."""
+        xp = array_namespace(self.x)
+        parts = (self.position, self.quat, self.velocity, self.rate)
+        return RigidBodyState(*(xp.stack(part, axis=-1) for part in parts))
+
+    @classmethod
+    def targets_of(cls, rigid: Array) -> Array:
+        """Poses and twists as they are."""
+        return rigid
+
+    @classmethod
+    def rigid_targets(cls, targets: Array, *, twists: bool) -> Array:
+        """Targets as they are."""
+        return targets
+
+    @property
+    def pose(self) -> Array:
+        """Where it is, as a target, shape (..., 7)."""
+        return array_namespace(self.x).stack((*self.position, *self.quat), axis=-1)
+
+    def distance_to(self, target: Array) -> Array:
+        """Distance from the place of a target, shape (...,) [m]."""
+        return length(minus(position_of(target), self.position))
+
+    def logged(self) -> dict[str, Array]:
+        """Pose, speed and length of the turn rate."""
+        pose = {name: getattr(self, name) for name in self.COLUMNS[:7]}
+        return pose | {"speed": length(self.velocity), "rate": length(self.rate)}
+
+
+def at_rest_in_space(position: Vector, quat: Quaternion) -> SpatialState:
+    """A body that stands still at a pose."""
+    zero = array_namespace(position[0]).zeros_like(position[0])
+    return SpatialState(*position, *quat, *((zero,) * 6))
+
+
+def position_of(target: Array) -> Vector:
+    """Place of a target, shape (..., 7) or (..., 3) [m]."""
+    return target[..., 0], target[..., 1], target[..., 2]
+
+
+def quat_of(target: Array) -> Quaternion:
+    """Attitude of a target, shape (..., 7)."""
+    return target[..., 3], target[..., 4], target[..., 5], target[..., 6]
