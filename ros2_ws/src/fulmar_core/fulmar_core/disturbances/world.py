@@ -5,16 +5,89 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields
-from typing import Any
+from typing import Any, Self
 
 from fulmar_core.arrays import array_namespace
 from fulmar_core.planar import PlanarState
 from fulmar_core.rotation import Array
 
+_NAMES: dict[type, tuple[str, ...]] = {}  # of the fields of each kind of `Drawn` that was met
+
 
 @dataclass(frozen=True, slots=True)
-class World:
-    """Body, actuators, surroundings and sensors of episodes; world axis last.
+class Drawn:
+    """What is drawn for episodes, world axis last: fields of the shape (...,), or (k, ...) with rows of their own."""
+
+    # As of `packed`: every number, and how many rows each field has; 0: one, without an axis for it.
+    _packing: tuple[Array, tuple[int, ...]] | None = field(
+        init=False, repr=False, compare=False, default=None
+    )
+
+    @classmethod
+    def names(cls) -> tuple[str, ...]:
+        """Names of the fields, in the order of the constructor."""
+        if cls not in _NAMES:
+            _NAMES[cls] = tuple(f.name for f in fields(cls) if f.init)
+        return _NAMES[cls]
+
+    def parts(self) -> tuple[Array, ...]:
+        """Every field, in the order of `names`."""
+        return tuple(getattr(self, name) for name in self.names())
+
+    def packed(self) -> Self:
+        """The same with all its numbers in one array: worlds that begin anew cost one call of it, not one for each."""
+        parts = self.parts()
+        xp, axes = array_namespace(parts[0]), parts[0].ndim
+        block = xp.concat([part if part.ndim > axes else part[None] for part in parts])
+        return self._unpacked(block, tuple(part.shape[0] if part.ndim > axes else 0 for part in parts))
+
+    @classmethod
+    def _unpacked(cls, block: Array, rows: tuple[int, ...]) -> Self:
+        """Fields that are views of an array, shape (all rows, ...)."""
+        starts = itertools.accumulate((max(1, count) for count in rows), initial=0)
+        drawn = cls(
+            *(block[at : at + count] if count else block[at] for at, count in zip(starts, rows, strict=False))
+        )
+        object.__setattr__(drawn, "_packing", (block, rows))
+        return drawn
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copies of a packed one are packed; their numbers stay views of one array."""
+        if self._packing is None:
+            return type(self), self.parts()
+        return self._unpacked, self._packing
+
+    def __getitem__(self, index: Any) -> Self:
+        """Pick worlds out of a batch."""
+        if self._packing is not None:
+            block, rows = self._packing
+            return self._unpacked(block[..., index], rows)
+        return self.mapped(lambda part: part[..., index])
+
+    def write(self, index: Any, other: Self) -> None:
+        """Overwrite some worlds of a batch in place."""
+        if self._packing is not None and other._packing is not None:
+            self._packing[0][..., index] = other._packing[0]
+            return
+        for mine, theirs in zip(self.parts(), other.parts(), strict=True):
+            mine[..., index] = theirs
+
+    def adopt(self, index: Any, other: Self) -> None:
+        """Overwrite some worlds by the same ones of another batch, in place; both are packed.
+
+        Worlds that were picked out first, for `write`, cost a view of each field, which takes longer than the copy.
+        """
+        assert self._packing is not None and other._packing is not None
+        self._packing[0][..., index] = other._packing[0][..., index]
+
+    def mapped(self, change: Callable[[Array], Array]) -> Self:
+        """The same with every array changed; not packed."""
+        return type(self)(*map(change, self.parts()))
+
+
+@dataclass(frozen=True, slots=True)
+class World(Drawn):
+    """Body, actuators, surroundings and sensors of episodes in the plane.
 
     Arrays have the shape (...,), those of actuators (n, ...), those of measured columns (6, ...).
     """
@@ -52,64 +125,9 @@ class World:
     sensor_scale: Array  # (6, ...) in the sensors' own standard deviations of scale [-]
     sensor_delay: Array  # beyond the sensors' own [s]
     dropout: Array  # chance that a measurement is lost [-]
-    # As of `packed`: every number, and how many rows each field has; 0: one, without an axis for it.
-    _packing: tuple[Array, tuple[int, ...]] | None = field(
-        init=False, repr=False, compare=False, default=None
-    )
-
-    def packed(self) -> World:
-        """The same with all its numbers in one array: worlds that begin anew cost one call of it, not one for each."""
-        xp = array_namespace(self.mass)
-        parts = [getattr(self, name) for name in FIELDS]
-        axes = self.mass.ndim
-        block = xp.concat([part if part.ndim > axes else part[None] for part in parts])
-        return _unpacked(block, tuple(part.shape[0] if part.ndim > axes else 0 for part in parts))
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Copies of a packed world are packed; their numbers stay views of one array."""
-        if self._packing is None:
-            return World, tuple(getattr(self, name) for name in FIELDS)
-        return _unpacked, self._packing
-
-    def __getitem__(self, index: Any) -> World:
-        """Pick worlds out of a batch."""
-        if self._packing is not None:
-            block, rows = self._packing
-            return _unpacked(block[..., index], rows)
-        return World(*(getattr(self, name)[..., index] for name in FIELDS))
-
-    def write(self, index: Any, other: World) -> None:
-        """Overwrite some worlds of a batch in place."""
-        if self._packing is not None and other._packing is not None:
-            self._packing[0][..., index] = other._packing[0]
-            return
-        for name in FIELDS:
-            getattr(self, name)[..., index] = getattr(other, name)
-
-    def adopt(self, index: Any, other: World) -> None:
-        """Overwrite some worlds by the same ones of another batch, in place; both are packed.
-
-        Worlds that were picked out first, for `write`, cost a view of each field, which takes longer than the copy.
-        """
-        assert self._packing is not None and other._packing is not None
-        self._packing[0][..., index] = other._packing[0][..., index]
-
-    def mapped(self, change: Callable[[Array], Array]) -> World:
-        """The world with every array changed; not packed."""
-        return World(*(change(getattr(self, name)) for name in FIELDS))
 
 
-FIELDS = tuple(f.name for f in fields(World) if f.init)
-
-
-def _unpacked(block: Array, rows: tuple[int, ...]) -> World:
-    """World whose fields are views of an array, shape (all rows, ...)."""
-    starts = itertools.accumulate((max(1, count) for count in rows), initial=0)
-    world = World(
-        *(block[at : at + count] if count else block[at] for at, count in zip(starts, rows, strict=False))
-    )
-    object.__setattr__(world, "_packing", (block, rows))
-    return world
+FIELDS = World.names()
 
 
 def outside_wrench(

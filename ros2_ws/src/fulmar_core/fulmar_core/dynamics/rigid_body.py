@@ -29,7 +29,9 @@ from fulmar_core.attitude import (
 from fulmar_core.rotation import Array
 from fulmar_core.spatial import SpatialState
 
-Tensor = tuple[Array, ...]  # entries xx, yy, zz, xy, xz, yz of a symmetric tensor, or the first three: the rest is zero
+Tensor = tuple[
+    Array, ...
+]  # entries xx, yy, zz, xy, xz, yz of a symmetric tensor, or the first three: the rest is zero
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,17 +105,13 @@ def rigid_body_step(
     k3 = turn_acceleration(_moved(w, half, k2), torque, inertia)
     k4 = turn_acceleration(_moved(w, dt, k3), torque, inertia)
     sixth, third = dt / 6.0, dt / 3.0
-    x, y, z = (
-        w[i] + sixth * (k1[i] + k4[i]) + third * (k2[i] + k3[i]) for i in range(3)
-    )
+    x, y, z = (w[i] + sixth * (k1[i] + k4[i]) + third * (k2[i] + k3[i]) for i in range(3))
     after = x, y, z
     # Hermite's midpoint of the rate, then the fourth-order Magnus expansion in the body's frame (Hairer, Lubich and
     # Wanner, Geometric Numerical Integration, 2006, §IV.7).
     bend = scaled(0.125 * dt, minus(k1, turn_acceleration(after, torque, inertia)))
     swing = scaled(dt * dt / 12.0, cross(w, after))
-    x, y, z = (
-        half * (w[i] + after[i]) + (4.0 * sixth) * bend[i] + swing[i] for i in range(3)
-    )
+    x, y, z = (half * (w[i] + after[i]) + (4.0 * sixth) * bend[i] + swing[i] for i in range(3))
     rotation = x, y, z
     quat = normalised(product(state.quat, exponential(rotation)))
     # Half of the rotation stands for the attitude in the middle of the step.
