@@ -144,7 +144,7 @@ def _body(robot: Robot, calibration: Calibration) -> Robot:
         body, spans = replace(body, mass=mass.value), replace(spans, mass=(mass.low, mass.high))
     if inertia:
         # As in the simulators: roll and pitch grow and shrink with yaw.
-        roll, pitch, yaw = (part * inertia.value / body.inertia[2] for part in body.inertia)
+        roll, pitch, yaw = (part * inertia.value / body.inertia[2] for part in body.inertia[:3])
         body = replace(body, inertia=(roll, pitch, yaw))
         spans = replace(spans, yaw_inertia=(inertia.low, inertia.high))
     if cx and cy:

@@ -6,6 +6,8 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from fulmar_core.actuators.ackermann import Ackermann
 from fulmar_core.actuators.differential_drive import DifferentialDrive
 from fulmar_core.actuators.propellers import Propellers
@@ -15,10 +17,13 @@ from fulmar_core.config import load_config
 from fulmar_core.dynamics.hydrodynamics import Hydrodynamics
 from fulmar_core.errors import ConfigError
 from fulmar_core.paths import config_path
+from fulmar_core.planar import PlanarState
 from fulmar_core.plausibility import check_plausible
 from fulmar_core.plausible_ranges import ROBOT
 from fulmar_core.sensors.imu import ImuSpec
 from fulmar_core.sensors.odometer import OdometrySpec
+from fulmar_core.spatial import SpatialState
+from fulmar_core.state import State
 
 Actuators = Thrusters | Propellers | DifferentialDrive | Ackermann
 Rolling = DifferentialDrive | Ackermann  # families whose wheels do not slip sideways
@@ -31,23 +36,42 @@ class Body:
     """Mass properties and outline of a rigid body."""
 
     mass: float  # [kg]
-    inertia: Vector3  # principal moments about the body axes [kg·m²]
+    inertia: tuple[float, ...]  # about the body axes: xx, yy, zz, or with xy, xz, yz [kg·m²]
     radius: float  # of the circle around the outline seen from above; what must not touch anything [m]
     height: float  # [m]
     planar: bool  # True: only x, y and yaw move
     footprint: tuple[float, float] | None = None  # length and width of a box; None: a disc of `radius` [m]
     footprint_x: float = 0.0  # of the box's centre, ahead of the body's origin [m]
-    center_of_mass: tuple[float, float] = (0.0, 0.0)  # ahead of the body's origin and to its left [m]
+    center_of_mass: tuple[float, ...] = (0.0, 0.0)  # ahead of the body's origin, to its left, and above [m]
 
     def __post_init__(self) -> None:
-        if min(self.mass, self.radius, self.height, *self.inertia) <= 0.0:
+        if len(self.inertia) not in (3, 6) or len(self.center_of_mass) not in (2, 3):
+            raise ValueError("'inertia' needs three or six values, 'center_of_mass' two or three.")
+        if min(self.mass, self.radius, self.height, *self.inertia[:3]) <= 0.0:
             raise ValueError("mass, inertia, radius and height must be greater than 0.")
-        if self.center_of_mass[0] ** 2 + self.center_of_mass[1] ** 2 > self.radius**2:
+        if sum(part * part for part in self.center_of_mass) > self.radius**2:
             raise ValueError(f"'center_of_mass' = {list(self.center_of_mass)} lies outside of the outline.")
-        if 2.0 * max(self.inertia) > sum(self.inertia) * (1.0 + 1e-9):
+        moments = np.linalg.eigvalsh(self.inertia_matrix)
+        if moments[0] <= 0.0 or 2.0 * moments[2] > moments.sum() * (1.0 + 1e-9):
             raise ValueError(
                 f"'inertia' = {list(self.inertia)}: no body has a moment beyond the sum of the two others."
             )
+
+    @property
+    def tensor(self) -> tuple[float, ...]:
+        """Entries xx, yy, zz, xy, xz, yz of the inertia tensor about the centre of mass [kg·m²]."""
+        return (*self.inertia, 0.0, 0.0, 0.0)[:6]
+
+    @property
+    def inertia_matrix(self) -> np.ndarray:
+        """Inertia tensor about the centre of mass in the body's frame, shape (3, 3) [kg·m²]."""
+        xx, yy, zz, xy, xz, yz = self.tensor
+        return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+    @property
+    def com(self) -> tuple[float, ...]:
+        """Centre of mass in the body's frame: x, y, z [m]."""
+        return (*self.center_of_mass, 0.0)[:3]
 
 
 @dataclass(frozen=True)
@@ -187,6 +211,12 @@ class Robot:
     hydrodynamics: Hydrodynamics | None = None  # of a hull that swims
     air_bearing: bool = False  # it floats on air that `air_bearing/enable` switches
 
+    @property
+    def state_type(self) -> type[State]:
+        """Form of its states: in the plane, or, of bodies that neither the floor nor water carries, in space."""
+        free = not self.body.planar and self.hydrodynamics is None and not isinstance(self.actuators, Rolling)
+        return SpatialState if free else PlanarState
+
     def __post_init__(self) -> None:
         if isinstance(self.actuators, Rolling) and self.actuators.track > 2.0 * self.body.radius:
             raise ValueError(
@@ -251,7 +281,7 @@ def use_calibration(path: Path | None, robot: str) -> None:
 
 def _check_spans(robot: Robot, path: Path) -> None:
     """Refuse a body that training under uncertainty would never see: a span was left as it was for another body."""
-    spans, (roll, pitch, yaw) = robot.uncertainty, robot.body.inertia
+    spans, (roll, pitch, yaw) = robot.uncertainty, robot.body.inertia[:3]
     for name, nominal, (low, high) in (
         ("mass", robot.body.mass, spans.mass),
         ("yaw_inertia", yaw, spans.yaw_inertia),

@@ -47,7 +47,7 @@ class BatchSimulation(MutableState, Generic[S]):
     truth: S
     measured: S
     goal: Goal
-    world: World
+    world: Any
 
     def __init__(
         self,
@@ -90,7 +90,7 @@ class BatchSimulation(MutableState, Generic[S]):
         self._repeats = self._whole(np.zeros(worlds))
         self._steps = self._whole(np.zeros(worlds))
         self._noise_keys = self._actuator_keys(self._numbers, self._repeats)
-        self._dynamics: Dynamics[S] = dynamics_of(robot, scenario)
+        self._dynamics: Dynamics[Any, S] = dynamics_of(robot, scenario)
         self._noisy = scenario.actuation.noise > 0.0
         self._odometer = self._dynamics.odometer(seed=seed, period=self.control_dt)
         safe = np.tile(robot.actuators.safe_command[:, None], (1, worlds))

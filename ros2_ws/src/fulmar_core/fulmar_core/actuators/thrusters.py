@@ -11,6 +11,7 @@ from array_api_compat import device
 
 from fulmar_core.actuators.response import Response
 from fulmar_core.arrays import array_namespace, clip
+from fulmar_core.attitude import Vector
 from fulmar_core.rotation import Array
 
 Vector3 = tuple[float, float, float]
@@ -145,6 +146,29 @@ class Thrusters:
         share = 1.0 / clip(_weighted(applied, every), 1.0, None) if self.shared_pressure else 1.0
         ahead, left, moment = (_weighted(thrust, row) * share for row in self._planar_rows)
         return ahead, left, moment
+
+    def spatial_wrench(self, applied: Array, gain: Array) -> tuple[Vector, Vector]:
+        """Force and torque in the body's frame.
+
+        Args:
+            applied: How far each valve is open, shape (n, ...).
+            gain: Factor on each thrust, same shape.
+
+        Returns:
+            Force [N] and torque about the body's origin [N·m], each three arrays of shape (...,).
+        """
+        applied = self._opening(applied)
+        thrust = applied * gain
+        if self.shared_pressure:
+            every: Row = ((1.0, list(range(len(self.nozzles))), []),)
+            thrust = thrust / clip(_weighted(applied, every), 1.0, None)
+        x, y, z, roll, pitch, yaw = (_weighted(thrust, row) for row in self._spatial_rows)
+        return (x, y, z), (roll, pitch, yaw)
+
+    @functools.cached_property
+    def _spatial_rows(self) -> tuple[Row, ...]:
+        """Three forces and three torques as sums over the nozzles."""
+        return tuple(_row(self.thrust * column) for column in self.wrench_per_newton.T)
 
     @functools.cached_property
     def _planar_rows(self) -> tuple[Row, ...]:

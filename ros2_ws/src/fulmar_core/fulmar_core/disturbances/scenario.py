@@ -274,9 +274,9 @@ def draw_world(robot: Robot, scenario: Scenario, draws: Draws) -> World:
     count = len(robot.actuators.names)
     uncertain = 1.0 if scenario.body == "uncertain" else 0.0
     spans = robot.uncertainty
-    mass = _around(robot.body.mass, spans.mass, uncertain, draws)
-    izz = _around(robot.body.inertia[2], spans.yaw_inertia, uncertain, draws)
-    drag = _around(1.0, spans.drag, uncertain, draws)
+    mass = around(robot.body.mass, spans.mass, uncertain, draws)
+    izz = around(robot.body.inertia[2], spans.yaw_inertia, uncertain, draws)
+    drag = around(1.0, spans.drag, uncertain, draws)
     bearing = draws.uniform(-math.pi, math.pi)
     offset = uncertain * draws.uniform(0.0, spans.center_of_mass)
     xp = array_namespace(mass)
@@ -323,7 +323,7 @@ def draw_world(robot: Robot, scenario: Scenario, draws: Draws) -> World:
         com_y=robot.body.center_of_mass[1] + offset * xp.sin(bearing),
         drag=drag,
         gain=gain.T,
-        alive=_survivors(lottery, chances, faults, together),
+        alive=survivors(lottery, chances, faults, together),
         action_noise=zero + faults.noise * noise,
         action_delay=faults.delay_s * delay,
         opening_delay=valves * opening_delay,
@@ -353,13 +353,13 @@ def draw_world(robot: Robot, scenario: Scenario, draws: Draws) -> World:
     )
 
 
-def _around(nominal: float, span: Range, uncertain: float, draws: Draws) -> Array:
+def around(nominal: float, span: Range, uncertain: float, draws: Draws) -> Array:
     """Between the ends of a span where the body is `uncertain` (1), the nominal value where it is not (0)."""
     drawn = draws.uniform(span[0], span[1])
     return nominal + uncertain * (drawn - nominal)
 
 
-def _survivors(
+def survivors(
     lottery: Array, chances: Array, faults: Actuation, together: tuple[tuple[int, ...], ...]
 ) -> Array:
     """1 for actuators that work, 0 for those that failed, shape (n, worlds).

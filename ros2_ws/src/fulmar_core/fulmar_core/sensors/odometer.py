@@ -63,15 +63,6 @@ class OdometrySpec:
         if min(self.rate_hz, self.delay_s) < 0.0:
             raise ValueError("rate_hz and delay_s must not be negative.")
 
-    @property
-    def channels(self) -> tuple[Channel, ...]:
-        """Of x, y, yaw, v_x, v_y and the turn rate."""
-        return self.position, self.position, self.heading, self.velocity, self.velocity, self.yaw_rate
-
-    def column(self, part: str) -> np.ndarray:
-        """One number of each channel, shape (6, 1)."""
-        return np.array([[getattr(channel, part)] for channel in self.channels])
-
 
 @dataclass(frozen=True, slots=True)
 class FirstReading:
@@ -90,6 +81,8 @@ class Odometer(MutableState, Generic[S]):
     """Measures a batch of worlds, once every `period` seconds; remembers what it held back."""
 
     MUTABLE = ("_past", "_held", "_keys")
+    LOST = 6  # which random word of a measurement says whether it is lost
+    WORDS, BLURRED_WORDS = 7, 10  # random words for a measurement of one world; with velocities that err
 
     def __init__(
         self,
@@ -113,6 +106,7 @@ class Odometer(MutableState, Generic[S]):
         """
         spec = spec if noisy else OdometrySpec()
         self._spec, self._seed, self._noisy, self._period = spec, seed, noisy, period
+        self._channels = self.channels(spec)
         self._blurred = blurred
         # Of the calls that bring a new reading.
         self._share = min(1.0, spec.rate_hz * period) if spec.rate_hz else 1.0
@@ -121,7 +115,7 @@ class Odometer(MutableState, Generic[S]):
         longest = spec.delay_s + max_delay_s if noisy else 0.0
         self._depth = int(np.ceil(longest / period - 1e-9)) + 1 if longest > 0.0 else 1
         self._constants: dict[str, Array] = {}
-        self._used = {part for part in Channel.__dataclass_fields__ if np.any(spec.column(part) != 0.0)}
+        self._used = {part for part in Channel.__dataclass_fields__ if np.any(self._column(part) != 0.0)}
         self._past: list[Array] = []  # readings, newest first
         self._held: Array | None = None
         self._keys: Keys | None = None
@@ -156,7 +150,7 @@ class Odometer(MutableState, Generic[S]):
         reading = self._disturbed(columns, world, bits)
         if self._depth > 1:
             reading = self._delayed(reading, world)
-        lost = uniform_from(bits[6], columns.dtype) < (world.dropout if self._noisy else 0.0)
+        lost = uniform_from(bits[self.LOST], columns.dtype) < (world.dropout if self._noisy else 0.0)
         if self._share < 1.0:
             due = xp.astype(steps, columns.dtype) * self._share + 1e-4
             lost = lost | (xp.floor(due) == xp.floor(due - self._share))
@@ -198,15 +192,23 @@ class Odometer(MutableState, Generic[S]):
     def _perfect(self) -> bool:
         return not (self._noisy or self._blurred)
 
+    @staticmethod
+    def channels(spec: OdometrySpec) -> tuple[Channel, ...]:
+        """Of x, y, yaw, v_x, v_y and the turn rate."""
+        return spec.position, spec.position, spec.heading, spec.velocity, spec.velocity, spec.yaw_rate
+
     @property
     def _words(self) -> int:
-        """Random words for a measurement of one world."""
-        return 10 if self._blurred else 7
+        return self.BLURRED_WORDS if self._blurred else self.WORDS
+
+    def _column(self, part: str) -> np.ndarray:
+        """One number of each channel, shape (k, 1)."""
+        return np.array([[getattr(channel, part)] for channel in self._channels])
 
     def _constant(self, part: str, like: Array) -> Array:
         if part not in self._constants:
             xp = array_namespace(like)
-            self._constants[part] = xp.asarray(self._spec.column(part), dtype=like.dtype, device=device(like))
+            self._constants[part] = xp.asarray(self._column(part), dtype=like.dtype, device=device(like))
         return self._constants[part]
 
     def _disturbed(self, columns: Array, world: World, bits: Array) -> Array:

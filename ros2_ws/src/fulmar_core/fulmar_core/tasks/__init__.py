@@ -15,6 +15,7 @@ from fulmar_core.paths import config_path
 from fulmar_core.plausibility import check_plausible
 from fulmar_core.plausible_ranges import TASK
 from fulmar_core.tasks.go_to_pose import GoToPose
+from fulmar_core.tasks.go_to_pose_3d import GoToPose3d
 from fulmar_core.tasks.go_to_position import GoToPosition
 from fulmar_core.tasks.go_to_position_with_obstacles import GoToPositionWithObstacles
 from fulmar_core.tasks.own_task import load_own_task
@@ -37,6 +38,7 @@ ShippedTask = (  # what a file of `configs/tasks` can be
     | RaceWayposes
     | RaceGates
     | PushBlock
+    | GoToPose3d
 )
 _asked_for: set[str] = set()  # dotted paths that this process was given, in the place of what a bag names
 

@@ -63,9 +63,19 @@ class Tolerance:
     velocity: float = 0.0  # [m/s]
     yaw_rate_deg: float = 0.0  # [deg/s]
     hold_s: float = 0.0  # length of the window [s]
+    attitude_deg: float = 0.0  # of the angle between attitudes in space [deg]
+    rate_deg: float = 0.0  # of the length of the turn rate's error in space [deg/s]
 
     def __post_init__(self) -> None:
-        values = (self.position, self.heading_deg, self.velocity, self.yaw_rate_deg, self.hold_s)
+        values = (
+            self.position,
+            self.heading_deg,
+            self.velocity,
+            self.yaw_rate_deg,
+            self.hold_s,
+            self.attitude_deg,
+            self.rate_deg,
+        )
         if min(values) < 0.0 or max(values) == 0.0:
             raise ValueError("tolerances must not be negative, and one must be greater than 0.")
 
@@ -76,6 +86,8 @@ class Tolerance:
             (errors.heading, math.radians(self.heading_deg)),
             (errors.velocity, self.velocity),
             (errors.yaw_rate, math.radians(self.yaw_rate_deg)),
+            (errors.attitude, math.radians(self.attitude_deg)),
+            (errors.rate, math.radians(self.rate_deg)),
         )
         return np.asarray(
             np.logical_and.reduce([np.abs(error) <= limit for error, limit in pairs if limit > 0.0])
@@ -90,6 +102,8 @@ class Errors:
     heading: Array = None  # (...,) in [-pi, pi] [rad]
     velocity: Array = None  # (...,) >= 0 [m/s]
     yaw_rate: Array = None  # (...,) [rad/s]
+    attitude: Array = None  # (...,) angle of the rotation to the target in space, in [0, pi] [rad]
+    rate: Array = None  # (...,) length of the error of a turn rate in space, >= 0 [rad/s]
 
 
 def pose_errors(state: PlanarState, target: Array, *, heading: bool) -> Errors:

@@ -1,0 +1,129 @@
+"""One draw of a scenario for each world of a body in space, and the push that follows from it.
+
+Of a scenario's parts a wave, a tether and a slope belong to robots on the floor, and mean nothing here.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from fulmar_core.arrays import array_namespace
+from fulmar_core.attitude import Vector, uniform_direction
+from fulmar_core.counter_rng import Draws
+from fulmar_core.disturbances.scenario import Scenario, around, check_delays, survivors
+from fulmar_core.disturbances.world import Drawn
+from fulmar_core.robot import Robot
+from fulmar_core.rotation import Array
+
+SENSED = 12  # errors of the odometry: three each of place, attitude, velocity and turn rate
+
+
+@dataclass(frozen=True, slots=True)
+class SpatialWorld(Drawn):
+    """Body, actuators, surroundings and sensors of episodes in space.
+
+    Arrays have the shape (...,), vectors (3, ...), those of actuators (n, ...), those of measured columns (12, ...).
+    """
+
+    mass: Array  # [kg]
+    inertia: Array  # (6, ...) xx, yy, zz, xy, xz, yz about the centre of mass [kg·m²]
+    com: Array  # (3, ...) centre of mass in the body's frame [m]
+    gain: Array  # (n, ...) factor on what each actuator does [-]
+    alive: Array  # (n, ...) 1, or 0 for an actuator that stays closed or still [-]
+    action_noise: Array  # largest error of an actuator, of full command, anew at each control step [-]
+    action_delay: Array  # until a command acts, beyond the actuators' own, at most one control step [s]
+    opening_delay: Array  # until a valve that was closed is open, beyond that; it closes without it [s]
+    force: Array  # (3, ...) constant, in the world [N]
+    torque: Array  # (3, ...) constant, in the body's frame, as of a leak [N·m]
+    kick: Array  # (3, ...) force of a kick that lasts one control step, in the world [N]
+    kick_period: Array  # from kick to kick [s]
+    noise: Array  # factor on the sensors' noise [-]
+    velocity_noise: Array  # largest error of each measured velocity, anew with each measurement [m/s]
+    rate_noise: Array  # same for each turn rate [rad/s]
+    sensor_bias: Array  # (12, ...) in the sensors' own standard deviations of bias [-]
+    sensor_scale: Array  # (12, ...) in the sensors' own standard deviations of scale [-]
+    sensor_delay: Array  # beyond the sensors' own [s]
+    dropout: Array  # chance that a measurement is lost [-]
+
+
+def push_in_world(world: SpatialWorld, time_s: Array, control_dt: float) -> Vector:
+    """Force of the surroundings, held over a control step, along the world's axes [N].
+
+    Args:
+        world: What surrounds the body.
+        time_s: Time in each episode, shape (...,) [s].
+        control_dt: Length of a kick [s].
+    """
+    xp = array_namespace(world.mass)
+    since = time_s - world.kick_period * xp.floor(time_s / world.kick_period)
+    kicking = (since < control_dt) & (time_s >= world.kick_period)
+    share = xp.where(kicking, xp.ones_like(world.mass), xp.zeros_like(world.mass))
+    x, y, z = (world.force[i] + share * world.kick[i] for i in range(3))
+    return x, y, z
+
+
+def draw_spatial_world(robot: Robot, scenario: Scenario, draws: Draws) -> SpatialWorld:
+    """Draw the worlds of some episodes, as `disturbances.scenario.draw_world` does in the plane.
+
+    The same numbers are drawn whatever the scenario. Directions are uniform over the sphere; the whole inertia tensor
+    grows with the `yaw_inertia` of the robot's `uncertainty` over its own.
+
+    Raises:
+        ConfigError: The robot cannot have this scenario; see `check_delays`.
+    """
+    check_delays(robot, scenario)
+    count, spans, sensing = len(robot.actuators.names), robot.uncertainty, scenario.sensing
+    uncertain = 1.0 if scenario.body == "uncertain" else 0.0
+    faults, push, kick = scenario.actuation, scenario.push, scenario.kick
+    mass = around(robot.body.mass, spans.mass, uncertain, draws)
+    izz = robot.body.inertia[2]
+    growth = around(izz, spans.yaw_inertia, uncertain, draws) / izz
+    offset = uncertain * draws.uniform(0.0, spans.center_of_mass)
+    aside = _direction(draws)
+    force = robot.performance.force * push.force * draws.uniform(push.least, 1.0)
+    towards = _direction(draws)
+    torque = robot.performance.torque * push.torque * draws.uniform(push.least, 1.0)
+    about = _direction(draws)
+    kick_size = robot.performance.force * kick.force * draws.uniform(0.0, 1.0)
+    kick_period, kick_towards = draws.uniform(*kick.every_s), _direction(draws)
+    low, high = faults.gain
+    gain = low + (high - low) * draws.uniform(0.0, 1.0, count)
+    lottery, chances = draws.uniform(0.0, 1.0, count), draws.uniform(0.0, 1.0, count)
+    delay, noise = draws.uniform(0.0, 1.0), draws.uniform(faults.least_noise, 1.0)
+    opening = draws.uniform(*faults.opening_delay_s)
+    bias, scale = draws.normal(1.0, SENSED), draws.normal(1.0, SENSED)
+    sensor_delay, dropout = draws.uniform(0.0, 1.0), draws.uniform(0.0, 1.0)
+    velocity_noise, rate_noise = (
+        draws.uniform(*sensing.velocity_noise),
+        draws.uniform(*sensing.yaw_rate_noise),
+    )
+    xp = array_namespace(mass)
+    if robot.actuators.response.gain:
+        gain = gain * xp.asarray(robot.actuators.response.gain, dtype=gain.dtype)
+    own = 1.0 if scenario.sensor_noise else 0.0  # what the robot's YAML says of its sensors
+    zero = xp.zeros_like(mass)
+    return SpatialWorld(
+        mass=mass,
+        inertia=xp.stack([growth * entry for entry in robot.body.tensor]),
+        com=xp.stack([nominal + offset * part for nominal, part in zip(robot.body.com, aside, strict=True)]),
+        gain=gain.T,
+        alive=survivors(lottery, chances, faults, ()),
+        action_noise=zero + faults.noise * noise,
+        action_delay=faults.delay_s * delay,
+        opening_delay=(1.0 if robot.actuators.binary else 0.0) * opening,
+        force=xp.stack([force * part for part in towards]),
+        torque=xp.stack([torque * part for part in about]),
+        kick=xp.stack([kick_size * part for part in kick_towards]),
+        kick_period=kick_period,
+        noise=zero + own * sensing.noise,
+        velocity_noise=velocity_noise,
+        rate_noise=rate_noise,
+        sensor_bias=(own * sensing.bias * bias).T,
+        sensor_scale=(own * sensing.bias * scale).T,
+        sensor_delay=sensing.delay_s * sensor_delay,
+        dropout=sensing.dropout * dropout,
+    )
+
+
+def _direction(draws: Draws) -> Vector:
+    return uniform_direction(draws.uniform(0.0, 1.0), draws.uniform(0.0, 1.0))
