@@ -23,6 +23,9 @@ FIGURES = {
     "final_heading_error_deg": Figure(
         "final heading error", "°", "Size of the heading error at the last step.", "less",
     ),
+    "final_attitude_error_deg": Figure(
+        "final attitude error", "°", "Angle of the rotation to the goal's attitude at the last step.", "less",
+    ),
     "time_to_target_s": Figure(
         "time to target", "s",
         "Time from which the episode stays inside every tolerance until its end; an episode that does not has "
@@ -64,6 +67,10 @@ FIGURES = {
     ),
     "yaw_rate_error_deg_s": Figure(
         "turn-rate error", "°/s", "Size of wanted minus true turn rate, mean over the whole episode.", "less",
+    ),
+    "rate_error_deg_s": Figure(
+        "turn-rate error", "°/s", "Length of wanted minus true turn rate in space, mean over the whole episode.",
+        "less",
     ),
     "settling_time_s": Figure(
         "settling time", "s",

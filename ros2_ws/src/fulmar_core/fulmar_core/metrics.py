@@ -58,14 +58,17 @@ def episode_metrics(run: Trajectories, task: Task) -> dict[str, np.ndarray]:
     inside = _inside(run, task)
     if not counts and _asked(run.position_error):
         figures["final_position_error_m"] = run.position_error[:, -1]
-    if not counts and _asked(run.heading_error):
-        figures["final_heading_error_deg"] = np.abs(np.rad2deg(run.heading_error[:, -1]))
+    turned = _turned(run)
+    if not counts and _asked(turned):
+        kind = "heading" if run.attitude_error is None else "attitude"
+        figures[f"final_{kind}_error_deg"] = np.rad2deg(turned[:, -1])
     if counts:
         figures["goals_reached"] = run.goals[:, -1]
         figures["time_to_first_goal_s"] = _first(run.goals >= 1.0, run)
     elif tracks:
         figures["velocity_error_m_s"] = _mean(run.velocity_error)
-        figures["yaw_rate_error_deg_s"] = np.rad2deg(_mean(np.abs(run.yaw_rate_error)))
+        kind = "yaw_rate" if run.rate_error is None else "rate"
+        figures[f"{kind}_error_deg_s"] = np.rad2deg(_mean(_rate_error(run)))
         figures["settling_time_s"], figures["targets_held_percent"] = _by_target(inside, run, task)
     else:
         figures["time_to_target_s"] = _time_to_target(inside, run)
@@ -75,9 +78,9 @@ def episode_metrics(run: Trajectories, task: Task) -> dict[str, np.ndarray]:
     if not counts and _asked(run.position_error):
         for centimetres in (5, 2, 1):
             figures[f"PT{centimetres}_percent"] = 100.0 * _mean(run.position_error < 0.01 * centimetres)
-    if not counts and _asked(run.heading_error):
+    if not counts and _asked(turned):
         for degrees in (5, 2, 1):
-            figures[f"OT{degrees}_percent"] = 100.0 * _mean(np.abs(np.rad2deg(run.heading_error)) < degrees)
+            figures[f"OT{degrees}_percent"] = 100.0 * _mean(np.rad2deg(turned) < degrees)
     figures["ALV_m_s"] = _mean(run.speed)
     figures["AAV_rad_s"] = _mean(np.abs(run.yaw_rate))
     figures["AAS"] = _mean(run.actuators_in_use)
@@ -127,6 +130,16 @@ def _asked(column: np.ndarray) -> bool:
     return not bool(np.isnan(column[:1, :1]).all())
 
 
+def _turned(run: Trajectories) -> np.ndarray:
+    """Size of the heading error, or in space the attitude error, shape (episodes, steps) [rad]."""
+    return np.abs(run.heading_error) if run.attitude_error is None else run.attitude_error
+
+
+def _rate_error(run: Trajectories) -> np.ndarray:
+    """Size of the turn rate's error, shape (episodes, steps) [rad/s]."""
+    return np.abs(run.yaw_rate_error) if run.rate_error is None else run.rate_error
+
+
 def _window(run: Trajectories, task: Task) -> int:
     """Control steps of the closing window."""
     return max(1, round(task.tolerance.hold_s / run.control_dt))
@@ -134,7 +147,14 @@ def _window(run: Trajectories, task: Task) -> int:
 
 def _inside(run: Trajectories, task: Task) -> np.ndarray:
     """Where an episode is inside every tolerance that the task has, shape (episodes, steps)."""
-    errors = Errors(run.position_error, run.heading_error, run.velocity_error, run.yaw_rate_error)
+    errors = Errors(
+        run.position_error,
+        run.heading_error,
+        run.velocity_error,
+        run.yaw_rate_error,
+        run.attitude_error,
+        run.rate_error,
+    )
     return task.tolerance.holds(errors)
 
 
@@ -180,6 +200,7 @@ def _thesis_successes(run: Trajectories, task: Task) -> np.ndarray:
         return np.asarray(run.goals[:, -1] >= 1.0)
     if _asked(run.velocity_error):
         slow = _mean(run.velocity_error) <= task.tolerance.velocity
-        steady = _mean(np.abs(run.yaw_rate_error)) <= np.deg2rad(task.tolerance.yaw_rate_deg)
+        limit_deg = task.tolerance.yaw_rate_deg if run.rate_error is None else task.tolerance.rate_deg
+        steady = _mean(_rate_error(run)) <= np.deg2rad(limit_deg)
         return np.asarray(slow & steady)
     return np.asarray(_inside(run, task)[:, -1])

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import ClassVar, Self
 
 from fulmar_core.arrays import array_namespace
-from fulmar_core.attitude import Quaternion, Vector, length, minus, turn_back
+from fulmar_core.attitude import Quaternion, Vector, euler_of, length, minus, turn_back
 from fulmar_core.rotation import Array
 from fulmar_core.state import RigidBodyState, State
 
@@ -103,9 +103,9 @@ class SpatialState(State):
         return length(minus(position_of(target), self.position))
 
     def logged(self) -> dict[str, Array]:
-        """Pose, speed and length of the turn rate."""
-        pose = {name: getattr(self, name) for name in self.COLUMNS[:7]}
-        return pose | {"speed": length(self.velocity), "rate": length(self.rate)}
+        """Place, yaw, speed and length of the turn rate."""
+        place = {"x": self.x, "y": self.y, "z": self.z, "yaw": euler_of(self.quat)[2]}
+        return place | {"speed": length(self.velocity), "yaw_rate": length(self.rate)}
 
 
 def at_rest_in_space(position: Vector, quat: Quaternion) -> SpatialState:

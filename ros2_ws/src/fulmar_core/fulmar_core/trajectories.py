@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -27,12 +28,26 @@ class Trajectories:
     velocity_error: np.ndarray  # (episodes, steps) [m/s]
     yaw_rate_error: np.ndarray  # (episodes, steps) [rad/s]
     speed: np.ndarray  # (episodes, steps) [m/s]
-    yaw_rate: np.ndarray  # (episodes, steps) [rad/s]
+    yaw_rate: np.ndarray  # (episodes, steps) about the vertical; in space the length of the turn rate [rad/s]
     shares: np.ndarray  # (episodes, steps, actuators) command as a share of the largest one, signed [-]
     goals: np.ndarray  # (episodes, steps) targets reached, or over, so far
     touching: np.ndarray  # (episodes, steps) whether the robot is at an obstacle
     outside: np.ndarray  # (episodes, steps) whether it is beyond the geofence
     control_dt: float  # [s]
+    # In space alone:
+    z: np.ndarray | None = None  # (episodes, steps) [m]
+    attitude_error: np.ndarray | None = None  # (episodes, steps) [rad]
+    rate_error: np.ndarray | None = None  # (episodes, steps) [rad/s]
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the arrays that it has."""
+        return tuple(name for name in COLUMNS if getattr(self, name) is not None)
+
+    def mapped(self, change: Callable[[np.ndarray], np.ndarray]) -> Trajectories:
+        """The same with every array changed."""
+        arrays: dict[str, Any] = {name: change(getattr(self, name)) for name in self.columns}
+        return dataclasses.replace(self, **arrays)
 
     @property
     def actuators_in_use(self) -> np.ndarray:
@@ -52,6 +67,7 @@ class Trajectories:
 
 
 COLUMNS = tuple(field.name for field in dataclasses.fields(Trajectories) if field.name != "control_dt")
+IN_SPACE = ("z", "attitude_error", "rate_error")  # columns that robots in the plane have not
 
 
 class TrajectoryLog:
@@ -60,7 +76,9 @@ class TrajectoryLog:
     def __init__(self, robot: Robot, task: Task, control_dt: float) -> None:
         """Begin empty; `control_dt` in seconds."""
         self._robot, self._task, self._control_dt = robot, task, control_dt
-        self._columns: dict[str, list[np.ndarray]] = {name: [] for name in COLUMNS}
+        in_space = "z" in task.state_type.COLUMNS
+        self._names = tuple(name for name in COLUMNS if in_space or name not in IN_SPACE)
+        self._columns: dict[str, list[np.ndarray]] = {name: [] for name in self._names}
 
     def add(self, truth: State, goal: Goal, command: np.ndarray) -> None:
         """Note one control step.
@@ -89,7 +107,7 @@ class TrajectoryLog:
     def _kept(self, state: State, goal: Goal, command: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
         values = _step_columns(self._robot, self._task, state, goal)
         values["shares"] = np.asarray(command) / self._robot.actuators.scale
-        for name in COLUMNS:
+        for name in self._names:
             value = np.asarray(values[name])
             shape = value.shape if name == "shares" else np.shape(state.like)
             kept = np.empty(shape, bool if value.dtype == bool else np.float32)
@@ -99,10 +117,10 @@ class TrajectoryLog:
     def trajectories(self) -> Trajectories:
         """Everything noted so far; the log is empty afterwards."""
         arrays = {}
-        for name in COLUMNS:
+        for name in self._names:
             steps = np.stack(self._columns.pop(name), axis=-2 if name == "shares" else -1)
             arrays[name] = steps[None] if steps.ndim == (2 if name == "shares" else 1) else steps
-        self._columns = {name: [] for name in COLUMNS}
+        self._columns = {name: [] for name in self._names}
         return Trajectories(**arrays, control_dt=self._control_dt)
 
 
@@ -117,6 +135,8 @@ def _step_columns(robot: Robot, task: Task, state: State, goal: Goal) -> dict[st
         "heading_error": unasked if errors.heading is None else errors.heading,
         "velocity_error": unasked if errors.velocity is None else errors.velocity,
         "yaw_rate_error": unasked if errors.yaw_rate is None else errors.yaw_rate,
+        "attitude_error": unasked if errors.attitude is None else errors.attitude,
+        "rate_error": unasked if errors.rate is None else errors.rate,
         "goals": goal.done,
         "touching": none if touching is None else touching,
         "outside": far,
@@ -147,17 +167,17 @@ def join(runs: list[Trajectories]) -> Trajectories:
     """One set of trajectories out of several of equal length and rate."""
     if len(runs) == 1:
         return runs[0]
-    arrays = {name: np.concatenate([getattr(run, name) for run in runs]) for name in COLUMNS}
-    return Trajectories(**arrays, control_dt=runs[0].control_dt)
+    arrays: dict[str, Any] = {
+        name: np.concatenate([getattr(run, name) for run in runs]) for name in runs[0].columns
+    }
+    return dataclasses.replace(runs[0], **arrays)
 
 
 def select(run: Trajectories, episodes: np.ndarray) -> Trajectories:
     """Some episodes of a set, in the order of their indices."""
-    arrays = {name: getattr(run, name)[episodes] for name in COLUMNS}
-    return Trajectories(**arrays, control_dt=run.control_dt)
+    return run.mapped(lambda array: array[episodes])
 
 
 def first_steps(run: Trajectories, steps: int) -> Trajectories:
     """The beginning of every episode: so many control steps, or all there are."""
-    arrays = {name: getattr(run, name)[:, :steps] for name in COLUMNS}
-    return Trajectories(**arrays, control_dt=run.control_dt)
+    return run.mapped(lambda array: array[:, :steps])

@@ -26,7 +26,6 @@ from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.state import State
 from fulmar_core.tasks import Task, load_recorded_task
-from fulmar_core.trajectories import COLUMNS
 
 LATE_NS = 1_000_000_000  # in real time a goal comes at most so long after its stamp
 
@@ -124,10 +123,7 @@ def evaluate_run(record: RunRecord) -> RunResult | None:
     # Steps one after another have the shape of episodes side by side.
     log = TrajectoryLog(robot, task, float(time_s[0]))
     log.add(states[samples], goal, _applied(record.actuation, robot, motion.stamp_s[0] + time_s - time_s[0]))
-    columns = log.trajectories()
-    run = Trajectories(
-        **{name: np.swapaxes(getattr(columns, name), 0, 1) for name in COLUMNS}, control_dt=float(time_s[0])
-    )
+    run = log.trajectories().mapped(lambda array: np.swapaxes(array, 0, 1))
     return RunResult(
         robot=robot,
         task=task,

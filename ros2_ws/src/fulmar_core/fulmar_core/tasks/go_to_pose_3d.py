@@ -11,7 +11,6 @@ from fulmar_core.goal import Goal, goals_at
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
 from fulmar_core.spatial import SpatialState
-from fulmar_core.state import State
 from fulmar_core.tasks.space_terms import (
     ATTITUDE_TERMS,
     FINE_ATTITUDE_TERMS,
@@ -61,7 +60,7 @@ class GoToPose3d(Task[SpatialState]):
     reward_weights: SpacePoseReward
 
     goal_topic: ClassVar[str] = "goal_pose"
-    state_type: ClassVar[type[State]] = SpatialState
+    state_type = SpatialState
     observation_names: ClassVar[tuple[str, ...]] = (
         *POSITION_TERMS,
         *FINE_TERMS,
