@@ -17,13 +17,16 @@ from fulmar_core.plausible_ranges import TASK
 from fulmar_core.tasks.go_to_pose import GoToPose
 from fulmar_core.tasks.go_to_pose_3d import GoToPose3d
 from fulmar_core.tasks.go_to_position import GoToPosition
+from fulmar_core.tasks.go_to_position_3d import GoToPosition3d
 from fulmar_core.tasks.go_to_position_with_obstacles import GoToPositionWithObstacles
 from fulmar_core.tasks.own_task import load_own_task
 from fulmar_core.tasks.push_block import PushBlock
 from fulmar_core.tasks.race_gates import RaceGates
 from fulmar_core.tasks.task import Task
 from fulmar_core.tasks.track_velocities import TrackVelocities
+from fulmar_core.tasks.track_velocities_3d import TrackVelocities3d
 from fulmar_core.tasks.waypoint_tasks import GoThroughPoses, GoThroughPositions, RaceWaypoints, RaceWayposes
+from fulmar_core.tasks.waypoints_3d import GoThroughPoses3d, GoThroughPositions3d
 
 __all__ = ["ShippedTask", "Task", "load_recorded_task", "load_task"]
 
@@ -38,7 +41,11 @@ ShippedTask = (  # what a file of `configs/tasks` can be
     | RaceWayposes
     | RaceGates
     | PushBlock
+    | GoToPosition3d
     | GoToPose3d
+    | TrackVelocities3d
+    | GoThroughPositions3d
+    | GoThroughPoses3d
 )
 _asked_for: set[str] = set()  # dotted paths that this process was given, in the place of what a bag names
 

@@ -1,0 +1,81 @@
+"""Reach a position in space, whatever the attitude, and stay there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+from fulmar_core.arrays import array_namespace
+from fulmar_core.attitude import length
+from fulmar_core.counter_rng import Draws
+from fulmar_core.goal import Goal, goals_at
+from fulmar_core.robot import Robot
+from fulmar_core.rotation import Array
+from fulmar_core.spatial import SpatialState
+from fulmar_core.tasks.space_terms import (
+    FINE_TERMS,
+    MOTION_TERMS,
+    POSITION_TERMS,
+    SpaceStart,
+    fine_terms,
+    goal_terms,
+    motion_terms,
+    place_errors,
+)
+from fulmar_core.tasks.task import Task
+from fulmar_core.tasks.terms import Errors, Tolerance
+
+
+@dataclass(frozen=True)
+class SpacePositionReward:
+    """Weights of the reward, per control step; d is the distance to the goal."""
+
+    position: float  # times exp(-d / 0.25 m): RANS 3-D GoToPosition
+    far: float  # times exp(-d / 2 m): leads in from metres away
+    near: float  # times exp(-d / 0.1 m): asks for centimetres
+    approach: float  # times metres come nearer
+    spin: float  # cost of the turn rate [per rad/s]
+
+
+@dataclass(frozen=True)
+class GoToPosition3d(Task[SpatialState]):
+    """Go to a position in space; the goal arrives on `goal_point`."""
+
+    kind: Literal["go_to_position_3d"]
+    name: str
+    title: str
+    episode_s: float  # length of an episode [s]
+    start: SpaceStart
+    tolerance: Tolerance
+    fine_distance: float  # where the magnified position saturates [m]
+    reward_weights: SpacePositionReward
+
+    goal_topic: ClassVar[str] = "goal_point"
+    state_type = SpatialState
+    observation_names: ClassVar[tuple[str, ...]] = (*POSITION_TERMS, *FINE_TERMS, *MOTION_TERMS)
+
+    def draw(self, draws: Draws, robot: Robot, *, training: bool) -> tuple[SpatialState, Goal]:
+        """Draw starts and goals; see `Task.draw`."""
+        start, target = self.start.draw_in_space(draws, training=training)
+        return start, goals_at(target)
+
+    def observe(self, state: SpatialState, goal: Goal) -> tuple[Array, ...]:
+        """What every controller of this task sees; see `Task.observe`."""
+        way = goal_terms(state, goal.current)
+        return (*way, *fine_terms(way, saturation=self.fine_distance), *motion_terms(state))
+
+    def reward(self, before: SpatialState, after: SpatialState, goal: Goal, ended: Goal) -> Array:
+        """Reward of one control step; see `Task.reward`."""
+        xp, w = array_namespace(after.x), self.reward_weights
+        old, d = self.errors(before, goal).position, self.errors(after, goal).position
+        return (
+            w.position * xp.exp(-d / 0.25)
+            + w.far * xp.exp(-d / 2.0)
+            + w.near * xp.exp(-d / 0.1)
+            + w.approach * (old - d)
+            - w.spin * length(after.rate)
+        )
+
+    def errors(self, state: SpatialState, goal: Goal) -> Errors:
+        """Distance from the goal."""
+        return place_errors(state, goal.current, attitude=False)
