@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 
 from fulmar_core.actuators.ackermann import Ackermann
+from fulmar_core.actuators.rolling import Rolling
 from fulmar_core.actuators.thrusters import Thrusters
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.dynamics.contact import outline_of
 from fulmar_core.episode import draw_episode
 from fulmar_core.paths import config_names
-from fulmar_core.robot import Rolling, load_robot
+from fulmar_core.robot import load_robot
 from fulmar_core.safety.watchdog import default_timeout
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import load_task

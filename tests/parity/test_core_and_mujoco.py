@@ -7,13 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fulmar_core.actuators.rolling import Rolling
 from fulmar_core.disturbances.scenario import Actuation, load_scenario
 from fulmar_core.episode import Episode, draw_episode
 from fulmar_core.goal import goal_at
 from fulmar_core.observation import slewed
 from fulmar_core.paths import config_names
 from fulmar_core.planar import PlanarState, planar_of
-from fulmar_core.robot import Rolling, load_robot
+from fulmar_core.robot import load_robot
 from fulmar_core.rollout import roll_out_in_backends, roll_out_in_batch
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import load_task
