@@ -51,7 +51,7 @@ def linearise(robot: Robot, state: PlanarState, command: np.ndarray, dt: float) 
     off_centre = any(robot.body.center_of_mass)
 
     def moved(states: np.ndarray, commands: np.ndarray) -> np.ndarray:
-        world = _nominal(robot, states.shape[1])
+        world = nominal_worlds(robot, states.shape[1])
         actuation = actuation_of(robot, commands)
         actuation.begin(commands, world, None)
         still = (np.zeros(states.shape[1]),) * 3
@@ -69,9 +69,9 @@ def linearise(robot: Robot, state: PlanarState, command: np.ndarray, dt: float) 
 
     trim = _columns(state)
     each = np.tile(command[:, None], 2 * STATES)
-    a = _slopes(lambda states: moved(states, each), trim - DELTA, trim + DELTA)
+    a = slopes(lambda states: moved(states, each), trim - DELTA, trim + DELTA)
     held = np.tile(trim[:, None], 2 * len(command))
-    b = _slopes(lambda commands: moved(held, commands), low, high, around=command)
+    b = slopes(lambda commands: moved(held, commands), low, high, around=command)
     return LinearModel(a, b)
 
 
@@ -99,22 +99,23 @@ def linearise_wrench(robot: Robot, state: PlanarState, wrench: np.ndarray, dt: f
 
     def moved(inputs: np.ndarray) -> np.ndarray:
         count = inputs.shape[1]
-        world, still = _nominal(robot, count), (np.zeros(count),) * 3
+        world, still = nominal_worlds(robot, count), (np.zeros(count),) * 3
         now, push = PlanarState(*inputs[:STATES]), (inputs[6], inputs[7], inputs[8])
         for _ in range(robot.timing.substeps(1.0 / dt)):
             now = free_body_step(now, push, still, world, robot.hydrodynamics, robot.timing.physics_dt)
         return _columns(now)
 
-    slopes = _slopes(moved, trim - DELTA, trim + DELTA)
-    return LinearModel(slopes[:, :STATES], slopes[:, STATES:])
+    both = slopes(moved, trim - DELTA, trim + DELTA)
+    return LinearModel(both[:, :STATES], both[:, STATES:])
 
 
-def _slopes(
+def slopes(
     function: Callable[[np.ndarray], np.ndarray],
     low: np.ndarray,
     high: np.ndarray,
     *,
     around: np.ndarray | None = None,
+    spans: np.ndarray | None = None,
 ) -> np.ndarray:
     """Change of a function per change of each input alone, shape (m, n).
 
@@ -123,6 +124,7 @@ def _slopes(
         low: Smallest value of each input, shape (n,).
         high: Largest, shape (n,).
         around: What the others stay at, shape (n,); halfway by default.
+        spans: What counts as the change of each input, shape (n,); from low to high by default.
     """
     count = len(low)
     middle = 0.5 * (low + high) if around is None else around
@@ -130,7 +132,8 @@ def _slopes(
     diagonal = np.arange(count)
     inputs[diagonal, diagonal], inputs[diagonal, count + diagonal] = high, low
     results = function(inputs)
-    return np.asarray((results[:, :count] - results[:, count:]) / (high - low))
+    spans = high - low if spans is None else spans
+    return np.asarray((results[:, :count] - results[:, count:]) / spans)
 
 
 def _columns(state: PlanarState) -> np.ndarray:
@@ -138,7 +141,7 @@ def _columns(state: PlanarState) -> np.ndarray:
     return np.stack([np.asarray(getattr(state, name), dtype=float) for name in COLUMNS])
 
 
-def _nominal(robot: Robot, count: int) -> World:
+def nominal_worlds(robot: Robot, count: int) -> World:
     """Worlds without any disturbance."""
     calm = Scenario("calm", sensor_noise=False, body="nominal")
     return draw_world(robot, calm, Draws(0, np.zeros(count), np.zeros(count)))
