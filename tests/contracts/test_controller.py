@@ -19,14 +19,14 @@ from fulmar_core.health.filters import HealthSettings
 from fulmar_core.paths import config_names
 from fulmar_core.planar import at_rest
 from fulmar_core.policy_bundle import read_passport
-from fulmar_core.robot import load_robot
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import load_task
 from policy_server.controllers import CONTROLLERS, Choice, load_controller, shipped_policies
 from tests.inputs import some_of
+from tests.new_robots import robots_of_every_family
 from tests.pairs import covering
 
-ROBOTS = {name: load_robot(name) for name in config_names("robots")}
+ROBOTS = robots_of_every_family()
 TASKS = {name: load_task(name) for name in config_names("tasks")}
 LEARNED = {
     (passport.robot, passport.task): str(folder)
