@@ -7,7 +7,7 @@ import time
 
 import numpy as np
 
-from fulmar_core.actuators.actuation import slowdown
+from fulmar_core.actuators.refuge import slowdown
 from fulmar_core.backend import AirBearing, Sample
 from fulmar_core.episode import Episode
 from fulmar_core.errors import DeviceError
@@ -50,7 +50,7 @@ class DriverBackend:
             Exception: None of them could be sent; raised by the last one.
         """
         safe = self.robot.actuators.safe_command
-        for command in slowdown(self.robot.actuators, self._sent, STOP_PERIOD_S):
+        for command in slowdown(self.robot.actuators.refuge, self._sent, safe, STOP_PERIOD_S):
             if self._failure(command) is not None:
                 break
             time.sleep(STOP_PERIOD_S)

@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from fulmar_core.actuators.rolling import Rolling
 from fulmar_core.dynamics.hydrodynamics import GRAVITY
 from fulmar_core.errors import SafetyError
 from fulmar_core.paths import config_names
 from fulmar_core.planar import PlanarState
-from fulmar_core.robot import Rolling, load_robot
+from fulmar_core.robot import load_robot
 
 mujoco = pytest.importorskip("mujoco")
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
-from fulmar_core.actuators.ackermann import Ackermann
-from fulmar_core.actuators.differential_drive import DifferentialDrive
-from fulmar_core.actuators.propellers import Propellers
-from fulmar_core.actuators.thrusters import Thrusters
+from fulmar_core.actuators.families import FAMILIES
+from fulmar_core.actuators.family import Actuators
+from fulmar_core.actuators.pushing import Pushing
+from fulmar_core.actuators.rolling import Rolling
 from fulmar_core.calibration import VARIABLE, calibrated, calibration_in_use, load_calibration
-from fulmar_core.config import load_config
+from fulmar_core.config import Kinds, load_config
 from fulmar_core.dynamics.hydrodynamics import Hydrodynamics
 from fulmar_core.errors import ConfigError
 from fulmar_core.paths import config_path
@@ -20,8 +21,6 @@ from fulmar_core.plausible_ranges import ROBOT
 from fulmar_core.sensors.imu import ImuSpec
 from fulmar_core.sensors.odometer import OdometrySpec
 
-Actuators = Thrusters | Propellers | DifferentialDrive | Ackermann
-Rolling = DifferentialDrive | Ackermann  # families whose wheels do not slip sideways
 Range = tuple[float, float]
 Vector3 = tuple[float, float, float]
 
@@ -179,7 +178,7 @@ class Robot:
     body: Body
     uncertainty: Uncertainty
     timing: Timing
-    actuators: Actuators
+    actuators: Annotated[Actuators, Kinds(FAMILIES)]
     performance: Performance
     costs: Costs
     sensors: Sensors
@@ -195,8 +194,8 @@ class Robot:
             )
         if self.hydrodynamics is not None and isinstance(self.actuators, Rolling):
             raise ValueError("'hydrodynamics' and wheels exclude one another.")
-        if self.air_bearing and not (isinstance(self.actuators, Thrusters) and self.hydrodynamics is None):
-            raise ValueError("'air_bearing' is for robots on the floor with thrusters; leave it out.")
+        if self.air_bearing and not (isinstance(self.actuators, Pushing) and self.hydrodynamics is None):
+            raise ValueError("'air_bearing' is for robots on the floor with thrusters or fans; leave it out.")
         late_s = self.actuators.response.latest_s
         if self.timing.is_over_within(late_s):
             raise ValueError(
@@ -220,7 +219,7 @@ def load_robot(name: str) -> Robot:
         raise ConfigError(
             f"{path}: 'name' is '{robot.name}', the file's own name is '{name}'. Make them equal."
         )
-    check_plausible(robot, ROBOT, path)
+    check_plausible(robot, (*ROBOT, *robot.actuators.plausible), path)
     _check_spans(robot, path)
     calibration = calibration_in_use()
     if calibration is None or calibration.robot != name:

@@ -9,7 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from fulmar_core.actuators.differential_drive import DifferentialDrive
 from fulmar_core.robot import Robot
 
 Source = Literal["plant", "controller", "operator", "every node", "device"]
@@ -208,4 +207,4 @@ def goal_wires(topic: str) -> tuple[Wire, ...]:
 
 def command_wire(robot: Robot) -> Wire:
     """Where a robot's commands come in."""
-    return VELOCITY_COMMAND if isinstance(robot.actuators, DifferentialDrive) else COMMAND
+    return VELOCITY_COMMAND if robot.actuators.takes_velocity else COMMAND
