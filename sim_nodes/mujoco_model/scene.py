@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Protocol
 
 import mujoco
@@ -27,7 +28,7 @@ from sim_nodes.mujoco_model.objects import (
 from sim_nodes.mujoco_model.scenery import add_scenery, add_sensors
 
 # Families on wheels each have a chassis of their own; all that push share `Floater`.
-WHEELED = {"differential_drive": DifferentialBase, "ackermann": Car}
+WHEELED: dict[str, Callable[[Robot], RobotModel]] = {"differential_drive": DifferentialBase, "ackermann": Car}
 PALE, WATER = [0.85, 0.87, 0.9, 1.0], [0.55, 0.75, 0.85, 1.0]
 
 

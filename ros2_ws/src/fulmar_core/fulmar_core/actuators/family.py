@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import functools
 from abc import ABC, abstractmethod
-from typing import ClassVar
+from dataclasses import Field
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -35,6 +36,7 @@ class Actuators(ABC):
 
     kind: str
     response: Response
+    __dataclass_fields__: ClassVar[dict[str, Field[Any]]]  # every family is a frozen dataclass
 
     law: ClassVar[str] = ""
     excitation: ClassVar[Excitation | None] = None

@@ -110,4 +110,4 @@ class ThrustAllocation:
 
 def _rows(rows: np.ndarray, matrix: np.ndarray) -> np.ndarray:
     """Rows (r, k) times the transpose of a matrix (n, k), in one order whatever the number of rows."""
-    return np.einsum("rk,nk->rn", rows, matrix)
+    return np.asarray(np.einsum("rk,nk->rn", rows, matrix))
