@@ -22,6 +22,8 @@ from fulmar_core.disturbances.world import World
 from fulmar_core.mutable_state import MutableState
 from fulmar_core.planar import COLUMNS, PlanarState
 from fulmar_core.rotation import Array, wrap_angle
+from fulmar_core.sensors.kind import SensorKind
+from fulmar_core.wire import Wire
 
 
 @dataclass(frozen=True)
@@ -263,3 +265,16 @@ def _columns(state: PlanarState) -> Array:
 def _state(columns: Array) -> PlanarState:
     """The state of such columns; its arrays are their rows."""
     return PlanarState(*(columns[i] for i in range(len(COLUMNS))))
+
+
+KIND = SensorKind(
+    spec=OdometrySpec,
+    wire=Wire(
+        "odom", "nav_msgs/msg/Odometry", "plant", "stream", "every plant tick",
+        "measured pose and twist, stamped at measurement", unit="m, m/s, rad/s",
+        frame="`odom`; twist in `base_link`",
+    ),
+    frame="odom",
+    message=None,
+    simulate=None,  # part of the batch, as an `Odometer`
+)  # fmt: skip
