@@ -91,6 +91,13 @@ def _rotation(vector: np.ndarray) -> np.ndarray:
     return np.append(share * vector, np.cos(0.5 * angle))
 
 
+def _write(reading: Reading, _spec: StarTrackerSpec) -> list[float]:
+    attitude = np.asarray(reading.value, dtype=float)
+    if attitude.shape != (4,) or not abs(float(np.linalg.norm(attitude)) - 1.0) < 1e-3:
+        raise ValueError(f"{attitude.tolist()} must be a unit quaternion x, y, z, w")
+    return list(attitude.tolist())
+
+
 KIND = SensorKind(
     spec=StarTrackerSpec,
     wire=Wire(
@@ -101,7 +108,7 @@ KIND = SensorKind(
     frame="inertial",
     message=MessageFields(
         paths=("quaternion.x", "quaternion.y", "quaternion.z", "quaternion.w"),
-        write=lambda reading, _spec: np.asarray(reading.value, dtype=float).tolist(),
+        write=_write,
         read=lambda values: Reading(np.array(values, dtype=float)),
     ),
     simulate=StarTracker,
