@@ -32,19 +32,22 @@ class Sample:
     @property
     def odometry(self) -> RigidBodyState | None:
         """Measured motion, without a batch axis; None: somebody else measures it."""
-        return self._value("odometry")
+        value: RigidBodyState | None = self._value("odometry")
+        return value
 
     @property
     def measured(self) -> RigidBodyState:
         """The odometry of a backend that measures it, such as every simulator."""
-        if self.odometry is None:
+        odometry = self.odometry
+        if odometry is None:
             raise ValueError("this backend does not measure where it is.")
-        return self.odometry
+        return odometry
 
     @property
     def imu(self) -> ImuSample | None:
         """The reading of the inertial unit; None: the robot has none."""
-        return self._value("imu")
+        value: ImuSample | None = self._value("imu")
+        return value
 
     def _value(self, sensor: str) -> Any:
         reading = self.readings.get(sensor)
