@@ -156,7 +156,7 @@ def _with_every_sensor(cls: Class) -> Class:
     """Give a class a field for each row of the table of sensors; a robot has those that its file names."""
     for name, kind in SENSORS.items():
         if name not in cls.__annotations__:
-            cls.__annotations__[name] = kind.spec
+            cls.__annotations__[name] = kind.spec  # not optional: a key without a value is a mistake
             setattr(cls, name, None)
     return cls
 

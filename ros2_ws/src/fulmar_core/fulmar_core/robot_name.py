@@ -61,11 +61,6 @@ class Frames:
         """The body."""
         return f"{self.prefix}base_link"
 
-    @property
-    def imu(self) -> str:
-        """The inertial sensor."""
-        return f"{self.prefix}imu_link"
-
     def named(self, frame: str) -> str:
         """A frame as messages name it: with the prefix, unless all robots share it."""
         return frame if frame in SHARED else f"{self.prefix}{frame}"
