@@ -40,8 +40,8 @@ class DriverBackend:
         applied = self._write(np.asarray(command, dtype=float))
         report = self._driver.read()
         if report is None:
-            return Sample(None, None, None, applied=applied)
-        return Sample(report.odometry, report.imu, None, stamp_ns=report.stamp_ns, applied=applied)
+            return Sample({}, None, applied=applied)
+        return Sample(report.readings, None, stamp_ns=report.stamp_ns, applied=applied)
 
     def make_safe(self) -> None:
         """Slow wheels down, then send the safe command several times, with time for each to arrive.

@@ -31,6 +31,7 @@ from fulmar_core.topics import (
     OBSERVATION,
     OBSTACLES,
     ODOMETRY,
+    SENSOR_WIRES,
     STATUS,
     TELEOP,
     TRUTH,
@@ -166,7 +167,9 @@ def plant_spec(plan: RunPlan, *, port: str = "") -> NodeSpec:
             "hardware_drivers.driver_node",
             parameters,
             inputs=(command_wire(load_robot(plan.robot)).name,),
-            outputs=tuple(dict.fromkeys((ACTUATORS_STATE.name, IMU.name, paced_wire(plan).name))),
+            outputs=tuple(
+                dict.fromkeys((ACTUATORS_STATE.name, *_sensor_topics(plan), paced_wire(plan).name))
+            ),
         )
     parameters |= _motion_capture(plan)
     things = tuple(thing.wire.name for thing in load_task(plan.task).things)
@@ -178,7 +181,22 @@ def plant_spec(plan: RunPlan, *, port: str = "") -> NodeSpec:
         "sim_nodes.sim_node",
         parameters,
         inputs=(command_wire(load_robot(plan.robot)).name,),
-        outputs=(CLOCK.name, TRUTH.name, ACTUATORS_STATE.name, IMU.name, *odometry, *poses, *things),
+        outputs=(
+            CLOCK.name,
+            TRUTH.name,
+            ACTUATORS_STATE.name,
+            *_sensor_topics(plan),
+            *odometry,
+            *poses,
+            *things,
+        ),
+    )
+
+
+def _sensor_topics(plan: RunPlan) -> tuple[str, ...]:
+    """Topics of a robot's sensors but the odometry, which may come from another node."""
+    return tuple(
+        SENSOR_WIRES[name].name for name in load_robot(plan.robot).sensors.specs if name != "odometry"
     )
 
 

@@ -29,14 +29,14 @@ from fulmar_core.robot import Robot
 from fulmar_core.safety.geofence import NO_AREA
 from fulmar_core.safety.watchdog import default_timeout
 from fulmar_core.tasks import Task
-from fulmar_core.topics import COMMAND, IMU, MOCAP, ODOMETRY, TRUTH, VELOCITY_COMMAND
+from fulmar_core.topics import COMMAND, MOCAP, SENSOR_WIRES, TRUTH, VELOCITY_COMMAND
 from hardware_drivers.own_driver import check_own_driver
 from hardware_drivers.settings import TOPIC_DRIVERS, UNARMED, MavlinkBoat, load_hardware
 from policy_server.controllers import EXTERNAL, FALLBACKS, controller_entry, shipped_policies, shipped_policy
 
 # Topics between plant, controller and estimator. Goals, e-stop and status keep their names: the run itself and every
 # other command of `fulmar` use them.
-REMAPPABLE = tuple(wire.name for wire in (MOCAP, ODOMETRY, IMU, TRUTH, COMMAND, VELOCITY_COMMAND))
+REMAPPABLE = tuple(wire.name for wire in (MOCAP, *SENSOR_WIRES.values(), TRUTH, COMMAND, VELOCITY_COMMAND))
 TOPIC = re.compile(r"/?[A-Za-z][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*")
 
 

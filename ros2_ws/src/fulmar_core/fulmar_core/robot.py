@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, TypeVar
 
 from fulmar_core.actuators.families import FAMILIES
 from fulmar_core.actuators.family import Actuators
@@ -20,9 +20,11 @@ from fulmar_core.plausibility import check_plausible
 from fulmar_core.plausible_ranges import ROBOT
 from fulmar_core.sensors.imu import ImuSpec
 from fulmar_core.sensors.odometer import OdometrySpec
+from fulmar_core.sensors.table import RANGES, SENSORS
 
 Range = tuple[float, float]
 Vector3 = tuple[float, float, float]
+Class = TypeVar("Class", bound=type)
 
 
 @dataclass(frozen=True)
@@ -148,12 +150,27 @@ class Timing:
         return round(ratio)
 
 
+def _with_every_sensor(cls: Class) -> Class:
+    """Give a class a field for each row of the table of sensors; a robot has those that its file names."""
+    for name, kind in SENSORS.items():
+        if name not in cls.__annotations__:
+            cls.__annotations__[name] = kind.spec  # not optional: a key without a value is a mistake
+            setattr(cls, name, None)
+    return cls
+
+
 @dataclass(frozen=True)
+@_with_every_sensor
 class Sensors:
-    """What the robot measures."""
+    """What the robot measures: two that every robot has, and by name any other row of `SENSORS`."""
 
     odometry: OdometrySpec
     imu: ImuSpec
+
+    @property
+    def specs(self) -> dict[str, Any]:
+        """The robot's sensors by name, in the order of the table."""
+        return {name: spec for name in SENSORS if (spec := getattr(self, name)) is not None}
 
 
 @dataclass(frozen=True)
@@ -219,7 +236,7 @@ def load_robot(name: str) -> Robot:
         raise ConfigError(
             f"{path}: 'name' is '{robot.name}', the file's own name is '{name}'. Make them equal."
         )
-    check_plausible(robot, (*ROBOT, *robot.actuators.plausible), path)
+    check_plausible(robot, (*ROBOT, *robot.actuators.plausible, *RANGES), path)
     _check_spans(robot, path)
     calibration = calibration_in_use()
     if calibration is None or calibration.robot != name:

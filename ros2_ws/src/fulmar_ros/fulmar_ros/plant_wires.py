@@ -14,7 +14,7 @@ from nav_msgs.msg import Odometry
 from rclpy.lifecycle import LifecycleNode
 from rclpy.publisher import Publisher
 from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import Imu, JointState
+from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, String
 from std_srvs.srv import Trigger
 
@@ -31,9 +31,7 @@ from fulmar_core.topics import (
     ESTOP,
     ESTOP_RELEASED,
     GIVE_BACK,
-    IMU,
     MOCAP,
-    ODOMETRY,
     TELEOP,
     TRUTH,
     VELOCITY_COMMAND,
@@ -41,7 +39,6 @@ from fulmar_core.topics import (
     thing_wire,
 )
 from fulmar_ros.convert import (
-    ImuWriter,
     OdometryWriter,
     PoseWriter,
     TwistReader,
@@ -56,6 +53,7 @@ from fulmar_ros.operator_subscription import subscribe_operator
 from fulmar_ros.parameters import own_frames
 from fulmar_ros.plant_clock import SimulatedTime
 from fulmar_ros.qos import FLUSH_S, LAST_WORDS_S, flush, publish_patiently, publisher_qos, subscriber_qos
+from fulmar_ros.sensor_wires import SensorWires
 
 REMEMBERED = 256  # states whose answer may still come, at least
 
@@ -159,21 +157,16 @@ class PlantWires:
         self._clock_ns = 0
         self._captured_ns = 0
         self._qos = qos = partial(publisher_qos, lockstep=lockstep)
-        self._odometry = node.create_publisher(Odometry, ODOMETRY.name, qos(ODOMETRY)) if odometry else None
+        frames = own_frames(node, robot)
+        self._sensors = SensorWires(node, robot, frames, qos, self._publish, odometry=odometry)
         self._poses = (
             node.create_publisher(PoseStamped, MOCAP.name, qos(MOCAP)) if mocap is not None else None
         )
-        self._imu = node.create_publisher(Imu, IMU.name, qos(IMU))
         self._state = node.create_publisher(JointState, ACTUATORS_STATE.name, qos(ACTUATORS_STATE))
         self._truth = node.create_publisher(Odometry, TRUTH.name, qos(TRUTH)) if simulated else None
         self._clock = node.create_publisher(Clock, CLOCK.name, qos(CLOCK)) if clock else None
-        self._frames = frames = own_frames(node, robot)
-        self._write_odometry = OdometryWriter(
-            robot.sensors.odometry, frame=frames.odom, child_frame=frames.base
-        )
         self._write_pose = PoseWriter(frames)
         self._write_truth = OdometryWriter(None, frame="map", child_frame=frames.base)
-        self._write_imu = ImuWriter(robot, frames)
         self._write_state = VectorWriter(robot.actuators.names)
         self._node = node
         self._things: dict[str, Publisher] = {}  # each made with its first pose: most robots are alone
@@ -214,12 +207,13 @@ class PlantWires:
             node.destroy_publisher(publisher)
 
     def _publishers(self) -> list[Publisher]:
-        made = (self._odometry, self._poses, self._imu, self._state, self._truth, self._clock)
-        return [*(publisher for publisher in made if publisher is not None), *self._things.values()]
+        made = (self._poses, self._state, self._truth, self._clock)
+        rest = (publisher for publisher in made if publisher is not None)
+        return [*self._sensors.publishers, *rest, *self._things.values()]
 
     def subscribers(self) -> int:
         """Matched subscriptions of the odometry, else of the poses, else of the actuators' state."""
-        return int((self._odometry or self._poses or self._state).get_subscription_count())
+        return int((self._sensors.odometry or self._poses or self._state).get_subscription_count())
 
     def publish_sample(self, sample: Sample, time_ns: int, *, resend: bool = False) -> None:
         """Publish a sample, the odometry first, since the controller waits for it.
@@ -231,18 +225,17 @@ class PlantWires:
         """
         if sample.stamp_ns is not None:
             if 0 <= self._captured_ns - sample.stamp_ns <= BACK_NS:
-                return  # a device that has nothing new; further back, the clock was set
+                self._sensors.publish_stamped(sample.readings, time_ns)
+                return  # a device that has nothing else that is new; further back, the clock was set
             time_ns = self._captured_ns = sample.stamp_ns
         with self.lock:
             self._sent.note(time_ns, time.monotonic_ns())
         for name, pose in sample.things.items():
             self._publish_thing(name, pose, time_ns)
-        if self._odometry is not None and sample.odometry is not None:
-            self._publish(self._odometry, self._write_odometry.raw(sample.odometry, time_ns))
         if resend:
+            self._sensors.publish_odometry(sample.readings, time_ns)
             return
-        if sample.imu is not None and self._imu.get_subscription_count():
-            self._publish(self._imu, self._write_imu.write(sample.imu, time_ns))
+        self._sensors.publish(sample.readings, time_ns)
         if self._mocap is not None and sample.odometry is not None:
             for stamp, state in self._mocap.see(sample.odometry, time_ns):
                 self._publish_pose(stamp, state)

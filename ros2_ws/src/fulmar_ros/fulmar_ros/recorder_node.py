@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import importlib
 import sys
 import threading
 import time
@@ -19,7 +18,8 @@ from fulmar_bags.writer import BagWriter, check_free
 from fulmar_bags.writer_thread import BagThread
 from fulmar_core.errors import DONE, FAILED, BagError
 from fulmar_core.provenance import attachments
-from fulmar_core.topics import COMMAND, GOAL_POSES, GOAL_WIRES, VELOCITY_COMMAND, WIRES, Wire, thing_wire
+from fulmar_core.topics import COMMAND, GOAL_POSES, GOAL_WIRES, VELOCITY_COMMAND, WIRES, thing_wire
+from fulmar_ros.message_class import message_class
 from fulmar_ros.operator_subscription import subscribe_operator, with_message_info
 from fulmar_ros.parameters import read_parameters
 from fulmar_ros.qos import EVERYTHING, subscriber_qos
@@ -50,7 +50,7 @@ class RecorderNode(Node):
         self._directory = Path(settings.directory or f"runs/{self._robot}_{time.strftime('%Y%m%d_%H%M%S')}")
         self._run_info, self._attachments = settings.run(), settings.files()
         wires = dict.fromkeys((*WIRES, *(thing_wire(name) for name in settings.things if name)))
-        found = {wire: _message_class(wire) for wire in wires if wire.recorded}
+        found = {wire: message_class(wire) for wire in wires if wire.recorded}
         classes = {wire: kind for wire, kind in found.items() if kind is not None}
         # The bag names topics as every reader of bags knows them, whatever they are remapped to on the wire.
         self._topics = {wire: self.resolve_topic_name(wire.name, only_expand=True) for wire in classes}
@@ -174,15 +174,6 @@ class RecorderNode(Node):
         if account.lost:
             self.get_logger().error(f"{account.lost} of {account.received} messages are not in the bag.")
         return FAILED if account.lost else DONE
-
-
-def _message_class(wire: Wire) -> type | None:
-    """The class of a wire's messages; None where the package of a foreign one is not installed."""
-    package, kind, name = wire.type.split("/")
-    try:
-        return getattr(importlib.import_module(f"{package}.{kind}"), name)
-    except ModuleNotFoundError:
-        return None
 
 
 def main() -> None:
