@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -74,6 +75,11 @@ class Ackermann(Rolling):
         widest = xp.atan(grip / clip(speed * speed, 1e-6, None))
         both = xp.stack((speed, clip(steering, -widest, widest)))
         return both.T if both.ndim == 2 else xp.moveaxis(both, 0, -1)  # worlds side by side in memory
+
+    @property
+    def largest_curvature(self) -> float | None:
+        """See `Actuators.largest_curvature` [1/m]."""
+        return math.tan(self.max_steering) / self.wheelbase
 
     @property
     def pull(self) -> float:

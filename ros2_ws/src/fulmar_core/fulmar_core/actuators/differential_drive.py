@@ -66,6 +66,11 @@ class DifferentialDrive(Rolling):
         return within / clip(outer / (self.max_wheel_speed * self.wheel_radius), 1.0, None)
 
     @property
+    def largest_yaw_rate(self) -> float | None:
+        """See `Actuators.largest_yaw_rate` [rad/s]."""
+        return self.max_yaw_rate
+
+    @property
     def pull(self) -> float:
         """The most that both wheels push together [N]."""
         return 2.0 * self.wheel_force

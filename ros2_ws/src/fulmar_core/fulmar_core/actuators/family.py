@@ -89,6 +89,16 @@ class Actuators(ABC):
         """Whether a robot moves to either side without turning."""
         return False
 
+    @property
+    def largest_yaw_rate(self) -> float | None:
+        """The fastest turn that a command can ask for [rad/s]; None where the robot's `limits` say it."""
+        return None
+
+    @property
+    def largest_curvature(self) -> float | None:
+        """Of the tightest circle that it drives [1/m]; None where it turns on the spot."""
+        return None
+
     def by_hand(self, ahead: float, left: float, turn: float) -> np.ndarray | None:
         """Command for what a person asks for, each from -1 to 1 of what the robot can.
 
