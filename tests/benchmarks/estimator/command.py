@@ -52,7 +52,7 @@ def estimator(
 
     plot = plot or old_plot
     require("filterpy", *(["matplotlib"] if plot else []))
-    from fulmar_core.estimation.settings import load_estimator
+    from fulmar_core.estimation.kinds import load_estimator
     from tests.benchmarks.estimator.comparison import MEAN, RATES_HZ, compare, requirements_met
     from tests.benchmarks.estimator.comparison import as_json as rows_of
     from tests.benchmarks.estimator.drive import drives as drive_about

@@ -1,7 +1,12 @@
-"""Poses and inertial readings in any order of arrival, to one estimate at the newest of their times.
+"""Motion in the plane, from poses, inertial readings and star tracker attitudes in any order of arrival.
 
 A pose is as old as its capture, and inertial readings have come since: the filter goes back to the time of capture,
 takes the pose in, and repeats what came after it.
+
+Readings: `mocap` is a pose in the world, shape (7,): position [m], quaternion x, y, z, w. `imu` is an `ImuSample` in
+the body's frame. `star_tracker` is the attitude of the body in the world, a quaternion x, y, z, w; its covariance is
+about the body's axes, shape (3, 3) [rad²]. The estimate is a `RigidBodyState`; its covariance, shape (12, 12), is about
+position and rotation in the world [m, rad], then velocity in the world [m/s] and turn rate in the body [rad/s].
 """
 
 from __future__ import annotations
@@ -13,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fulmar_core.dynamics.hydrodynamics import GRAVITY
+from fulmar_core.estimation.estimator import Estimate
 from fulmar_core.estimation.motion_filter import (
     MOTION,
     POSE,
@@ -25,11 +31,11 @@ from fulmar_core.estimation.motion_filter import (
     X,
     Y,
 )
-from fulmar_core.estimation.settings import EstimatorSettings
+from fulmar_core.estimation.settings import PlanarMotionSettings
 from fulmar_core.robot import Limits
 from fulmar_core.rotation import from_yaw, multiply, rotate, yaw_of
 from fulmar_core.safety.input_gate import BACK_NS, FORWARD_NS
-from fulmar_core.sensors.imu import ImuSample
+from fulmar_core.sensors.reading import Reading
 from fulmar_core.state import RigidBodyState
 
 KEPT_NS = 1_000_000_000  # how far back an estimate can be corrected
@@ -38,42 +44,35 @@ TO_BEGIN_ANEW = 10  # outliers in a row that agree with one another: then it is 
 KNOWN_SPEED_STD = 0.15  # velocity must be known so well before an estimate is published [m/s]
 
 
-@dataclass(frozen=True, slots=True)
-class Estimate:
-    """What is believed at one time."""
-
-    stamp_ns: int
-    state: RigidBodyState
-    pose_covariance: np.ndarray  # (3, 3) of x [m], y [m] and yaw [rad]
-    motion_covariance: np.ndarray  # (3, 3) of the velocity in the world [m/s] and the turn rate [rad/s]
+IMU, POSE_SEEN, HEADING = range(
+    3
+)  # kinds of events; of one time the inertial reading first, which moves the robot there
+PLANAR = np.array((0, 1, 5, 6, 7, 11))  # rows of a covariance that a motion in the plane has
 
 
 @dataclass(slots=True)
 class _Event:
-    """Something that was seen, and what was believed after it."""
+    """Something that was measured, and what was believed after it."""
 
     stamp_ns: int
-    pose: np.ndarray | None  # (x, y, yaw); None for an inertial reading
-    force: np.ndarray | None = None  # level, (2,)
-    turn_rate: float = 0.0
+    kind: int
+    pose: np.ndarray | None = None  # (x, y, yaw) of a pose
+    yaw: float = 0.0  # of a heading [rad]
+    yaw_std: float = 0.0  # of a heading [rad]
+    force: np.ndarray | None = None  # level, (2,) of an inertial reading
+    turn_rate: float = 0.0  # of an inertial reading
     after: Snapshot | None = None
 
     @property
-    def key(self) -> tuple[int, bool]:
-        """Order: by time, and of one time the inertial reading first, which moves the robot there."""
-        return self.stamp_ns, self.pose is not None
+    def key(self) -> tuple[int, int]:
+        """Order: by time, then by kind."""
+        return self.stamp_ns, self.kind
 
 
-class Estimator:
-    """Not thread-safe; the caller holds a lock.
+class PlanarMotionEstimator:
+    """Extended Kalman filter with a history; see `Estimator`."""
 
-    Attributes:
-        outliers: Poses that were not believed.
-        epoch: How often it had to begin anew.
-        problem: Why there is no estimate; empty if there is one.
-    """
-
-    def __init__(self, settings: EstimatorSettings, limits: Limits) -> None:
+    def __init__(self, settings: PlanarMotionSettings, limits: Limits) -> None:
         """Begin without an estimate.
 
         Args:
@@ -81,33 +80,32 @@ class Estimator:
             limits: What the robot can possibly do.
         """
         self._settings, self._limits = settings, limits
+        self._takers = {"mocap": self._take_pose, "imu": self._take_imu, "star_tracker": self._take_attitude}
+        self.reset()
+
+    def reset(self) -> None:
+        """See `Estimator`."""
         self.outliers, self.epoch = 0, 0
-        self._filter: MotionFilter | None = None
-        self._history: list[_Event] = []
-        self._pose_ns: int | None = None
-        self._imu_ns: int | None = None
-        self._strangers: list[tuple[int, np.ndarray]] = []
         self._forget()
 
-    def see_pose(self, position: np.ndarray, quat_xyzw: np.ndarray, stamp_ns: int) -> str:
-        """Take a pose in.
+    def take(self, name: str, reading: Reading) -> str | None:
+        """See `Estimator`; the latency of the settings is taken off the stamps of poses here."""
+        if name not in self._takers:
+            return f"reading '{name}' is not known here, only {', '.join(self._takers)}"
+        if reading.stamp_ns is None:
+            return f"reading of '{name}' has no stamp"
+        return self._takers[name](reading, reading.stamp_ns) or None
 
-        Args:
-            position: In the world, shape (3,) [m].
-            quat_xyzw: Attitude, shape (4,).
-            stamp_ns: As the source stamped it; the latency of the settings is taken off here [ns].
-
-        Returns:
-            Why it is not believed; empty if it is.
-        """
+    def _take_pose(self, reading: Reading, stamp_ns: int) -> str:
+        position, quat_xyzw = reading.value[:3], reading.value[3:]
         captured = stamp_ns - round(1e9 * self._settings.latency_s)
-        problem = _pose_problem(position, quat_xyzw) or self._time_problem(captured, self._pose_ns, "pose")
+        problem = _pose_problem(position, quat_xyzw) or self._time_problem(captured, "pose")
         if problem:
             return problem
         quat = quat_xyzw / np.linalg.norm(quat_xyzw)
         pose = np.array([position[0], position[1], float(yaw_of(quat))])
         tilt = multiply(from_yaw(-pose[2]), quat)
-        self._pose_ns = captured
+        self._newest_ns["pose"] = captured
         if self._filter is None:
             self._begin(captured, pose)
         elif not self._believe(captured, pose):
@@ -115,43 +113,72 @@ class Estimator:
         self._height, self._tilt, self._believed_ns = float(position[2]), tilt, captured
         return ""
 
-    def see_imu(self, sample: ImuSample, stamp_ns: int) -> str:
-        """Take an inertial reading in the body's frame, measured at a stamp [ns].
-
-        Returns:
-            Why it is not believed; empty if it is.
-        """
+    def _take_imu(self, reading: Reading, stamp_ns: int) -> str:
+        sample = reading.value
         if not (np.isfinite(sample.specific_force).all() and np.isfinite(sample.angular_velocity).all()):
             return "inertial reading holds a value that is not finite"
         if abs(float(sample.angular_velocity[2])) > 2.0 * self._limits.yaw_rate:
             return f"turn rate {float(sample.angular_velocity[2]):.1f} rad/s is beyond the possible"
-        problem = self._time_problem(stamp_ns, self._imu_ns, "inertial reading")
+        problem = self._time_problem(stamp_ns, "inertial reading")
         if problem:
             return problem
-        self._imu_ns = stamp_ns
+        self._newest_ns["inertial reading"] = stamp_ns
         if self._filter is not None:
             level = rotate(self._tilt, sample.specific_force) - np.array([0.0, 0.0, GRAVITY])
-            self._insert(_Event(stamp_ns, None, level[:2], float(sample.angular_velocity[2])))
+            turn_rate = float(sample.angular_velocity[2])
+            self._insert(_Event(stamp_ns, IMU, force=level[:2], turn_rate=turn_rate))
         return ""
 
-    def estimate(self) -> Estimate | None:
-        """What is believed at the newest time that anything was seen of; None, with `problem`, if it is stale."""
-        self.problem = self._staleness()
+    def _take_attitude(self, reading: Reading, stamp_ns: int) -> str:
+        """Correct the heading; an attitude before the first pose is of no use yet."""
+        problem = _attitude_problem(reading.value, "attitude") or self._time_problem(stamp_ns, "attitude")
+        if problem:
+            return problem
+        self._newest_ns["attitude"] = stamp_ns
+        if self._filter is None:
+            return ""
+        std = self._settings.star_tracker_std
+        if reading.covariance is not None:
+            std = math.sqrt(float(reading.covariance[2, 2]))
+        event = _Event(stamp_ns, HEADING, yaw=float(yaw_of(reading.value)), yaw_std=std)
+        at = bisect.bisect_right(self._history, event.key, key=lambda past: past.key)
+        if at == 0:
+            return ""
+        self._rewind(at)
+        self._move_on(at, stamp_ns)
+        if self._filter.heading_distance2(event.yaw, std) <= self._settings.gate:
+            self._insert(event)
+            return ""
+        self.outliers += 1
+        self._replay(at)
+        return f"attitude lies beyond the gate: {self.outliers} outliers so far"
+
+    def estimate(self, stamp_ns: int | None = None) -> Estimate | None:
+        """See `Estimator`."""
+        newest_ns = self._history[-1].stamp_ns if self._history else 0
+        stamp_ns = newest_ns if stamp_ns is None else max(stamp_ns, newest_ns)
+        self.problem = self._staleness(stamp_ns)
         if self.problem or self._filter is None:
             return None
-        x, P = self._filter.x, self._filter.P
+        now = self._filter.snapshot()
+        if stamp_ns > newest_ns:
+            self._move_on(len(self._history), stamp_ns)
+        x, P = self._filter.snapshot()
+        self._filter.restore(now)
         state = RigidBodyState(
             np.array([x[X], x[Y], self._height]),
             np.asarray(multiply(from_yaw(np.asarray(x[YAW])), self._tilt)),
             np.array([x[VX], x[VY], 0.0]),
             np.array([0.0, 0.0, x[RATE]]),
         )
-        return Estimate(self._history[-1].stamp_ns, state, P[np.ix_(POSE, POSE)], P[np.ix_(MOTION, MOTION)])
+        covariance = np.zeros((12, 12))
+        covariance[np.ix_(PLANAR, PLANAR)] = P[np.ix_((*POSE, *MOTION), (*POSE, *MOTION))]
+        return Estimate(state, covariance, stamp_ns)
 
-    def _staleness(self) -> str:
+    def _staleness(self, stamp_ns: int) -> str:
         if self._filter is None:
             return "no pose yet. Is the motion capture running, and does it see the robot?"
-        gap_s = (self._history[-1].stamp_ns - self._believed_ns) / 1e9
+        gap_s = (stamp_ns - self._believed_ns) / 1e9
         if gap_s > self._settings.bridge_s:
             return f"no believable pose for {gap_s:.2f} s (limit {self._settings.bridge_s:g} s)"
         if max(self._filter.P[VX, VX], self._filter.P[VY, VY]) > KNOWN_SPEED_STD**2:
@@ -159,21 +186,22 @@ class Estimator:
         return ""
 
     def _forget(self) -> None:
-        self._filter = None
-        self._history = []
-        self._pose_ns = self._imu_ns = None
+        self._filter: MotionFilter | None = None
+        self._history: list[_Event] = []
+        self._newest_ns: dict[str, int] = {}  # stamp of the newest reading, by what it is
         self._believed_ns = 0
         self._height, self._tilt = 0.0, np.array([0.0, 0.0, 0.0, 1.0])
-        self._strangers = []
+        self._strangers: list[tuple[int, np.ndarray]] = []
         self.problem = "no pose yet. Is the motion capture running, and does it see the robot?"
 
     def _begin(self, stamp_ns: int, pose: np.ndarray) -> None:
         self._filter = MotionFilter(self._settings, pose)
-        self._history = [_Event(stamp_ns, pose, after=self._filter.snapshot())]
+        self._history = [_Event(stamp_ns, POSE_SEEN, pose, after=self._filter.snapshot())]
         self._strangers = []
 
-    def _time_problem(self, stamp_ns: int, last_ns: int | None, what: str) -> str:
+    def _time_problem(self, stamp_ns: int, what: str) -> str:
         """Reject old stamps; a jump of time is reported once and begins anew."""
+        last_ns = self._newest_ns.get(what)
         if last_ns is None:
             return ""
         ahead = stamp_ns - last_ns
@@ -186,14 +214,14 @@ class Estimator:
     def _believe(self, stamp_ns: int, pose: np.ndarray) -> bool:
         """Insert a pose if it is no outlier."""
         assert self._filter is not None
-        at = bisect.bisect_right(self._history, (stamp_ns, True), key=lambda event: event.key)
+        at = bisect.bisect_right(self._history, (stamp_ns, POSE_SEEN), key=lambda event: event.key)
         if at == 0:
             return True  # captured before everything that is remembered: too late to matter, but no lie
         self._rewind(at)
         self._move_on(at, stamp_ns)
         if self._filter.distance2(pose) <= self._settings.gate:
             self._strangers = []
-            self._insert(_Event(stamp_ns, pose))
+            self._insert(_Event(stamp_ns, POSE_SEEN, pose))
             return True
         self.outliers += 1
         self._replay(at)
@@ -241,6 +269,8 @@ class Estimator:
             self._move_on(number, event.stamp_ns)
             if event.pose is not None:
                 self._filter.see_pose(event.pose)
+            elif event.kind == HEADING:
+                self._filter.see_heading(event.yaw, event.yaw_std)
             else:
                 self._filter.see_turn_rate(event.turn_rate)
             event.after = self._filter.snapshot()
@@ -262,7 +292,13 @@ class Estimator:
 
 
 def _pose_problem(position: np.ndarray, quat_xyzw: np.ndarray) -> str:
-    if not (np.isfinite(position).all() and np.isfinite(quat_xyzw).all()):
+    if not np.isfinite(position).all():
         return "pose holds a value that is not finite"
+    return _attitude_problem(quat_xyzw, "pose")
+
+
+def _attitude_problem(quat_xyzw: np.ndarray, what: str) -> str:
+    if not np.isfinite(quat_xyzw).all():
+        return f"{what} holds a value that is not finite"
     norm = float(np.linalg.norm(quat_xyzw))
-    return "" if abs(norm - 1.0) <= 0.01 else f"quaternion of the pose has norm {norm:.3f}, must be 1"
+    return "" if abs(norm - 1.0) <= 0.01 else f"quaternion of the {what} has norm {norm:.3f}, must be 1"
