@@ -147,9 +147,7 @@ def plan_run(
     hz = checked_rate(the_robot, control_hz or default_control_hz(robot, task, controller, backend))
     if not lockstep:
         check_beat(hz, rate)
-    watched = checked_guards(
-        default_guards(controller, backend, hardware), guards, the_robot, the_task, lockstep=lockstep
-    )
+    watched = checked_guards(default_guards(controller, backend, hardware), guards, the_robot, the_task)
     check_external(controller, watched, adapter=adapter, topic=topic, lockstep=lockstep)
     check_node_options(controller, copies=copies, network=controller_network)
     policy = chosen_policy(controller, policy, the_robot, the_task, hz, fallback=watched.fallback)
@@ -209,7 +207,9 @@ def plan_run(
         recording=_recording_of_run(controller, backend, recording),
         copies=copies,
         controller_network=controller_network,
-        mocap_hz=checked_mocap(mocap_hz, hardware, emulate=emulate, lockstep=lockstep),
+        mocap_hz=checked_mocap(
+            mocap_hz, hardware, emulate=emulate, lockstep=lockstep, estimated=bool(watched.estimator)
+        ),
         remappings=tuple(read_remappings(remap).items()),
         adapter=adapter_path(robot, adapter),
         adapter_topic=topic or "",

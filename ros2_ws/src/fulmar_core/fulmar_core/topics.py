@@ -12,7 +12,7 @@ from typing import Literal
 from fulmar_core.actuators.differential_drive import DifferentialDrive
 from fulmar_core.robot import Robot
 
-Source = Literal["plant", "controller", "operator", "every node", "device"]
+Source = Literal["plant", "estimator", "controller", "operator", "every node", "device"]
 Delivery = Literal["stream", "latched", "best_effort"]
 
 # Services, all of std_srvs/Trigger.
@@ -60,6 +60,10 @@ MOCAP = Wire(
     "every capture, where an estimator runs or `mocap_hz` is set",
     "pose as motion capture reports it, Z up, stamped at capture or a constant time after", unit="m",
     frame="`odom`, `map` or `world`",
+)  # fmt: skip
+ATTITUDE = Wire(
+    "attitude", "geometry_msgs/msg/QuaternionStamped", "plant", "stream", "of the star tracker, where there is one",
+    "attitude of `base_link` in the inertial frame, stamped at capture", frame="inertial",
 )  # fmt: skip
 TRUTH = Wire(
     "ground_truth/odom", "nav_msgs/msg/Odometry", "plant", "stream", "every plant tick",
@@ -186,16 +190,27 @@ VELOCITY_COMMAND = Wire(
     "command of a differential drive: `linear.x` and `angular.z`, stamped as the observation it answers",
     unit="m/s, rad/s", frame="`base_link`",
 )  # fmt: skip
+PERIOD = Wire(
+    "lockstep/period", "sensor_msgs/msg/JointState", "plant", "stream",
+    "control rate, in lock step with nodes between plant and controller",
+    "readings of one control period: `name` has topics, `position` the number of messages on each; the stamp ends it",
+)  # fmt: skip
+ANSWER = Wire(
+    "lockstep/answer", "sensor_msgs/msg/JointState", "estimator", "stream",
+    "control rate, from each node between plant and controller in lock step",
+    "the node `header.frame_id` has processed the period of the stamp; `name` and `position` as of `lockstep/period`",
+    recorded=False,
+)  # fmt: skip
 TRANSFORMS = Wire(
     "/tf", "tf2_msgs/msg/TFMessage", "device", "stream", "of its publishers",
     "frames, recorded where tf2_msgs is installed; not used for control", unit="m", frame="each its own",
 )  # fmt: skip
 
 WIRES: tuple[Wire, ...] = (
-    ODOMETRY, IMU, MOCAP, TRUTH, ACTUATORS_STATE, ACTUATORS_HEALTH, CLOCK, COMMAND, VELOCITY_COMMAND,
+    ODOMETRY, IMU, MOCAP, ATTITUDE, TRUTH, ACTUATORS_STATE, ACTUATORS_HEALTH, CLOCK, COMMAND, VELOCITY_COMMAND,
     OBSERVATION, ACTION, METADATA, STATUS, DIAGNOSTICS, GOAL_POSE, GOAL_POINT, GOAL_PATH, GOAL_POSES,
     GOAL_VELOCITY, OBSTACLES, BLOCK, AIR_BEARING, DEVICE_STATE, ESTOP, ESTOP_RELEASED, TELEOP, JOY, SWAP,
-    TRANSFORMS,
+    TRANSFORMS, PERIOD, ANSWER,
 )  # fmt: skip
 
 GOAL_WIRES: dict[str, Wire] = {wire.name: wire for wire in (GOAL_POSE, GOAL_POINT, GOAL_PATH, GOAL_VELOCITY)}

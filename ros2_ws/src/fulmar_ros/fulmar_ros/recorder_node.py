@@ -19,7 +19,21 @@ from fulmar_bags.writer import BagWriter, check_free
 from fulmar_bags.writer_thread import BagThread
 from fulmar_core.errors import DONE, FAILED, BagError
 from fulmar_core.provenance import attachments
-from fulmar_core.topics import COMMAND, GOAL_POSES, GOAL_WIRES, VELOCITY_COMMAND, WIRES, Wire, thing_wire
+from fulmar_core.topics import (
+    ACTUATORS_STATE,
+    ATTITUDE,
+    COMMAND,
+    GOAL_POSES,
+    GOAL_WIRES,
+    IMU,
+    MOCAP,
+    ODOMETRY,
+    PERIOD,
+    VELOCITY_COMMAND,
+    WIRES,
+    Wire,
+    thing_wire,
+)
 from fulmar_ros.operator_subscription import subscribe_operator, with_message_info
 from fulmar_ros.parameters import read_parameters
 from fulmar_ros.qos import EVERYTHING, subscriber_qos
@@ -29,6 +43,10 @@ from fulmar_ros.runtime import RequestExit, run_node
 
 QUIET_S = 0.2  # nothing came for this long: what was published before the stop is here
 LONGEST_GOODBYE_S = 5.0
+# What plant and estimators publish once more in lock step, where an answer is missing; each has a stamp.
+REPEATED = (ODOMETRY, IMU, MOCAP, ATTITUDE, ACTUATORS_STATE, COMMAND, VELOCITY_COMMAND, PERIOD)
+REMEMBERED = 1024  # of a topic: more than one period has
+Keep = Callable[[bytes, dict[str, int]], None]
 
 
 class RecorderNode(Node):
@@ -66,8 +84,9 @@ class RecorderNode(Node):
                     self, classes[wire], wire, self._keep(topic), depth=EVERYTHING, raw=True, with_info=True
                 )
                 continue
-            qos = subscriber_qos(wire, reliable=True, depth=EVERYTHING)
-            keep = with_message_info(self._keep(topic))
+            qos = subscriber_qos(wire, reliable=True, depth=EVERYTHING, lossless=settings.lossless)
+            put = self._keep(topic)
+            keep = with_message_info(once(put) if settings.lossless and wire in REPEATED else put)
             made = self.create_subscription(classes[wire], wire.name, keep, qos, raw=True)
             commands += [made] if wire in (COMMAND, VELOCITY_COMMAND) else []
         self._health = RecorderHealth(
@@ -138,7 +157,7 @@ class RecorderNode(Node):
             fault_in=fault_finder(self._robot, self._topics),
         )
 
-    def _keep(self, topic: str) -> Callable[[bytes, dict[str, int]], None]:
+    def _keep(self, topic: str) -> Keep:
         """A callback that puts a topic's messages into the bag.
 
         `log_time` is when the message was received, by the wall clock of this machine; `publish_time` is when it was
@@ -174,6 +193,21 @@ class RecorderNode(Node):
         if account.lost:
             self.get_logger().error(f"{account.lost} of {account.received} messages are not in the bag.")
         return FAILED if account.lost else DONE
+
+
+def once(keep: Keep) -> Keep:
+    """A callback that leaves out what equals one of the newest messages, to the last byte."""
+    newest: dict[bytes, None] = {}  # in the order in which they came
+
+    def keep_once(data: bytes, info: dict[str, int]) -> None:
+        if data in newest:
+            return
+        newest[data] = None
+        if len(newest) > REMEMBERED:
+            del newest[next(iter(newest))]
+        keep(data, info)
+
+    return keep_once
 
 
 def _message_class(wire: Wire) -> type | None:
