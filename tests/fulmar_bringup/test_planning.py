@@ -186,9 +186,9 @@ def test_an_emulated_one_begins_where_the_seed_says(plan):
     assert plan(backend="hardware", emulate=True).plan.start == plan().plan.start
 
 
-def test_an_estimator_in_lock_step_is_refused(plan):
-    with pytest.raises(ConfigError, match="Leave --lockstep out"):
-        plan(guards=dict(estimator="mocap_imu"), lockstep=True)
+def test_an_estimator_runs_in_lock_step_and_takes_poses_at_a_rate_of_their_own(plan):
+    asked = plan(guards=dict(estimator="mocap_imu"), lockstep=True, mocap_hz=100.0).plan
+    assert (asked.guards.estimator, asked.mocap_hz) == ("mocap_imu", 100.0)
 
 
 def test_a_bundle_for_something_else_stops_a_run_unless_a_fallback_is_named(plan):
