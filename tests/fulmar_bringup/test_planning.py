@@ -279,7 +279,7 @@ def test_the_system_file_says_how_to_record(plan, tmp_path, monkeypatch):
 
 def test_a_simulated_motion_capture_needs_time_that_goes_on_and_no_real_one(plan):
     assert plan(mocap_hz=200.0).plan.mocap_hz == 200.0
-    with pytest.raises(ConfigError, match="in lock step time stands still"):
+    with pytest.raises(ConfigError, match="for an estimator only"):
         plan(mocap_hz=200.0, lockstep=True)
     with pytest.raises(ConfigError, match="a real robot has its own"):
         plan(mocap_hz=200.0, backend="hardware", controller="lqr", goal=(0.0, 0.0, 0.0))

@@ -11,13 +11,18 @@ from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
+from fulmar_bringup.run_plan import RunPlan
+from fulmar_bringup.system import Guards
+from fulmar_bringup.system_rows import system_rows
 from fulmar_core.errors import ConfigError
-from fulmar_core.estimation.kinds import load_estimator
+from fulmar_core.estimation.kinds import KINDS, EstimatorKind, load_estimator, make_estimator
 from fulmar_core.estimation.planar_motion import TO_BEGIN_ANEW, PlanarMotionEstimator
+from fulmar_core.estimation.settings import EstimatorSettings
 from fulmar_core.robot import load_robot
 from fulmar_core.rotation import from_yaw
 from fulmar_core.sensors.imu import ImuSample
 from fulmar_core.sensors.reading import Reading
+from fulmar_core.topics import IMU, ODOMETRY
 
 pytest.importorskip("filterpy")
 LIMITS = load_robot("floating_platform").limits
@@ -261,3 +266,98 @@ def test_settings_without_meaning_are_refused_with_their_line(tmp_path):
     (tmp_path / "bad.yaml").write_text(text)
     with pytest.raises(ConfigError, match="gate"):
         load_estimator(str(tmp_path / "bad.yaml"))
+
+
+def attitude(track: Track, t: float, *, off: float = 0.0, covariance: np.ndarray | None = None) -> str | None:
+    quat = from_yaw(np.asarray(track.at(t)[2] + off))
+    return track.estimator.take("star_tracker", Reading(quat, BEGIN + round(1e9 * t), covariance))
+
+
+def test_a_star_tracker_corrects_the_heading_between_poses():
+    spread = []
+    for tracks_stars in (False, True):
+        track = Track()
+        assert track.run(3.0) == 0
+        for tick in range(601, 641):
+            assert track.imu(0.005 * tick) is None
+            if tracks_stars and tick % 20 == 0:
+                assert attitude(track, 0.005 * tick, covariance=np.eye(3) * 1e-8) is None
+        estimate = track.estimator.estimate()
+        spread.append(math.sqrt(estimate.covariance[5, 5]))
+        error = abs(float(estimate.value.yaw) - track.at(3.2)[2])
+        assert error < 5.0 * spread[-1]
+    assert spread[1] < 0.0003 < spread[0]
+
+
+def test_a_star_tracker_far_off_is_an_outlier_and_before_a_pose_of_no_use():
+    track = Track()
+    assert attitude(track, 0.001) is None
+    assert track.estimator.estimate() is None
+    assert track.run(3.0) == 0
+    before = float(track.estimator.estimate().value.yaw)
+    assert "gate" in attitude(track, 3.0, off=0.5)
+    assert (track.estimator.outliers, float(track.estimator.estimate().value.yaw)) == (1, before)
+    wrong = Reading(np.array([0.0, 0.0, 0.0, 2.0]), BEGIN + 3_100 * MS)
+    assert "norm" in track.estimator.take("star_tracker", wrong)
+
+
+def test_an_estimate_is_predicted_to_a_later_time_without_a_trace():
+    track = Track()
+    assert track.run(3.0) == 0
+    now, later = track.estimator.estimate(), track.estimator.estimate(BEGIN + 3_050 * MS)
+    assert later.stamp_ns - now.stamp_ns == 50 * MS
+    assert later.value.position_in_world[0] == pytest.approx(track.at(3.05)[0], abs=0.003)
+    assert later.covariance[0, 0] > now.covariance[0, 0]
+    again = track.estimator.estimate()
+    assert (again.stamp_ns, again.value.position_in_world.tolist()) == (
+        now.stamp_ns,
+        now.value.position_in_world.tolist(),
+    )
+    assert track.estimator.estimate(BEGIN + 3_500 * MS) is None  # beyond what may be bridged
+
+
+def test_a_reset_leaves_nothing_behind():
+    track, fresh = Track(), Track()
+    assert track.run(3.0) == 0
+    track.pose(3.001, off=0.3)
+    track.estimator.reset()
+    track.rng = np.random.default_rng(1)
+    assert (track.estimator.estimate(), track.estimator.outliers) == (None, 0)
+    for one in (track, fresh):
+        one.run(3.0)
+    assert track.velocity().tolist() == fresh.velocity().tolist()
+
+
+def test_readings_without_a_name_or_a_stamp_that_it_knows_are_refused():
+    track = Track()
+    assert "only mocap, imu, star_tracker" in track.estimator.take("sonar", Reading(1.0, BEGIN))
+    assert "no stamp" in track.estimator.take("mocap", Reading(np.zeros(7)))
+
+
+def test_a_file_of_an_unknown_kind_is_refused_with_its_line(tmp_path):
+    (tmp_path / "other.yaml").write_text("title: t\nkind: planar_motoin\n")
+    with pytest.raises(ConfigError, match=r"other.yaml:2: unknown kind .* Did you mean 'planar_motion'"):
+        load_estimator(str(tmp_path / "other.yaml"))
+
+
+def test_another_estimator_is_a_row_of_the_table(tmp_path, monkeypatch):
+    """Settings, a class and what it takes: plans and files then know it."""
+
+    @dataclasses.dataclass(frozen=True, kw_only=True)
+    class MeanSettings(EstimatorSettings):
+        kind: str = "mean_rate"
+        readings: int
+
+    made = []
+    row = EstimatorKind(
+        MeanSettings, lambda settings, robot: made.append((settings.readings, robot.name)), {"imu": IMU}, (ODOMETRY,)
+    )  # fmt: skip
+    monkeypatch.setitem(KINDS, "mean_rate", row)
+    (tmp_path / "mean.yaml").write_text("title: t\nkind: mean_rate\nreadings: 5\nbridge_s: 1.0\n")
+    make_estimator(str(tmp_path / "mean.yaml"), load_robot("turtlebot2"))
+    assert made == [(5, "turtlebot2")]
+    plan = RunPlan(
+        "turtlebot2", "go_to_position", "classical", "mock", 10.0, guards=Guards(estimator=str(tmp_path / "mean.yaml"))
+    )  # fmt: skip
+    rows = system_rows(plan)
+    assert (rows["estimator"].inputs, rows["estimator"].outputs) == (("imu/data",), ("odom",))
