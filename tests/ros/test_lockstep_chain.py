@@ -49,7 +49,7 @@ def test_two_runs_of_one_seed_have_the_same_bytes_and_a_rerun_the_same_actions(
     assert summary["success"], summary
     done = fulmar("bag", "rerun", "one", "--json", env=ros_domain.env, cwd=tmp_path)
     assert done.returncode == 0, done.stdout
-    assert json_of(done.stdout)["identical"] is True
+    assert json_of(done.stdout)["same"] is True
 
 
 def own_system(folder: Path, **changes: str) -> None:
