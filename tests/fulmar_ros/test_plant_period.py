@@ -133,7 +133,7 @@ def test_bytes_between_fields_and_room_at_the_end_do_not_matter() -> None:
 
 def test_a_recorder_leaves_out_what_equals_one_of_the_newest_messages() -> None:
     kept: list[bytes] = []
-    keep = once(lambda data, _info: kept.append(data))
+    keep = once(lambda data, _info: kept.append(data), REMEMBERED)
     for data in (b"a", b"b", b"a", b"c"):
         keep(data, {})
     assert kept == [b"a", b"b", b"c"]
@@ -141,3 +141,8 @@ def test_a_recorder_leaves_out_what_equals_one_of_the_newest_messages() -> None:
         keep(str(number).encode(), {})
     keep(b"a", {})
     assert kept[-1] == b"a"
+    kept.clear()
+    keep = once(lambda data, _info: kept.append(data), 1)
+    for data in (b"on", b"on", b"off", b"on"):
+        keep(data, {})
+    assert kept == [b"on", b"off", b"on"]

@@ -344,7 +344,9 @@ class PlantWires:
             return False
         if self._odometry is None and not self._period.has_odometry():
             actuators = self._robot.actuators
-            self._guard.offer(actuators.names, actuators.safe_command, time.monotonic_ns(), plant_ns=time_ns)
+            self._guard.offer(
+                actuators.names, actuators.safe_command.tolist(), time.monotonic_ns(), plant_ns=time_ns
+            )
             return True
         return self.answered_ns == time_ns
 

@@ -21,6 +21,7 @@ from fulmar_core.errors import DONE, FAILED, BagError
 from fulmar_core.provenance import attachments
 from fulmar_core.topics import (
     ACTUATORS_STATE,
+    AIR_BEARING,
     ATTITUDE,
     COMMAND,
     GOAL_POSES,
@@ -43,9 +44,15 @@ from fulmar_ros.runtime import RequestExit, run_node
 
 QUIET_S = 0.2  # nothing came for this long: what was published before the stop is here
 LONGEST_GOODBYE_S = 5.0
-# What plant and estimators publish once more in lock step, where an answer is missing; each has a stamp.
-REPEATED = (ODOMETRY, IMU, MOCAP, ATTITUDE, ACTUATORS_STATE, COMMAND, VELOCITY_COMMAND, PERIOD)
-REMEMBERED = 1024  # of a topic: more than one period has
+REMEMBERED = 1024  # messages of a topic: more than one period has
+# What plant and estimators publish once more in lock step, and among how many of the newest messages it is looked for.
+# Each has a stamp, but for the air bearing: of its states the changes count.
+REPEATED = {
+    **dict.fromkeys(
+        (ODOMETRY, IMU, MOCAP, ATTITUDE, ACTUATORS_STATE, COMMAND, VELOCITY_COMMAND, PERIOD), REMEMBERED
+    ),
+    AIR_BEARING: 1,
+}
 Keep = Callable[[bytes, dict[str, int]], None]
 
 
@@ -86,7 +93,9 @@ class RecorderNode(Node):
                 continue
             qos = subscriber_qos(wire, reliable=True, depth=EVERYTHING, lossless=settings.lossless)
             put = self._keep(topic)
-            keep = with_message_info(once(put) if settings.lossless and wire in REPEATED else put)
+            if settings.lossless and wire in REPEATED:
+                put = once(put, REPEATED[wire])
+            keep = with_message_info(put)
             made = self.create_subscription(classes[wire], wire.name, keep, qos, raw=True)
             commands += [made] if wire in (COMMAND, VELOCITY_COMMAND) else []
         self._health = RecorderHealth(
@@ -195,15 +204,15 @@ class RecorderNode(Node):
         return FAILED if account.lost else DONE
 
 
-def once(keep: Keep) -> Keep:
-    """A callback that leaves out what equals one of the newest messages, to the last byte."""
+def once(keep: Keep, remembered: int) -> Keep:
+    """A callback that leaves out what equals one of so many newest messages, to the last byte."""
     newest: dict[bytes, None] = {}  # in the order in which they came
 
     def keep_once(data: bytes, info: dict[str, int]) -> None:
         if data in newest:
             return
         newest[data] = None
-        if len(newest) > REMEMBERED:
+        if len(newest) > remembered:
             del newest[next(iter(newest))]
         keep(data, info)
 
