@@ -35,7 +35,7 @@ class DriverBackend:
         self._driver.begin(float(start.x), float(start.y), float(start.yaw))
         return self.step(self.robot.actuators.safe_command)
 
-    def step(self, command: np.ndarray, ticks: int = 1) -> Sample:
+    def step(self, command: np.ndarray, ticks: int = 1, *, begins: int | None = None) -> Sample:
         """Send a command and take the newest measurement; see `Backend.step`."""
         applied = self._write(np.asarray(command, dtype=float))
         report = self._driver.read()

@@ -38,10 +38,10 @@ class MockBackend:
         self._ticks = 0
         return self._sample()
 
-    def step(self, command: np.ndarray, ticks: int = 1) -> Sample:
+    def step(self, command: np.ndarray, ticks: int = 1, *, begins: int | None = None) -> Sample:
         """Apply a command; see `Backend.step`."""
         world, before = self._world, self._state
-        world.begin(np.asarray(command, dtype=float), ticks, before[0].to_rigid())
+        world.begin(np.asarray(command, dtype=float), ticks, before[0].to_rigid(), begins=begins)
         self._state = move(
             self.robot,
             before,
@@ -55,10 +55,11 @@ class MockBackend:
         self._poses, self._state = push_things(self._things, self._poses, before, self._state, self.robot)
         return self._sample(ticks)
 
-    def stand(self, ticks: int = 1) -> Sample:
+    def stand(self, ticks: int = 1, *, begins: int | None = None) -> Sample:
         """Let time pass for a body that nothing moves; see `CanStand.stand`."""
         zero = np.zeros(1)
-        self._world.begin(np.array(self.robot.actuators.safe_command), ticks, self._state[0].to_rigid())
+        rest = np.array(self.robot.actuators.safe_command)
+        self._world.begin(rest, ticks, self._state[0].to_rigid(), begins=begins)
         self._state = PlanarState(self._state.x, self._state.y, self._state.yaw, zero, zero, zero)
         return self._sample(ticks)
 

@@ -58,14 +58,14 @@ class MujocoBackend:
         truth = self._read()
         return self._sample(truth, self._world.reset(episode, truth.state, seed=seed, number=number))
 
-    def step(self, command: np.ndarray, ticks: int = 1) -> Sample:
+    def step(self, command: np.ndarray, ticks: int = 1, *, begins: int | None = None) -> Sample:
         """Apply a command; see `Backend.step`.
 
         Raises:
             SafetyError: The state is not finite; the message has it.
         """
         model, data, robot_model, world = self.model, self.data, self._scene.robot_model, self._world
-        world.begin(np.asarray(command, dtype=float), ticks, self._truth)
+        world.begin(np.asarray(command, dtype=float), ticks, self._truth, begins=begins)
         fx, fy, torque = (float(part[0]) for part in world.outside)
         dt = self.robot.timing.physics_dt
         last = None
@@ -80,10 +80,10 @@ class MujocoBackend:
         truth = self._read()
         return self._sample(truth, world.measure(truth.state))
 
-    def stand(self, ticks: int = 1) -> Sample:
+    def stand(self, ticks: int = 1, *, begins: int | None = None) -> Sample:
         """Let time pass for a body that nothing moves; see `CanStand.stand`."""
         data, world, rest = self.data, self._world, np.array(self.robot.actuators.safe_command, dtype=float)
-        world.begin(rest, ticks, self._truth)
+        world.begin(rest, ticks, self._truth, begins=begins)
         dt = self.robot.timing.physics_dt
         for _ in range(ticks):
             world.actuation.advance(dt, latest_s=world.latest_s)

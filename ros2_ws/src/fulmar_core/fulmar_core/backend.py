@@ -72,7 +72,7 @@ class Backend(Protocol):
         """
         ...
 
-    def step(self, command: np.ndarray, ticks: int = 1) -> Sample:
+    def step(self, command: np.ndarray, ticks: int = 1, *, begins: int | None = None) -> Sample:
         """Apply a command for some physics steps.
 
         Several at once are a control step. One at a time, a command that stays the same goes on as it was.
@@ -80,6 +80,8 @@ class Backend(Protocol):
         Args:
             command: Within the actuators' limits, shape (n,).
             ticks: Number of physics steps, >= 1.
+            begins: Physics steps of the control step that begins with this one, 0 within it; None: a control step
+                begins with a new command, and after the robot's own control period. Hardware ignores it.
 
         Returns:
             Sample at their end.

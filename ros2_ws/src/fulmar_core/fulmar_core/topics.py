@@ -154,6 +154,17 @@ VELOCITY_COMMAND = Wire(
     "command of a differential drive: `linear.x` and `angular.z`, stamped as the observation it answers",
     unit="m/s, rad/s", frame="`base_link`",
 )  # fmt: skip
+PERIOD = Wire(
+    "lockstep/period", "sensor_msgs/msg/JointState", "plant", "stream",
+    "control rate, in lock step with nodes between plant and controller",
+    "readings of one control period: `name` has topics, `position` the number of messages on each; the stamp ends it",
+)  # fmt: skip
+ANSWER = Wire(
+    "lockstep/answer", "sensor_msgs/msg/JointState", "estimator", "stream",
+    "control rate, from each node between plant and controller in lock step",
+    "the node `header.frame_id` has processed the period of the stamp; `name` and `position` as of `lockstep/period`",
+    recorded=False,
+)  # fmt: skip
 TRANSFORMS = Wire(
     "/tf", "tf2_msgs/msg/TFMessage", "device", "stream", "of its publishers",
     "frames, recorded where tf2_msgs is installed; not used for control", unit="m", frame="each its own",
@@ -163,7 +174,7 @@ WIRES: tuple[Wire, ...] = (
     *SENSOR_WIRES.values(), MOCAP, TRUTH, ACTUATORS_STATE, ACTUATORS_HEALTH, CLOCK, COMMAND, VELOCITY_COMMAND,
     OBSERVATION, ACTION, METADATA, STATUS, DIAGNOSTICS, GOAL_POSE, GOAL_POINT, GOAL_PATH, GOAL_POSES,
     GOAL_VELOCITY, OBSTACLES, BLOCK, AIR_BEARING, DEVICE_STATE, ESTOP, ESTOP_RELEASED, TELEOP, JOY, SWAP,
-    TRANSFORMS,
+    TRANSFORMS, PERIOD, ANSWER,
 )  # fmt: skip
 
 GOAL_WIRES: dict[str, Wire] = {wire.name: wire for wire in (GOAL_POSE, GOAL_POINT, GOAL_PATH, GOAL_VELOCITY)}

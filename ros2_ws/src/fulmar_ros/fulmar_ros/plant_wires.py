@@ -6,6 +6,7 @@ import threading
 import time
 from collections import OrderedDict
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -52,6 +53,7 @@ from fulmar_ros.motion_capture import MakeCapture
 from fulmar_ros.operator_subscription import subscribe_operator
 from fulmar_ros.parameters import own_frames
 from fulmar_ros.plant_clock import SimulatedTime
+from fulmar_ros.plant_period import PlantPeriod
 from fulmar_ros.qos import FLUSH_S, LAST_WORDS_S, flush, publish_patiently, publisher_qos, subscriber_qos
 from fulmar_ros.sensor_wires import SensorWires
 
@@ -125,6 +127,7 @@ class PlantWires:
         mocap: MakeCapture | None = None,
         lockstep: bool = False,
         simulated_time: SimulatedTime | None = None,
+        chain: Sequence[str] = (),
     ) -> None:
         """Create every endpoint.
 
@@ -139,6 +142,7 @@ class PlantWires:
             lockstep: Whether the plant waits for the controller's answers, and for readers that lag behind. By the
                 clock, without it, a person may take the actuators, and commands go before other work.
             simulated_time: Clock of a simulated plant, by which actuators follow commands.
+            chain: Nodes between plant and controller that take part in lock step.
         """
         self._mocap = mocap(self._publish_pose) if mocap is not None else None
         self._prior = lockstep  # whether the threads that commands pass have what priority they need
@@ -148,7 +152,7 @@ class PlantWires:
         self.latency_ms = Spread()
         self.answers = 0  # states that a command has answered
         self.listening = True  # whether commands of controllers count
-        self._guard = guard
+        self._robot, self._guard = robot, guard
         self._simulated_time = simulated_time
         self._sent = SentStates(guard.watchdog.timeout_ns)
         # Without them, commands answer odometry of another node, whose stamps are of another clock.
@@ -156,7 +160,10 @@ class PlantWires:
         self.answered_ns: int | None = None  # stamp of the newest command that was taken
         self._clock_ns = 0
         self._captured_ns = 0
-        self._qos = qos = partial(publisher_qos, lockstep=lockstep)
+        self._qos = qos = partial(publisher_qos, lockstep=lockstep, lossless=bool(chain))
+        self._period = PlantPeriod(node, chain, self.lock) if chain else None
+        if self._period is not None:
+            self._publish = self._period.publish
         frames = own_frames(node, robot)
         self._sensors = SensorWires(node, robot, frames, qos, self._publish, odometry=odometry)
         self._poses = (
@@ -165,6 +172,8 @@ class PlantWires:
         self._state = node.create_publisher(JointState, ACTUATORS_STATE.name, qos(ACTUATORS_STATE))
         self._truth = node.create_publisher(Odometry, TRUTH.name, qos(TRUTH)) if simulated else None
         self._clock = node.create_publisher(Clock, CLOCK.name, qos(CLOCK)) if clock else None
+        if self._period is not None:
+            self._period.distinguish(odometry=self._sensors.odometry, truth=self._truth, clock=self._clock)
         self._write_pose = PoseWriter(frames)
         self._write_truth = OdometryWriter(None, frame="map", child_frame=frames.base)
         self._write_state = VectorWriter(robot.actuators.names)
@@ -202,6 +211,8 @@ class PlantWires:
         self.end_capture()
         for subscription in (self._commands, *self._operator):
             node.destroy_subscription(subscription)
+        if self._period is not None:
+            node.destroy_subscription(self._period.answers)
         node.destroy_service(self._give_back)
         for publisher in self._publishers():
             node.destroy_publisher(publisher)
@@ -209,10 +220,13 @@ class PlantWires:
     def _publishers(self) -> list[Publisher]:
         made = (self._poses, self._state, self._truth, self._clock)
         rest = (publisher for publisher in made if publisher is not None)
-        return [*self._sensors.publishers, *rest, *self._things.values()]
+        period = [self._period.publisher] if self._period is not None else []
+        return [*self._sensors.publishers, *rest, *self._things.values(), *period]
 
     def subscribers(self) -> int:
-        """Matched subscriptions of the odometry, else of the poses, else of the actuators' state."""
+        """Matched subscriptions of periods, else of the odometry, of the poses, or of the actuators' state."""
+        if self._period is not None:
+            return int(self._period.publisher.get_subscription_count())
         return int((self._sensors.odometry or self._poses or self._state).get_subscription_count())
 
     def publish_sample(self, sample: Sample, time_ns: int, *, resend: bool = False) -> None:
@@ -282,6 +296,53 @@ class PlantWires:
     def wait_for_answer(self, time_ns: int, timeout_s: float) -> bool:
         """Wait until a command answers the odometry of this stamp; call with `lock` held."""
         return self.lock.wait_for(lambda: self.answered_ns == time_ns, timeout_s)
+
+    def publish_tick(self, sample: Sample, time_ns: int) -> None:
+        """Publish the readings of a physics step within a period; see `PlantPeriod`."""
+        assert self._period is not None
+        self._period.within = True
+        self.publish_sample(replace(sample, things={}), time_ns)
+        self._period.within = False
+
+    def publish_period(self, sample: Sample, time_ns: int) -> None:
+        """Publish the sample that ends a period, and then what the period holds."""
+        assert self._period is not None
+        self.publish_sample(sample, time_ns)
+        self._period.close(time_ns)
+
+    def repeat_period(self) -> None:
+        """Publish the period once more."""
+        assert self._period is not None
+        self._period.repeat()
+
+    def begin_period(self) -> None:
+        """Let what is published from here on belong to the next period."""
+        assert self._period is not None
+        self._period.begin()
+
+    def silent_nodes(self, time_ns: int) -> list[str]:
+        """Nodes that have not answered the period that ends at a time [ns]; call with `lock` held."""
+        assert self._period is not None
+        return self._period.silent(time_ns)
+
+    def wait_for_period(self, time_ns: int, timeout_s: float) -> bool:
+        """Wait until every node has answered the period that ends at a time [ns], and a command has come.
+
+        Without odometry no command comes: the safe one is taken in its place. Call with `lock` held.
+        """
+        return self.lock.wait_for(lambda: self._is_answered(time_ns), timeout_s)
+
+    def _is_answered(self, time_ns: int) -> bool:
+        assert self._period is not None
+        if self._period.silent(time_ns):
+            return False
+        if self._sensors.odometry is None and not self._period.has_odometry():
+            actuators = self._robot.actuators
+            self._guard.offer(
+                actuators.names, actuators.safe_command.tolist(), time.monotonic_ns(), plant_ns=time_ns
+            )
+            return True
+        return self.answered_ns == time_ns
 
     def _on_command(self, data: bytes) -> None:
         command = self._reader.read(data)
