@@ -7,7 +7,7 @@ import time
 
 import numpy as np
 
-from fulmar_core.actuators.actuation import slowdown
+from fulmar_core.actuators.refuge import slowdown
 from fulmar_core.backend import AirBearing, Sample
 from fulmar_core.episode import Episode
 from fulmar_core.errors import DeviceError
@@ -35,13 +35,13 @@ class DriverBackend:
         self._driver.begin(float(start.x), float(start.y), float(start.yaw))
         return self.step(self.robot.actuators.safe_command)
 
-    def step(self, command: np.ndarray, ticks: int = 1) -> Sample:
+    def step(self, command: np.ndarray, ticks: int = 1, *, begins: int | None = None) -> Sample:
         """Send a command and take the newest measurement; see `Backend.step`."""
         applied = self._write(np.asarray(command, dtype=float))
         report = self._driver.read()
         if report is None:
-            return Sample(None, None, None, applied=applied)
-        return Sample(report.odometry, report.imu, None, stamp_ns=report.stamp_ns, applied=applied)
+            return Sample({}, None, applied=applied)
+        return Sample(report.readings, None, stamp_ns=report.stamp_ns, applied=applied)
 
     def make_safe(self) -> None:
         """Slow wheels down, then send the safe command several times, with time for each to arrive.
@@ -50,7 +50,7 @@ class DriverBackend:
             Exception: None of them could be sent; raised by the last one.
         """
         safe = self.robot.actuators.safe_command
-        for command in slowdown(self.robot.actuators, self._sent, STOP_PERIOD_S):
+        for command in slowdown(self.robot.actuators.refuge, self._sent, safe, STOP_PERIOD_S):
             if self._failure(command) is not None:
                 break
             time.sleep(STOP_PERIOD_S)

@@ -123,7 +123,7 @@ class DriverNode(PlantNode):
         if isinstance(driver, VelocityTopic):
             frame = own_frames(self, robot).base
             send_velocity = velocity_sender(self, driver.topic, stamped=driver.stamped, frame=frame)
-            track = robot.actuators.track  # type: ignore[union-attr]  # settings refuse any other
+            track = robot.actuators.track  # type: ignore[attr-defined]  # settings refuse any other
 
             def send_wheels(command: np.ndarray) -> None:
                 speed, turn_rate = (float(value) for value in command)

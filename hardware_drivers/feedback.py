@@ -4,20 +4,38 @@ from __future__ import annotations
 
 import threading
 import time
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from fulmar_core.errors import DeviceError
 from fulmar_core.sensors.imu import ImuSample
+from fulmar_core.sensors.reading import Reading
 from fulmar_core.state import RigidBodyState
 
 
 @dataclass(frozen=True)
 class Report:
-    """One measurement of a device."""
+    """What a device measured at one instant.
 
-    odometry: RigidBodyState
+    Raises:
+        ValueError: `others` has odometry or IMU, which have fields of their own.
+    """
+
+    odometry: RigidBodyState | None  # None: somebody else measures it
     imu: ImuSample | None
     stamp_ns: int  # when it was captured, since the epoch [ns]
+    # Of other sensors, by their names in the robot's YAML. One with a stamp of its own is published once.
+    others: Mapping[str, Reading] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if twice := {"odometry", "imu"} & set(self.others):
+            raise ValueError(f"'{min(twice)}' is a field of a report of its own: Report({min(twice)}=...).")
+
+    @property
+    def readings(self) -> dict[str, Reading]:
+        """Readings of every sensor, by name."""
+        own = {"odometry": self.odometry, "imu": self.imu}
+        return {name: Reading(value) for name, value in own.items() if value is not None} | dict(self.others)
 
 
 class Feedback:
@@ -63,11 +81,11 @@ class Feedback:
                 )
 
     @property
-    def newest(self) -> Report:
-        """The newest report; there must be one."""
+    def measured(self) -> RigidBodyState:
+        """The newest odometry, of a device that measures it; there must be a report."""
         with self._changed:
-            assert self._newest is not None
-            return self._newest
+            assert self._newest is not None and self._newest.odometry is not None
+            return self._newest.odometry
 
     def read(self) -> Report:
         """The newest report, if it is recent.

@@ -54,7 +54,7 @@ class KingfisherDriver(DeviceDriver):
     def begin(self, x: float, y: float, heading: float) -> None:
         """Without an origin, set the boat's position in `odom`; see `DeviceDriver`."""
         if self._settings.origin is None:
-            here = self._feedback.newest.odometry.position_in_world - self._shift
+            here = self._feedback.measured.position_in_world - self._shift
             self._shift = np.array([x, y, 0.0]) - here
 
     def write(self, command: np.ndarray) -> None:

@@ -73,7 +73,7 @@ class MavlinkDriver(DeviceDriver):
 
     def begin(self, x: float, y: float, heading: float) -> None:
         """Set the boat's position in `odom`, and arm if allowed; see `DeviceDriver`."""
-        here = self._feedback.newest.odometry.position_in_world - self._telemetry.shift
+        here = self._feedback.measured.position_in_world - self._telemetry.shift
         self._telemetry.shift = np.array([x, y, 0.0]) - here
         if self._settings.arm:
             self._drive(0.0, 0.0)

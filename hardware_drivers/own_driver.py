@@ -8,9 +8,11 @@ from typing import Any, TypeVar
 import numpy as np
 
 from fulmar_core.actuators.differential_drive import DifferentialDrive
-from fulmar_core.errors import ConfigError, DeviceError, FulmarError, shortened
+from fulmar_core.errors import ConfigError, DeviceError, FulmarError, did_you_mean, shortened
 from fulmar_core.own_class import construct, load_class, one_line
 from fulmar_core.robot import Robot
+from fulmar_core.sensors.reading import Reading
+from fulmar_core.sensors.table import SENSORS
 from hardware_drivers.driver import MEMBERS, DeviceDriver
 from hardware_drivers.driver_backend import DriverBackend, backend_of
 from hardware_drivers.feedback import Report
@@ -68,6 +70,7 @@ class _WiredDriver(DeviceDriver):
     def __init__(self, robot: Robot, settings: OwnDriver, driver: Any) -> None:
         self._name, self._module = settings.kind, type(driver).__module__
         self._driver, self._count = driver, len(robot.actuators.names)
+        self._specs = robot.sensors.specs
         self._safe, self._unarmed = robot.actuators.safe_command, settings.arm is False
         self._to_wires = _matrix(robot, settings)
         self._from_wires = np.linalg.inv(self._to_wires)
@@ -96,6 +99,9 @@ class _WiredDriver(DeviceDriver):
         report = self._call("read", self._driver.read)
         if report is not None and not isinstance(report, Report):
             raise self._wrong("read", f"returned {type(report).__name__}, which must be a Report or None")
+        for name, reading in report.others.items() if report else ():
+            if problem := _problem_of(name, reading, self._specs):
+                raise self._wrong("read", f"returned a Report whose '{shortened(str(name))}' {problem}")
         return report
 
     def health(self) -> dict[str, str]:
@@ -138,6 +144,25 @@ class _FloatingDriver(_WiredDriver):
             return str(self._call("set_bearing", lambda: self._driver.set_bearing(on)) or "")
         except FulmarError as error:
             return str(error)
+
+
+def _problem_of(name: str, reading: Any, specs: Mapping[str, Any]) -> str:
+    """Why a reading cannot be published, to go on after the sensor's name; empty where it can."""
+    if name not in SENSORS:
+        return f"is no sensor.{did_you_mean(str(name), SENSORS)}"
+    if name not in specs:
+        return f"is no sensor of this robot: add '{name}:' below 'sensors:' in the robot's YAML"
+    if not isinstance(reading, Reading):
+        return f"is {type(reading).__name__}, which must be a Reading"
+    message = SENSORS[name].message
+    assert message is not None  # only the odometry has none, which is a field of the report
+    try:
+        values = message.write(reading, specs[name])
+        if not all(np.isfinite(value).all() for value in values if not isinstance(value, str | list)):
+            return "holds a value that is not finite"
+    except Exception as error:  # noqa: BLE001 - a value of the user's class may be anything
+        return " ".join(f"cannot be published: {type(error).__name__}: {error}".split())
+    return ""
 
 
 def _matrix(robot: Robot, settings: OwnDriver) -> np.ndarray:

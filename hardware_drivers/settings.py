@@ -6,11 +6,12 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+from fulmar_core.actuators.family import Actuators
 from fulmar_core.config import Named, load_config
 from fulmar_core.errors import ConfigError
 from fulmar_core.own_class import check_class_path
 from fulmar_core.paths import config_names, config_path
-from fulmar_core.robot import Actuators, load_robot
+from fulmar_core.robot import load_robot
 from hardware_drivers.valves import VALVE_ORDERS
 from hardware_drivers.wiring import AS_NAMED, check_wiring
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from fulmar_core.controllers.classical import LAWS, check_pair, load_classical
+from fulmar_core.controllers.classical import LAWS, check_pair, families_of, load_classical
 from fulmar_core.controllers.controller import Controller
 from fulmar_core.controllers.excite import TASKS as EXCITE_TASKS
 from fulmar_core.controllers.excite import Excite
@@ -102,7 +102,7 @@ def _check_own(name: str, robot: Robot, task: Task) -> None:
     load_class(name, members=MEMBERS, what="controller")
 
 
-_LAWS = ", ".join(f"{entry.law.title} ({family})" for family, entry in LAWS.items())
+_LAWS = ", ".join(f"{entry.law.title} ({', '.join(families_of(law))})" for law, entry in LAWS.items())
 CONTROLLERS = {
     "policy": ControllerEntry(
         "a learned policy bundle", _load_policy, _any_pair, ("onnxruntime",), runs_bundle=True

@@ -9,6 +9,9 @@ from fulmar_core.episode import Episode
 from fulmar_core.motion import move
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
+from fulmar_core.sensors.kind import Truth
+from fulmar_core.sensors.reading import Reading
+from fulmar_core.sensors.simulated import SimulatedSensors
 from fulmar_core.things import Poses, Thing, push_things
 from sim_nodes.one_world import OneWorld
 
@@ -19,6 +22,7 @@ class MockBackend:
     def __init__(self, robot: Robot, *, things: tuple[Thing, ...] = ()) -> None:
         self.robot, self._things = robot, things
         self._world = OneWorld(robot, noisy=False)
+        self._sensors = SimulatedSensors(robot.sensors.specs, noisy=False)
 
     def reset(self, episode: Episode, *, seed: int, number: int = 0) -> Sample:
         """Begin anew; see `Backend.reset`."""
@@ -30,12 +34,14 @@ class MockBackend:
             thing.name: np.array([episode.goal.things[thing.name]], dtype=float) for thing in self._things
         }
         self._world.reset(episode, self._state[0].to_rigid(), seed=seed, number=number)
+        self._sensors.reset(seed, number)
+        self._ticks = 0
         return self._sample()
 
-    def step(self, command: np.ndarray, ticks: int = 1) -> Sample:
+    def step(self, command: np.ndarray, ticks: int = 1, *, begins: int | None = None) -> Sample:
         """Apply a command; see `Backend.step`."""
         world, before = self._world, self._state
-        world.begin(np.asarray(command, dtype=float), ticks, before[0].to_rigid())
+        world.begin(np.asarray(command, dtype=float), ticks, before[0].to_rigid(), begins=begins)
         self._state = move(
             self.robot,
             before,
@@ -47,14 +53,15 @@ class MockBackend:
             off_centre=bool(world.world.com_x[0] or world.world.com_y[0]),
         )
         self._poses, self._state = push_things(self._things, self._poses, before, self._state, self.robot)
-        return self._sample()
+        return self._sample(ticks)
 
-    def stand(self, ticks: int = 1) -> Sample:
+    def stand(self, ticks: int = 1, *, begins: int | None = None) -> Sample:
         """Let time pass for a body that nothing moves; see `CanStand.stand`."""
         zero = np.zeros(1)
-        self._world.begin(np.array(self.robot.actuators.safe_command), ticks, self._state[0].to_rigid())
+        rest = np.array(self.robot.actuators.safe_command)
+        self._world.begin(rest, ticks, self._state[0].to_rigid(), begins=begins)
         self._state = PlanarState(self._state.x, self._state.y, self._state.yaw, zero, zero, zero)
-        return self._sample()
+        return self._sample(ticks)
 
     def make_safe(self) -> None:
         """Nothing to do: a command acts only during a step."""
@@ -62,6 +69,9 @@ class MockBackend:
     def close(self) -> None:
         """Nothing to release."""
 
-    def _sample(self) -> Sample:
+    def _sample(self, ticks: int = 0) -> Sample:
+        self._ticks += ticks
         truth = self._state[0].to_rigid()
-        return Sample(truth, None, truth, {name: pose[0] for name, pose in self._poses.items()})
+        others = self._sensors.measure(Truth(truth), self._ticks * self.robot.timing.physics_dt)
+        things = {name: pose[0] for name, pose in self._poses.items()}
+        return Sample({"odometry": Reading(truth), **others}, truth, things)

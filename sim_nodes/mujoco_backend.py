@@ -10,7 +10,9 @@ from fulmar_core.disturbances.scenario import Scenario
 from fulmar_core.episode import Episode
 from fulmar_core.errors import SafetyError
 from fulmar_core.robot import Robot
-from fulmar_core.sensors.imu import ImuSample, InertialUnit
+from fulmar_core.sensors.kind import Truth
+from fulmar_core.sensors.reading import Reading
+from fulmar_core.sensors.simulated import SimulatedSensors
 from fulmar_core.state import RigidBodyState
 from fulmar_core.tasks import Task
 from fulmar_core.things import Thing
@@ -18,7 +20,7 @@ from sim_nodes.mujoco_model import Scene
 from sim_nodes.mujoco_model.objects import radii_for
 from sim_nodes.one_world import OneWorld
 
-SENSORS = (("position", 3), ("attitude", 4), ("velocity", 3), ("gyroscope", 3), ("accelerometer", 3))
+READ_OUT = (("position", 3), ("attitude", 4), ("velocity", 3), ("gyroscope", 3), ("accelerometer", 3))
 
 
 class MujocoBackend:
@@ -26,8 +28,8 @@ class MujocoBackend:
 
     def __init__(self, robot: Robot, *, sensor_noise: bool = True, things: tuple[Thing, ...] = ()) -> None:
         self.robot = robot
-        self._noisy, self._things = sensor_noise, things
-        self._unit = InertialUnit(robot.sensors.imu)
+        self._things = things
+        self._sensors = SimulatedSensors(robot.sensors.specs, noisy=sensor_noise)
         self._world = OneWorld(robot, noisy=sensor_noise)
         self._use(Scene(robot, things=things))
 
@@ -52,18 +54,18 @@ class MujocoBackend:
         if not self._scene.has_room_for(obstacles):
             self._use(Scene(self.robot, radii_for(obstacles), self._things))
         self._scene.begin(episode)
-        self._unit.reset(seed, number)
-        truth, imu = self._read()
-        return self._sample(truth, imu, self._world.reset(episode, truth, seed=seed, number=number))
+        self._sensors.reset(seed, number)
+        truth = self._read()
+        return self._sample(truth, self._world.reset(episode, truth.state, seed=seed, number=number))
 
-    def step(self, command: np.ndarray, ticks: int = 1) -> Sample:
+    def step(self, command: np.ndarray, ticks: int = 1, *, begins: int | None = None) -> Sample:
         """Apply a command; see `Backend.step`.
 
         Raises:
             SafetyError: The state is not finite; the message has it.
         """
         model, data, robot_model, world = self.model, self.data, self._scene.robot_model, self._world
-        world.begin(np.asarray(command, dtype=float), ticks, self._truth)
+        world.begin(np.asarray(command, dtype=float), ticks, self._truth, begins=begins)
         fx, fy, torque = (float(part[0]) for part in world.outside)
         dt = self.robot.timing.physics_dt
         last = None
@@ -75,21 +77,21 @@ class MujocoBackend:
             mujoco.mj_step(model, data, robot_model.steps_per_tick)
         if not np.isfinite(data.qpos).all():
             raise SafetyError(f"MuJoCo's state is not finite at t = {data.time:.2f} s: {data.qpos}.")
-        truth, imu = self._read()
-        return self._sample(truth, imu, world.measure(truth))
+        truth = self._read()
+        return self._sample(truth, world.measure(truth.state))
 
-    def stand(self, ticks: int = 1) -> Sample:
+    def stand(self, ticks: int = 1, *, begins: int | None = None) -> Sample:
         """Let time pass for a body that nothing moves; see `CanStand.stand`."""
         data, world, rest = self.data, self._world, np.array(self.robot.actuators.safe_command, dtype=float)
-        world.begin(rest, ticks, self._truth)
+        world.begin(rest, ticks, self._truth, begins=begins)
         dt = self.robot.timing.physics_dt
         for _ in range(ticks):
             world.actuation.advance(dt, latest_s=world.latest_s)
         self._scene.robot_model.drive(self.model, data, rest, world.actuation.gain[:, 0], (0.0, 0.0, 0.0))
         data.qvel[:] = 0.0
         data.time += ticks * dt
-        truth, imu = self._read()
-        return self._sample(truth, imu, world.measure(truth))
+        truth = self._read()
+        return self._sample(truth, world.measure(truth.state))
 
     def make_safe(self) -> None:
         """Bring the actuators to rest."""
@@ -103,11 +105,11 @@ class MujocoBackend:
         self._scene = scene
         self._at = {
             name: slice(int(scene.model.sensor(name).adr[0]), int(scene.model.sensor(name).adr[0]) + width)
-            for name, width in SENSORS
+            for name, width in READ_OUT
         }
 
-    def _read(self) -> tuple[RigidBodyState, ImuSample]:
-        """True state and reading of the inertial unit."""
+    def _read(self) -> Truth:
+        """True motion."""
         # mj_step leaves the sensors as they were before its last integration step.
         mujoco.mj_forward(self.model, self.data)
         every = np.array(self.data.sensordata)
@@ -115,11 +117,10 @@ class MujocoBackend:
         position = read["position"]
         position[2] -= self._scene.robot_model.rest_height
         w, x, y, z = read["attitude"]
-        truth = RigidBodyState(position, np.array([x, y, z, w]), read["velocity"], read["gyroscope"])
-        return truth, ImuSample(read["accelerometer"], read["gyroscope"])
+        state = RigidBodyState(position, np.array([x, y, z, w]), read["velocity"], read["gyroscope"])
+        return Truth(state, read["accelerometer"])
 
-    def _sample(self, truth: RigidBodyState, imu: ImuSample, odometry: RigidBodyState) -> Sample:
-        self._truth = truth
-        if self._noisy:
-            imu = self._unit.measure(imu, self.data.time)
-        return Sample(odometry, imu, truth, self._scene.things)
+    def _sample(self, truth: Truth, odometry: RigidBodyState) -> Sample:
+        self._truth = truth.state
+        others = self._sensors.measure(truth, self.data.time)
+        return Sample({"odometry": Reading(odometry), **others}, truth.state, self._scene.things)

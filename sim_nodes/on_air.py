@@ -16,11 +16,12 @@ from fulmar_core.episode import Episode
 class CanStand(Backend, Protocol):
     """A simulator whose body can be kept where it is."""
 
-    def stand(self, ticks: int = 1) -> Sample:
+    def stand(self, ticks: int = 1, *, begins: int | None = None) -> Sample:
         """Let time pass for a body that nothing moves.
 
         Args:
             ticks: Number of physics steps, >= 1.
+            begins: As of `Backend.step`.
 
         Returns:
             Sample at their end; the body is at rest.
@@ -51,12 +52,15 @@ class OnAir:
             self._open_s = self._carried_s = 0.0
         return self._backend.reset(episode, seed=seed, number=number)
 
-    def step(self, command: np.ndarray, ticks: int = 1) -> Sample:
+    def step(self, command: np.ndarray, ticks: int = 1, *, begins: int | None = None) -> Sample:
         """Apply a command, or closed valves while the bearing is off; see `Backend.step`."""
         on, (grip_s, release_s) = self.bearing_on, self._scenario.held_s
         applied = np.asarray(command, dtype=float) if on else self._safe
         held = grip_s <= self._carried_s < release_s
-        sample = self._backend.step(applied, ticks) if on and not held else self._backend.stand(ticks)
+        if on and not held:
+            sample = self._backend.step(applied, ticks, begins=begins)
+        else:
+            sample = self._backend.stand(ticks, begins=begins)
         seconds = ticks * self.robot.timing.physics_dt
         with self._lock:
             self._carried_s += seconds if on else 0.0

@@ -65,24 +65,28 @@ class OneWorld:
         self._start_odometer(self._robot.timing.substeps(self._robot.timing.control_hz))
         return self._measure(truth)
 
-    def begin(self, command: np.ndarray, ticks: int, truth: RigidBodyState) -> None:
+    def begin(
+        self, command: np.ndarray, ticks: int, truth: RigidBodyState, *, begins: int | None = None
+    ) -> None:
         """Take a command for some physics ticks.
 
         Several ticks are a control step of their own. With one tick at a time, a control step begins with each new
-        command, and with an old one after the robot's own control period.
+        command, and, unless `begins` says where, with an old one after the robot's own control period.
 
         Args:
             command: Within the actuators' limits, shape (n,).
             ticks: >= 1.
             truth: Where the robot is.
+            begins: As of `Backend.step`.
         """
-        nominal = self._robot.timing.substeps(self._robot.timing.control_hz)
+        nominal = begins or self._robot.timing.substeps(self._robot.timing.control_hz)
         if self._measured == 1 and ticks != self._period:
             self._start_odometer(ticks)
             self._measured = 0
             self._measure(self._first)
         changed = self._command is None or not np.array_equal(command, self._command)
-        if ticks > 1 or changed or self._left <= 0:
+        due = self._left <= 0 if begins is None else begins > 0
+        if ticks > 1 or changed or due:
             self._command = np.array(command, dtype=float)
             self.actuation.begin(self._command[:, None], self.world, self._noise())
             if not (self._constant_push and self._begun):

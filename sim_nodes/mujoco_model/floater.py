@@ -1,12 +1,11 @@
-"""Robots with thrusters or propellers in MuJoCo: on air, in space or on water."""
+"""Robots that forces push in MuJoCo: on air, in space or on water."""
 
 from __future__ import annotations
 
 import mujoco
 import numpy as np
 
-from fulmar_core.actuators.propellers import Propellers
-from fulmar_core.actuators.thrusters import Thrusters
+from fulmar_core.actuators.pushing import Push, Pushing
 from fulmar_core.disturbances.world import World
 from fulmar_core.dynamics.hydrodynamics import GRAVITY
 from fulmar_core.planar import PlanarState, PlanarWrench
@@ -22,8 +21,8 @@ class Floater:
     """One body under forces at fixed places.
 
     A planar robot gets two slides and a hinge and stands on a floor under gravity, which holds it up but pushes
-    nowhere. A robot with hydrodynamics swims. Any other robot floats free without gravity. One actuator for each
-    nozzle or propeller pushes at its place along its direction, and takes newtons.
+    nowhere. A robot with hydrodynamics swims. Any other robot floats free without gravity. Each
+    actuator pushes at its place along its direction, and takes newtons.
 
     Attributes:
         water: That a robot with hydrodynamics swims in; None for any other.
@@ -37,16 +36,15 @@ class Floater:
         return self.water is None
 
     def __init__(self, robot: Robot) -> None:
-        assert isinstance(robot.actuators, Thrusters | Propellers)  # `robot_model_of` has others for wheels
+        assert isinstance(robot.actuators, Pushing)  # `robot_model_of` has others for wheels
         self._robot, self._actuators = robot, robot.actuators
         self._body = 0
         self._planar, self._swims = robot.body.planar, robot.hydrodynamics is not None
         self.water: Water | None = None
         if robot.hydrodynamics is not None:
-            places, directions = (
-                np.array(vectors) for vectors in list(zip(*self._pushes(), strict=True))[1:]
-            )
-            self.water = Water(robot.hydrodynamics, places, directions)
+            pushes = robot.actuators.pushes
+            places = np.array([push.position for push in pushes])
+            self.water = Water(robot.hydrodynamics, places, np.array([push.direction for push in pushes]))
 
     @property
     def rest_height(self) -> float:
@@ -78,8 +76,8 @@ class Floater:
             high=low + robot.body.height,
             ahead=robot.body.footprint_x,
         )
-        for name, position, direction in self._pushes():
-            _add_push(spec, body, name, position, direction)
+        for push in self._actuators.pushes:
+            _add_push(spec, body, push)
         return body
 
     def bind(self, model: mujoco.MjModel) -> None:
@@ -114,11 +112,7 @@ class Floater:
         outside: PlanarWrench,
     ) -> None:
         """Set thrusts, the push of the surroundings and the forces of the water; see `RobotModel.drive`."""
-        actuators = self._actuators
-        if isinstance(actuators, Thrusters):
-            data.ctrl[:] = actuators.thrusts(applied) * gain
-        else:
-            data.ctrl[:] = actuators.thrust(applied) * gain
+        data.ctrl[:] = self._actuators.thrusts(applied) * gain
         fx, fy, torque = outside
         push = np.array((fx, fy, 0.0, 0.0, 0.0, torque))
         if self.water is None:
@@ -130,33 +124,14 @@ class Floater:
             data.qpos[2], rotation.reshape(3, 3), data.qvel[:6], data.ctrl, push
         )
 
-    def _pushes(self) -> list[tuple[str, tuple[float, float, float], tuple[float, float, float]]]:
-        """Name, place and unit vector of everything that pushes."""
-        if isinstance(self._actuators, Thrusters):
-            return [
-                (nozzle.name, nozzle.position, _unit(nozzle.direction)) for nozzle in self._actuators.nozzles
-            ]
-        return [(each.name, each.position, (1.0, 0.0, 0.0)) for each in self._actuators.propellers]
 
-
-def _unit(vector: tuple[float, float, float]) -> tuple[float, float, float]:
-    length = sum(part * part for part in vector) ** 0.5
-    return vector[0] / length, vector[1] / length, vector[2] / length
-
-
-def _add_push(
-    spec: mujoco.MjSpec,
-    body: mujoco.MjsBody,
-    name: str,
-    position: tuple[float, float, float],
-    direction: tuple[float, float, float],
-) -> None:
-    body.add_site(name=name, pos=list(position), size=[0.02, 0.02, 0.02], rgba=[0.9, 0.4, 0.2, 1])
+def _add_push(spec: mujoco.MjSpec, body: mujoco.MjsBody, push: Push) -> None:
+    body.add_site(name=push.name, pos=list(push.position), size=[0.02, 0.02, 0.02], rgba=[0.9, 0.4, 0.2, 1])
     spec.add_actuator(
-        name=name,
+        name=push.name,
         trntype=mujoco.mjtTrn.mjTRN_SITE,
-        target=name,
-        gear=[*direction, 0.0, 0.0, 0.0],
+        target=push.name,
+        gear=[*push.direction, 0.0, 0.0, 0.0],
         gaintype=mujoco.mjtGain.mjGAIN_FIXED,
         biastype=mujoco.mjtBias.mjBIAS_NONE,
         dyntype=mujoco.mjtDyn.mjDYN_NONE,

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Protocol
 
 import mujoco
 import numpy as np
 
-from fulmar_core.actuators.ackermann import Ackermann
-from fulmar_core.actuators.differential_drive import DifferentialDrive
+from fulmar_core.actuators.pushing import Pushing
 from fulmar_core.disturbances.world import World
 from fulmar_core.episode import Episode
 from fulmar_core.errors import ConfigError
@@ -27,6 +27,8 @@ from sim_nodes.mujoco_model.objects import (
 )
 from sim_nodes.mujoco_model.scenery import add_scenery, add_sensors
 
+# Families on wheels each have a chassis of their own; all that push share `Floater`.
+WHEELED: dict[str, Callable[[Robot], RobotModel]] = {"differential_drive": DifferentialBase, "ackermann": Car}
 PALE, WATER = [0.85, 0.87, 0.9, 1.0], [0.55, 0.75, 0.85, 1.0]
 
 
@@ -166,9 +168,17 @@ class RobotModel(Protocol):
 
 
 def robot_model_of(robot: Robot) -> RobotModel:
-    """The MuJoCo model of a robot's family."""
-    if isinstance(robot.actuators, DifferentialDrive):
-        return DifferentialBase(robot)
-    if isinstance(robot.actuators, Ackermann):
-        return Car(robot)
-    return Floater(robot)
+    """The MuJoCo model of a robot's family.
+
+    Raises:
+        ConfigError: The family has none.
+    """
+    if isinstance(robot.actuators, Pushing):
+        return Floater(robot)
+    kind = robot.actuators.kind
+    if kind not in WHEELED:
+        raise ConfigError(
+            f"there is no MuJoCo model of robots with {kind} such as '{robot.name}'; there is one for what pushes, "
+            f"and for {', '.join(WHEELED)}. Use --backend mock."
+        )
+    return WHEELED[kind](robot)

@@ -9,9 +9,9 @@ import mujoco
 import numpy as np
 
 from fulmar_core.actuators.response import Response
+from fulmar_core.actuators.rolling import SERVO_S
 from fulmar_core.disturbances.world import World
 from fulmar_core.dynamics.hydrodynamics import GRAVITY
-from fulmar_core.dynamics.rolling import SERVO_S
 from fulmar_core.planar import PlanarState, PlanarWrench
 from fulmar_core.robot import Robot
 from sim_nodes.mujoco_model.scenery import BODY, DARK, FLOOR_BIT, add_hull

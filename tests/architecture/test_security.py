@@ -22,6 +22,7 @@ from fulmar_core.tasks import load_task
 from fulmar_core.topics import WIRES
 from policy_server.controllers import policies_directory
 from policy_server.policy import Policy
+from tests.architecture.security_policy import BEGIN, POLICY, with_sensors
 
 ON_THE_ROBOT = (
     "ros2_ws/src/fulmar_core/fulmar_core",
@@ -154,6 +155,12 @@ def test_the_policy_file_for_enclaves_has_exactly_the_topics_of_the_table(policy
     own = {wire.name.lstrip("/") for wire in WIRES}
     assert own <= {name.strip("/") for name in named}
     assert {name.strip("/") for name in named} - own <= {"parameter_events", "rosout"}
+
+
+def test_the_plant_publishes_and_the_recorder_subscribes_every_sensor_of_the_table():
+    written = POLICY.read_text(encoding="utf-8")
+    assert written.count(BEGIN) == 2
+    assert written == with_sensors(written), "out of date: python -m tests.architecture.security_policy"
 
 
 def test_only_the_plant_publishes_applied_commands_and_only_operators_stop_or_swap(policy_file):

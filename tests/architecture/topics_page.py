@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from fulmar_core.topics import ESTOP_RESET, ESTOP_TRIGGER, GIVE_BACK, WIRES, Wire
 
+UNRECORDED = ", ".join(f"`{wire.name}`" for wire in WIRES if not wire.recorded)
+
 INTRODUCTION = f"""\
 # Topics
 
@@ -12,7 +14,7 @@ INTRODUCTION = f"""\
 Topic names are relative to the robot's namespace, such as `/turtlebot2/odom`, unless they begin with a slash. The
 namespace is the robot's type or its `--name` ([systems.md](systems.md#several-robots-of-one-type)). Frames follow REP
 103 and REP 105; with a `--name` they have it as a prefix. Units are SI; orientations are quaternions (x, y, z, w).
-Every topic is recorded in the bag of a run.
+Every topic is recorded in the bag of a run, except {UNRECORDED}.
 
 | Unit of `effort` | Actuators |
 |---|---|
@@ -25,7 +27,7 @@ Every topic is recorded in the bag of a run.
 |---|---|
 | stream | reliable, volatile, keeps the last 50; in lock step all that a reliable subscriber has not received |
 | latched | reliable, transient local, keeps the last message, or as many as stated |
-| best_effort | best effort, volatile, keeps the last 50 |
+| best_effort | best effort, volatile, keeps the last 50; in lock step with estimators as stream |
 
 Subscribers of Fulmar ask for best effort where only the newest message counts. They receive goals, obstacles and the
 e-stop from volatile publishers, which is the default of rclpy and rclcpp, and from latched ones.
@@ -36,6 +38,7 @@ Services: `{ESTOP_TRIGGER}`, `{ESTOP_RESET}` and `{GIVE_BACK}` (std_srvs/Trigger
 
 DIRECTIONS = {
     "plant": "From the plant to controller and recorder",
+    "estimator": "From estimators to the plant",
     "controller": "From the controller to plant and recorder",
     "operator": "From the operator to plant and controller",
     "every node": "From every node to the operator",

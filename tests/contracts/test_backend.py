@@ -11,13 +11,13 @@ from fulmar_bringup.system import SIMULATED
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import Episode, draw_episode
 from fulmar_core.goal import goal_at
-from fulmar_core.paths import config_names
 from fulmar_core.planar import PlanarState
-from fulmar_core.robot import load_robot
+from fulmar_core.sensors.star_tracker import StarTrackerSpec
 from fulmar_core.tasks import load_task
 from sim_nodes.mock_backend import MockBackend
+from tests.new_robots import robots_of_every_family
 
-ROBOTS = {name: load_robot(name) for name in config_names("robots")}
+ROBOTS = robots_of_every_family()
 PLATFORM = ROBOTS["floating_platform"]
 TASK = load_task("go_to_pose")
 
@@ -98,6 +98,22 @@ def test_odometry_is_near_the_truth(backend):
     assert np.abs(turn).max() <= 6.0 * spec.yaw_rate.std
 
 
+def test_a_star_tracker_reports_at_its_own_rate_where_the_robot_has_one(build):
+    stars = StarTrackerSpec(rate_hz=2.0)
+    robot = replace(PLATFORM, sensors=replace(PLATFORM.sensors, star_tracker=stars))
+    backend = build(robot)
+    samples = [backend.reset(episode_of(robot), seed=1)]
+    ticks = round(0.1 / robot.timing.physics_dt)
+    samples += [backend.step(command_of(robot), ticks) for _ in range(20)]  # every 0.1 s
+    seen = [number for number, sample in enumerate(samples) if "star_tracker" in sample.readings]
+    assert seen == [0, 5, 10, 15, 20]
+    for sample in (samples[number] for number in seen):
+        attitude = sample.readings["star_tracker"].value
+        np.testing.assert_allclose(attitude, sample.truth.quat_xyzw, rtol=0, atol=1e-12)
+    assert "star_tracker" not in build(PLATFORM).reset(episode_of(PLATFORM), seed=1).readings
+    backend.close()
+
+
 def test_ticks_one_by_one_are_ticks_at_once(backend):
     robot = backend.robot
     ticks = robot.timing.substeps(robot.timing.control_hz)
@@ -135,8 +151,9 @@ def test_a_kept_sample_does_not_change_with_later_steps(backend):
 def test_it_moves_by_commands(backend):
     robot = backend.robot
     command = command_of(robot)
-    if robot.actuators.kind == "thrusters":
-        command = np.array([1.0, 0, 0, 0, 0, 0, 0, 1.0])
+    if robot.actuators.one_way:  # all of them together push nowhere
+        ends = np.eye(len(command))
+        command = ends[0] + ends[-1]
     begun = PlanarState.from_rigid(backend.reset(episode_of(robot), seed=1).truth)
     state = PlanarState.from_rigid(backend.step(command, 100).truth)
     assert np.hypot(state.x - begun.x, state.y - begun.y) > 0.1

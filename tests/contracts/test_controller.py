@@ -9,6 +9,7 @@ from dataclasses import fields, is_dataclass, replace
 import numpy as np
 import pytest
 
+from fulmar_core.actuators.families import FAMILIES
 from fulmar_core.control_loop import ControlLoop
 from fulmar_core.controllers.classical import LAWS
 from fulmar_core.disturbances.scenario import load_scenario
@@ -18,14 +19,14 @@ from fulmar_core.health.filters import HealthSettings
 from fulmar_core.paths import config_names
 from fulmar_core.planar import at_rest
 from fulmar_core.policy_bundle import read_passport
-from fulmar_core.robot import load_robot
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import load_task
 from policy_server.controllers import CONTROLLERS, Choice, load_controller, shipped_policies
 from tests.inputs import some_of
+from tests.new_robots import robots_of_every_family
 from tests.pairs import covering
 
-ROBOTS = {name: load_robot(name) for name in config_names("robots")}
+ROBOTS = robots_of_every_family()
 TASKS = {name: load_task(name) for name in config_names("tasks")}
 LEARNED = {
     (passport.robot, passport.task): str(folder)
@@ -200,5 +201,5 @@ def test_pairs_without_a_law_are_refused_with_what_to_use_instead(name):
         assert "is for robots with thrusters" in words or "there is one for: go_to_" in words
 
 
-def test_the_table_of_laws_knows_every_family():
-    assert set(LAWS) == {robot.actuators.kind for robot in ROBOTS.values()}
+def test_every_law_drives_a_family_and_every_family_names_a_law():
+    assert {family.law for family in FAMILIES.values()} == set(LAWS)

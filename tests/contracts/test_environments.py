@@ -15,18 +15,25 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.env_checker import check_env
 
 from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.paths import config_names
-from fulmar_core.robot import load_robot
+from fulmar_core.paths import OWN_FOLDERS, config_names
 from fulmar_core.tasks import load_task
+from tests.new_robots import robots_of_every_family, write_new_robots
 from tests.pairs import each_pair
 from training.environments import environment_id
 from training.gym_env import TaskEnv
 from training.vec_env import BatchVecEnv
 
-ROBOTS = {name: load_robot(name) for name in config_names("robots")}
+ROBOTS = robots_of_every_family()
 TASKS = {name: load_task(name) for name in config_names("tasks")}
 EACH_PAIR = each_pair(ROBOTS, TASKS)
 RANDOMISED = load_scenario("randomised")
+
+
+@pytest.fixture(autouse=True)
+def new_robots(tmp_path, monkeypatch):
+    """Environments load robots by their names."""
+    write_new_robots(tmp_path)
+    monkeypatch.setenv(OWN_FOLDERS, str(tmp_path))
 
 
 @pytest.fixture(autouse=True, scope="module")

@@ -9,18 +9,17 @@ import numpy as np
 import pytest
 
 from fulmar_core.actuators.ackermann import Ackermann
-from fulmar_core.actuators.thrusters import Thrusters
+from fulmar_core.actuators.rolling import Rolling
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.dynamics.contact import outline_of
 from fulmar_core.episode import draw_episode
-from fulmar_core.paths import config_names
-from fulmar_core.robot import Rolling, load_robot
 from fulmar_core.safety.watchdog import default_timeout
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import load_task
 from sim_nodes.mock_backend import MockBackend
+from tests.new_robots import robots_of_every_family
 
-ROBOTS = {name: load_robot(name) for name in config_names("robots")}
+ROBOTS = robots_of_every_family()
 WHEELED = {name: robot for name, robot in ROBOTS.items() if isinstance(robot.actuators, Rolling)}
 FLOATING = {name: robot for name, robot in ROBOTS.items() if name not in WHEELED}
 EACH = pytest.mark.parametrize("robot", ROBOTS.values(), ids=ROBOTS)
@@ -98,15 +97,14 @@ def test_it_can_push_and_turn_every_way_that_tasks_ask_for(robot):
     ways = [0, 1, 2] if robot.performance.lateral_speed > 0.0 else [0, 2]
     for way in ways:
         assert wrenches[:, way].min() < 0.0 < wrenches[:, way].max()
-    if isinstance(robot.actuators, Thrusters):
+    if robot.actuators.one_way:
         assert np.linalg.matrix_rank(robot.actuators.wrench_per_newton[:, [0, 1, 5]]) == 3
 
 
 @EACH_THAT_FLOATS
-def test_its_nozzles_and_propellers_sit_on_the_body(robot):
-    parts = getattr(robot.actuators, "nozzles", None) or robot.actuators.propellers
-    for part in parts:
-        x, y, _ = part.position
+def test_its_nozzles_propellers_and_fans_sit_on_the_body(robot):
+    for push in robot.actuators.pushes:
+        x, y, _ = push.position
         # The free-flyer's nozzles stick out by 2 cm: its box and their places are RoboRAN's.
         assert outline_of(robot).gap(np.asarray(x), np.asarray(y)) <= 0.03
 

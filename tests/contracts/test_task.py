@@ -16,15 +16,15 @@ from fulmar_core.goal import Goal
 from fulmar_core.observation import Observer
 from fulmar_core.paths import config_names
 from fulmar_core.planar import PlanarState
-from fulmar_core.robot import load_robot
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import ShippedTask, load_task
 from fulmar_core.things import push_things
 from fulmar_core.topics import GOAL_WIRES
+from tests.new_robots import robots_of_every_family
 from tests.pairs import each_pair
 
 TASKS = {name: load_task(name) for name in config_names("tasks")}
-ROBOTS = {name: load_robot(name) for name in config_names("robots")}
+ROBOTS = robots_of_every_family()
 RANDOMISED = load_scenario("randomised")
 EACH_PAIR, EACH_TASK = each_pair(ROBOTS, TASKS), pytest.mark.parametrize("task", TASKS.values(), ids=TASKS)
 COUNT = 50

@@ -16,11 +16,11 @@ from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool
 
-from fulmar_bringup.commissioning.commission import WIRINGS, is_right, rewired
+from fulmar_bringup.commissioning.commission import WIRINGS, Request, commission, is_right, rewired
 from fulmar_bringup.commissioning.hardware_file import command_of, line_of, wires_of, with_line, write_line
 from fulmar_bringup.commissioning.session import Session
 from fulmar_core.errors import ConfigError, RunFailed
-from fulmar_core.paths import config_names
+from fulmar_core.paths import OWN_FOLDERS, config_names
 from fulmar_core.robot import load_robot
 from fulmar_core.topics import ACTUATORS_STATE, AIR_BEARING, COMMAND, DIAGNOSTICS, MOCAP
 from fulmar_ros.convert import VectorWriter, stamp_of
@@ -29,8 +29,20 @@ from fulmar_ros.runtime import spinning
 from hardware_drivers.settings import hardware_path, load_hardware
 from hardware_drivers.valves import to_message
 from hardware_drivers.wiring import channels
+from tests.new_robots import write_new_robots
 
 ROBOT = load_robot("floating_platform")
+
+
+def test_a_family_that_no_procedure_moves_is_refused_before_anything_starts(tmp_path, monkeypatch):
+    write_new_robots(tmp_path)
+    monkeypatch.setenv(OWN_FOLDERS, str(tmp_path))
+    path = tmp_path / "fans.yaml"
+    path.write_text("title: t\nrobot: fan_disc\ndriver:\n  kind: my_fans:Board\n", encoding="utf-8")
+    with pytest.raises(
+        ConfigError, match=r"no pulses are known for 'fan_disc', which has fans; there are some for"
+    ):
+        commission(Request(str(path), pulses=True), print)
 
 
 @pytest.mark.parametrize("name", config_names("hardware"))

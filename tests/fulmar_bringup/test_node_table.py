@@ -342,3 +342,54 @@ def test_a_launched_system_takes_a_name_from_its_file_and_from_its_argument(tmp_
 def test_measurements_without_noise_may_repeat_while_a_robot_stands(changes, repeats):
     parameters = controller_spec(replace(PLAN, **changes)).parameters
     assert parameters.get("odometry_may_repeat", False) is repeats
+
+
+ESTIMATED = replace(PLAN, guards=Guards(estimator="mocap_imu"), lockstep=True)
+
+
+def test_in_lock_step_an_estimator_answers_the_periods_of_the_plant():
+    rows = system_rows(ESTIMATED, record={})
+    assert "lockstep/period" in rows["plant"].outputs
+    assert rows["plant"].parameters["chain"] == ["estimator"]
+    assert rows["estimator"].inputs == ("mocap/pose", "imu/data", "lockstep/period")
+    assert rows["estimator"].outputs == ("odom", "lockstep/answer")
+    assert rows["recorder"].parameters["lossless"] is True
+    awaited = {name: row.parameters.get("wait_for_subscribers") for name, row in rows.items()}
+    # Periods: recorder and estimator; odometry: recorder and controller.
+    assert (awaited["plant"], awaited["estimator"]) == (2, 2)
+    external = system_rows(replace(ESTIMATED, controller="external"), record={})
+    assert (
+        external["estimator"].parameters["wait_for_subscribers"] == 2
+    )  # recorder, and a controller of one's own
+
+
+@pytest.mark.parametrize("plan", [PLAN, replace(PLAN, lockstep=True), replace(ESTIMATED, lockstep=False)])
+def test_no_period_is_published_by_the_clock_or_without_a_node_that_answers_it(plan):
+    rows = system_rows(plan, record={})
+    assert "lockstep/period" not in rows["plant"].outputs
+    assert not {"chain", "lossless", "upstream"} & {name for row in rows.values() for name in row.parameters}
+
+
+def test_an_own_node_that_publishes_odometry_takes_the_place_of_the_plant():
+    def node(**wires):
+        return replace(PLAN, lockstep=True, nodes=(own_node("mine", **wires),))
+
+    inputs, outputs = ("mocap/pose", "lockstep/period"), ("odom", "lockstep/answer")
+    plan = node(inputs=inputs, outputs=outputs)
+    plant = system_rows(plan)["plant"]
+    assert (plant.parameters["estimated"], plant.parameters["chain"]) == (True, ["mine"])
+    assert "odom" not in plant.outputs
+    assert "lockstep/period" not in system_rows(replace(plan, lockstep=False))["plant"].outputs
+    with pytest.raises(ConfigError, match=r"its outputs lack 'lockstep/answer'"):
+        system_rows(node(inputs=inputs, outputs=("odom",)))
+    with pytest.raises(ConfigError, match=r"node 'mine' publishes 'odom': in lock step it answers"):
+        system_rows(node(inputs=inputs[:1], outputs=outputs))
+    with pytest.raises(ConfigError, match=r"estimator and mine publish odom, and a controller follows one"):
+        system_rows(replace(plan, guards=Guards(estimator="mocap_imu")))
+
+
+def test_an_estimator_waits_for_the_answer_of_a_node_whose_output_it_takes():
+    camera = own_node("camera", inputs=("lockstep/period",), outputs=("attitude", "lockstep/answer"))
+    rows = system_rows(replace(ESTIMATED, nodes=(camera,)))
+    assert rows["estimator"].parameters["upstream"] == ["camera"]
+    assert rows["plant"].parameters["chain"] == ["estimator", "camera"]

@@ -186,9 +186,9 @@ def test_an_emulated_one_begins_where_the_seed_says(plan):
     assert plan(backend="hardware", emulate=True).plan.start == plan().plan.start
 
 
-def test_an_estimator_in_lock_step_is_refused(plan):
-    with pytest.raises(ConfigError, match="Leave --lockstep out"):
-        plan(guards=dict(estimator="mocap_imu"), lockstep=True)
+def test_an_estimator_runs_in_lock_step_and_takes_poses_at_a_rate_of_their_own(plan):
+    asked = plan(guards=dict(estimator="mocap_imu"), lockstep=True, mocap_hz=100.0).plan
+    assert (asked.guards.estimator, asked.mocap_hz) == ("mocap_imu", 100.0)
 
 
 def test_a_bundle_for_something_else_stops_a_run_unless_a_fallback_is_named(plan):
@@ -279,7 +279,7 @@ def test_the_system_file_says_how_to_record(plan, tmp_path, monkeypatch):
 
 def test_a_simulated_motion_capture_needs_time_that_goes_on_and_no_real_one(plan):
     assert plan(mocap_hz=200.0).plan.mocap_hz == 200.0
-    with pytest.raises(ConfigError, match="in lock step time stands still"):
+    with pytest.raises(ConfigError, match="for an estimator only"):
         plan(mocap_hz=200.0, lockstep=True)
     with pytest.raises(ConfigError, match="a real robot has its own"):
         plan(mocap_hz=200.0, backend="hardware", controller="lqr", goal=(0.0, 0.0, 0.0))

@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from fulmar_core.actuators.family import Actuators
+from fulmar_core.actuators.response import Response
 from fulmar_core.config import load_config
 from fulmar_core.controllers.classical import LAWS, OTHERS, check_pair, has_law, load_classical
 from fulmar_core.controllers.excite import Excite
@@ -21,6 +23,7 @@ from fulmar_core.planar import PlanarState
 from fulmar_core.robot import load_robot
 from fulmar_core.rollout import roll_out_in_batch
 from fulmar_core.tasks import load_task
+from fulmar_core.teleop import hand_mapping
 from tests.inputs import inputs_at
 from tests.pairs import covering
 
@@ -30,7 +33,7 @@ PAIRS = [
     (robot, task)
     for robot in ROBOTS.values()
     for task in TASKS.values()
-    if task.kind in LAWS[robot.actuators.kind].tasks
+    if task.kind in LAWS[robot.actuators.law].tasks
 ]
 WHEELED = [robot for robot in ROBOTS.values() if robot.actuators.kind in ("differential_drive", "ackermann")]
 BOAT = ROBOTS["kingfisher"]
@@ -48,7 +51,7 @@ def command(robot, task, state, *targets, previous=None):
 
 # Robots of a family take turns at its tasks.
 QUICK = {
-    pair for kind in LAWS for pair in covering((r.name, t.name) for r, t in PAIRS if r.actuators.kind == kind)
+    pair for law in LAWS for pair in covering((r.name, t.name) for r, t in PAIRS if r.actuators.law == law)
 }
 
 
@@ -174,13 +177,13 @@ def test_a_boat_goes_astern_to_a_pose_that_looks_away_from_it():
 NUMBERS = [
     (robot, field.name)
     for robot in (ROBOTS["turtlebot2"], BOAT, ROBOTS["leatherback"])
-    for field in fields(LAWS[robot.actuators.kind].gains)
+    for field in fields(LAWS[robot.actuators.law].gains)
 ]
 
 
 @pytest.mark.parametrize(("robot", "name"), NUMBERS, ids=lambda value: getattr(value, "name", value))
 def test_the_metadata_hash_changes_with_every_gain(robot, name):
-    entry = LAWS[robot.actuators.kind]
+    entry = LAWS[robot.actuators.law]
     gains = load_config(entry.gains, config_path("controllers", f"{robot.name}_{entry.law.law}"))
     task, other = TASKS["go_to_position"], replace(gains, **{name: 1.01 * getattr(gains, name)})
     metadata = entry.law(robot, task, other).metadata()
@@ -209,7 +212,7 @@ def test_docs_state_of_every_law_and_of_every_task_that_one_does():
 
 
 def test_every_file_of_gains_belongs_to_a_robot_and_its_law():
-    every = {f"{robot.name}_{LAWS[robot.actuators.kind].law.law}" for robot in ROBOTS.values()}
+    every = {f"{robot.name}_{LAWS[robot.actuators.law].law.law}" for robot in ROBOTS.values()}
     others = {
         f"{robot.name}_{law}"
         for law, (family, _) in OTHERS.items()
@@ -222,10 +225,16 @@ def test_every_file_of_gains_belongs_to_a_robot_and_its_law():
 
 
 @dataclass(frozen=True)
-class Sails:
-    """Actuators of a family that no law knows."""
+class Sails(Actuators):
+    """A family that has nothing but what it must have."""
 
     kind: str = "sails"
+    response: Response = Response()
+    names = ("main",)
+    scale = np.ones(1)
+
+    def limited(self, command):
+        return command
 
 
 def test_a_family_without_a_law_or_an_excitation_is_named_in_one_line():
@@ -238,3 +247,7 @@ def test_a_family_without_a_law_or_an_excitation_is_named_in_one_line():
         check_pair(robot, task)
     with pytest.raises(ValueError, match=r"'excite' drives thrusters, .*; 'turtlebot2' has sails"):
         Excite(robot, task)
+    with pytest.raises(
+        ConfigError, match="'turtlebot2' cannot be teleoperated: robots with sails are not driven"
+    ):
+        hand_mapping(robot)

@@ -44,7 +44,7 @@ def success(robot: Robot, task_name: str, *, episodes: int) -> float:
 @pytest.mark.parametrize("name", TASKS)
 def test_a_new_robot_reaches_its_goals_without_a_gains_file(own, name):
     robot = load_robot(name)
-    assert f"{name}_{LAWS[robot.actuators.kind].law.law}" not in config_names("controllers")
+    assert f"{name}_{LAWS[robot.actuators.law].law.law}" not in config_names("controllers")
     assert success(robot, TASKS[name], episodes=8) >= 0.95
 
 
@@ -132,7 +132,7 @@ IN_LINE = tuple(replace(each, position=(each.position[0], 0.0, 0.0)) for each in
 @pytest.mark.parametrize(
     ("robot", "changes", "words"),
     [
-        (PLATFORM, {"nozzles": PLATFORM.actuators.nozzles[:3]}, "valves do not push in every direction"),
+        (PLATFORM, {"nozzles": PLATFORM.actuators.nozzles[:3]}, "thrusters do not push in every direction"),
         (BOAT, {"propellers": IN_LINE}, "propellers are not side by side"),
     ],
     ids=["platform", "boat"],

@@ -11,8 +11,9 @@ import pytest
 from fulmar_core.actuators.thrusters import Nozzle
 from fulmar_core.config import load_config
 from fulmar_core.controllers.classical import load_classical
-from fulmar_core.controllers.lqr import Lqr, LqrWeights, linear_model
+from fulmar_core.controllers.lqr import Lqr, LqrWeights
 from fulmar_core.disturbances.scenario import load_scenario
+from fulmar_core.dynamics.linear_model import linearise_wrench
 from fulmar_core.errors import ConfigError
 from fulmar_core.goal import goal_at
 from fulmar_core.metrics import episode_metrics, successes
@@ -40,15 +41,15 @@ def seen(task, state, *target):
 
 @pytest.mark.parametrize("hz", [50.0, 5.0])
 def test_the_linear_model_is_the_textbook_double_integrator(hz):
-    a, b = linear_model(ROBOT, 1.0 / hz)
+    model = linearise_wrench(ROBOT, at(), np.zeros(3), 1.0 / hz)
     dt, n = 1.0 / hz, ROBOT.timing.substeps(hz)
     expected_a = np.eye(6)
     expected_a[:3, 3:] = dt * np.eye(3)
     moments = np.array([ROBOT.body.mass, ROBOT.body.mass, ROBOT.body.inertia[2]])
     # Sum of n semi-implicit steps: dt²/2 of the continuous plant, times (n + 1) / n.
     expected_b = np.concatenate((np.diag(dt * dt * (n + 1) / (2 * n) / moments), np.diag(dt / moments)))
-    np.testing.assert_allclose(a, expected_a, rtol=0, atol=1e-7)
-    np.testing.assert_allclose(b, expected_b, rtol=0, atol=1e-7)
+    np.testing.assert_allclose(model.a, expected_a, rtol=0, atol=1e-7)
+    np.testing.assert_allclose(model.b, expected_b, rtol=0, atol=1e-7)
 
 
 USED = {"go_to_pose": [0, 1, 2, 3, 4, 5], "go_to_position": [0, 1, 3, 4, 5], "track_velocities": [3, 4, 5]}
@@ -58,9 +59,9 @@ USED = {"go_to_pose": [0, 1, 2, 3, 4, 5], "go_to_position": [0, 1, 3, 4, 5], "tr
 @pytest.mark.parametrize("task", [POSE, POSITION, SPEED], ids=lambda task: task.name)
 def test_the_closed_loop_without_saturation_is_stable(task, hz):
     used = USED[task.name]
-    a, b = linear_model(ROBOT, 1.0 / hz)
+    model = linearise_wrench(ROBOT, at(), np.zeros(3), 1.0 / hz)
     gain = gain_by_probing(load_lqr(ROBOT, task, control_hz=hz), task)
-    radius = np.abs(np.linalg.eigvals(a[np.ix_(used, used)] - b[used] @ gain)).max()
+    radius = np.abs(np.linalg.eigvals(model.a[np.ix_(used, used)] - model.b[used] @ gain)).max()
     assert radius < 1.0
     assert np.log(radius) * hz < -0.1  # errors die out within some ten seconds
 

@@ -27,7 +27,12 @@ def test_a_name_makes_the_namespace_and_a_name_apart_from_the_type_the_prefix_of
     assert namespace_of("alpha") == "/alpha"
     assert frames_of("jetbot", "jetbot") == PLAIN
     frames = frames_of("alpha", "jetbot")
-    assert (frames.odom, frames.base, frames.imu) == ("alpha/odom", "alpha/base_link", "alpha/imu_link")
+    assert (frames.odom, frames.base, frames.named("imu_link")) == (
+        "alpha/odom",
+        "alpha/base_link",
+        "alpha/imu_link",
+    )
+    assert [frames.named(shared) for shared in ("map", "inertial")] == ["map", "inertial"]
 
 
 def test_a_frame_is_known_with_the_own_prefix_and_without_it():

@@ -9,7 +9,8 @@ import pytest
 
 from fulmar_core.counter_rng import WORLD, Draws
 from fulmar_core.disturbances.scenario import draw_world, load_scenario
-from fulmar_core.dynamics.rolling import GRAVITY, rolling_step
+from fulmar_core.dynamics.hydrodynamics import GRAVITY
+from fulmar_core.dynamics.rolling import rolling_step
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import load_robot
 

@@ -16,6 +16,7 @@ def test_every_wire_of_the_module_is_in_the_table():
     from fulmar_core import topics
 
     named = [value for value in vars(topics).values() if isinstance(value, topics.Wire)]
+    named += topics.SENSOR_WIRES.values()
     assert {wire.name for wire in named} == {wire.name for wire in WIRES}
 
 

@@ -6,19 +6,26 @@ import numpy as np
 
 from fulmar_core.robot import load_robot
 from fulmar_core.sensors.imu import ImuSample
-from fulmar_ros.convert import ImuWriter
+from fulmar_core.sensors.reading import Reading
+from fulmar_core.sensors.table import SENSORS
+from fulmar_ros.sensor_wires import ReadingWriter
 
 TURN = np.array([0.0, 0.0, 0.3])
 
 
+def written(force):
+    writer = ReadingWriter(SENSORS["imu"], load_robot("turtlebot2").sensors.imu)
+    return writer.write(Reading(ImuSample(force, TURN)), 1)
+
+
 def test_a_force_that_nobody_measures_is_marked_as_absent():
-    message = ImuWriter(load_robot("turtlebot2")).write(ImuSample(np.full(3, np.nan), TURN), 1)
+    message = written(np.full(3, np.nan))
     assert message.linear_acceleration_covariance[0] == -1.0
     assert message.linear_acceleration.z == 0.0
     assert message.angular_velocity.z == 0.3
 
 
 def test_a_force_that_is_measured_has_its_noise():
-    message = ImuWriter(load_robot("turtlebot2")).write(ImuSample(np.array([0.0, 0.0, 9.81]), TURN), 1)
+    message = written(np.array([0.0, 0.0, 9.81]))
     assert message.linear_acceleration_covariance[0] > 0.0
     assert message.linear_acceleration.z == 9.81

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from fulmar_core.robot import load_robot
-from fulmar_ros.motion_capture import MotionCapture, PacedCapture, capture_maker, moved_on
+from fulmar_ros.motion_capture import MotionCapture, PacedCapture, SteppedCapture, capture_maker, moved_on
 from tests.states import planar_state
 
 MS = 1_000_000
@@ -40,6 +40,23 @@ def test_a_pose_moves_on_at_constant_velocity_and_turn_rate():
     assert state.position_in_world == pytest.approx([1.0075, 1.997, 0.0])
     assert float(state.yaw) == pytest.approx(0.306, abs=1e-6)
     assert np.linalg.norm(state.quat_xyzw) == pytest.approx(1.0)
+
+
+def test_in_lock_step_captures_faster_than_the_ticks_come_with_them_and_in_order():
+    """The plant's ticks are 20 ms apart: at 75 Hz the pose moves on from the tick before."""
+    capture, poses = SteppedCapture(rate_hz=75.0), []
+    for tick in range(4):
+        x = 1.0 + 0.5 * 0.02 * tick
+        poses += capture.see(planar_state(x, 0.0, 0.0, vx=0.5), 20 * MS * tick)
+    assert [stamp for stamp, _ in poses] == [0, 13_333_333, 26_666_667, 40_000_000, 53_333_333]
+    for stamp, pose in poses:
+        assert pose.position_in_world[0] == pytest.approx(1.0 + 0.5e-9 * stamp, abs=1e-12)
+
+
+def test_late_captures_in_lock_step_are_stamped_when_they_come():
+    capture = SteppedCapture(rate_hz=100.0, late_s=0.02)
+    found = [[stamp // MS for stamp, _ in capture.see(STATE, 20 * MS * tick)] for tick in range(3)]
+    assert found == [[], [20], [30, 40]]
 
 
 @pytest.mark.parametrize(

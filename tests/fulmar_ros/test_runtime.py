@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import threading
+import time
 
 import pytest
 import rclpy
 from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.signals import SignalHandlerOptions
+from std_msgs.msg import Bool
 
 from fulmar_ros import runtime
 from fulmar_ros.runtime import spinning
@@ -35,6 +38,23 @@ def test_an_error_of_a_callback_reaches_the_owner(node: Node) -> None:
     with spinning(node, keep):
         assert raised.wait(8.0)
     assert [repr(error) for error in errors] == ["ZeroDivisionError('no gain today')"]
+
+
+def test_a_publisher_that_another_thread_destroys_while_its_event_comes_ends_nothing(node: Node) -> None:
+    """Each publisher meets a latched subscription, which its QoS does not satisfy: an event that rclpy then takes."""
+    errors: list[Exception] = []
+    other = rclpy.create_node("latched")
+    latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    subscriptions = [other.create_subscription(Bool, "estop", lambda _: None, latched) for _ in range(3)]
+    with spinning(node, errors.append), spinning(other, errors.append):
+        for number in range(100):
+            publisher = node.create_publisher(Bool, "estop", 10)
+            time.sleep(0.0005 * (number % 8))  # events come some of 0 to 4 ms later
+            node.destroy_publisher(publisher)
+        served = threading.Event()
+        node.create_timer(0.01, served.set)
+        assert served.wait(8.0)
+    assert subscriptions and errors == []
 
 
 @pytest.mark.parametrize("ended", [False, True])

@@ -14,6 +14,7 @@ from fulmar_core.episode import Episode, draw_episode
 from fulmar_core.planar import at_rest
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.sensors.imu import ImuSample
+from fulmar_core.sensors.reading import Reading
 from fulmar_core.tasks import load_task
 from sim_nodes.emulators.device import EmulatedDevice
 from sim_nodes.mock_backend import MockBackend
@@ -55,7 +56,8 @@ class Bench:
                 sample = self.backend.step(self.command)
                 self._each_tick()
                 imu = ImuSample(np.array([0.0, 0.0, 9.80665]), sample.truth.angular_velocity_in_body)
-                self.sample = Sample(sample.truth, imu, sample.truth)
+                readings = {"odometry": Reading(sample.truth), "imu": Reading(imu)}
+                self.sample = Sample(readings, sample.truth)
                 self.device.report(self.sample, time.monotonic())
                 ticks += 1
 

@@ -7,7 +7,9 @@ from typing import Any
 
 import yaml
 
-from fulmar_core.paths import config_path
+from fulmar_core.config import load_config
+from fulmar_core.paths import config_names, config_path
+from fulmar_core.robot import Robot, load_robot
 
 # Tasks by robot; no law here parks a car.
 TASKS = {
@@ -19,7 +21,19 @@ TASKS = {
     "courier": "go_to_pose",
     "skiff": "go_to_pose",
     "rally": "go_to_position",
+    "fan_disc": "go_to_pose",
 }
+
+
+def new_robot(name: str) -> Robot:
+    """A robot whose YAML lies beside this file."""
+    return load_config(Robot, Path(__file__).parent / f"{name}.yaml")
+
+
+def robots_of_every_family() -> dict[str, Robot]:
+    """The robots that Fulmar comes with, and one of each further family, by their names."""
+    shipped = {name: load_robot(name) for name in config_names("robots")}
+    return shipped | {"fan_disc": new_robot("fan_disc")}
 
 
 def write_new_robots(folder: Path) -> None:

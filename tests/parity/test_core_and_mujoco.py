@@ -7,17 +7,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fulmar_core.actuators.rolling import Rolling
 from fulmar_core.disturbances.scenario import Actuation, load_scenario
 from fulmar_core.episode import Episode, draw_episode
 from fulmar_core.goal import goal_at
 from fulmar_core.observation import slewed
 from fulmar_core.paths import config_names
 from fulmar_core.planar import PlanarState
-from fulmar_core.robot import Rolling, load_robot
+from fulmar_core.robot import load_robot
 from fulmar_core.rollout import roll_out_in_backends, roll_out_in_batch
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import load_task
 from sim_nodes.mock_backend import MockBackend
+from tests.new_robots import new_robot
 
 mujoco = pytest.importorskip("mujoco")
 
@@ -26,6 +28,7 @@ from sim_nodes.mujoco_backend import MujocoBackend  # noqa: E402
 PLATFORM = load_robot("floating_platform")
 FLYER = load_robot("modular_freeflyer")
 BOAT = load_robot("kingfisher")
+FANS = new_robot("fan_disc")
 POSE, IDEAL = load_task("go_to_pose"), load_scenario("ideal")
 TWO_PI = 2.0 * np.pi
 
@@ -68,11 +71,12 @@ PUSH = {"force_x": 0.05, "force_y": -0.03, "torque": 0.004}
 WEAR = {"gain": np.linspace(0.8, 1.0, 8), "alive": np.array([1.0] * 7 + [0.0])}
 
 
-@pytest.mark.parametrize("robot", [PLATFORM, FLYER], ids=lambda robot: robot.name)
+@pytest.mark.parametrize("robot", [PLATFORM, FLYER, FANS], ids=lambda robot: robot.name)
 @pytest.mark.parametrize("changes", [{}, {"mass": 5.0} | PUSH, WEAR], ids=["calm", "pushed", "worn"])
-def test_robots_with_thrusters_move_alike_to_rounding(robot, changes):
-    rng = np.random.default_rng(6)
-    commands = rng.uniform(size=(101, 8))
+def test_robots_with_thrusters_or_fans_move_alike_to_rounding(robot, changes):
+    count = len(robot.actuators.names)
+    changes = changes | {name: changes[name][-count:] for name in WEAR if name in changes}
+    commands = np.random.default_rng(6).uniform(size=(101, count))
     ours, theirs = drive(
         robot, episode_of(robot, moving=True, **changes), lambda t: commands[round(5 * t)], 20.0
     )

@@ -21,6 +21,7 @@ from fulmar_core.planar import PlanarState
 from fulmar_core.robot import load_robot
 from fulmar_core.safety.fallback import ControllerSwitch, Standby
 from fulmar_core.safety.input_gate import Measurement
+from fulmar_core.sensors.reading import Reading
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import load_task
 from sim_nodes.mock_backend import MockBackend
@@ -102,7 +103,8 @@ class ReplayedBackend(MockBackend):
 
     def _given(self, sample):
         step = min(self._control_step, STEPS - 1)
-        return replace(sample, odometry=exact(self._series[step, self._number]).to_rigid())
+        seen = Reading(exact(self._series[step, self._number]).to_rigid())
+        return replace(sample, readings={**sample.readings, "odometry": seen})
 
 
 class Recorder:

@@ -13,6 +13,7 @@ from fulmar_core.planar import PlanarState
 from fulmar_core.robot import load_robot
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import load_task
+from tests.new_robots import new_robot
 from tests.pairs import covering
 
 torch = pytest.importorskip("torch")
@@ -65,6 +66,11 @@ def assert_alike(robot, task, dtype, device):
 )
 def test_torch_moves_every_robot_as_numpy_does(name, dtype):
     assert_alike(load_robot(name), load_task("go_to_position_with_obstacles"), dtype, "cpu")
+
+
+@pytest.mark.parametrize("dtype", CLOSE)
+def test_torch_moves_fans_as_numpy_does(dtype):
+    assert_alike(new_robot("fan_disc"), load_task("go_to_position_with_obstacles"), dtype, "cpu")
 
 
 @pytest.mark.parametrize("name", TASKS)

@@ -17,6 +17,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.supervisor import Supervisor
+from fulmar_core.actuators.rolling import Rolling
 from fulmar_core.backend import Sample
 from fulmar_core.controllers.controller import Controller, Inputs
 from fulmar_core.disturbances.scenario import load_scenario
@@ -24,7 +25,7 @@ from fulmar_core.episode import draw_episode, episode_steps
 from fulmar_core.observation import Observer
 from fulmar_core.paths import config_names
 from fulmar_core.planar import PlanarState
-from fulmar_core.robot import Robot, Rolling, load_robot
+from fulmar_core.robot import Robot, load_robot
 from fulmar_core.rollout import roll_out_in_backends
 from fulmar_core.tasks import Task, load_task
 from fulmar_ros.controller_node import ControllerNode

@@ -14,7 +14,7 @@ from pathlib import Path as FilePath
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from geometry_msgs.msg import PointStamped, PoseStamped, TwistStamped
+from geometry_msgs.msg import PointStamped, PoseStamped, QuaternionStamped, TwistStamped
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from mcap.reader import make_reader
@@ -26,9 +26,11 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from fulmar_bags.message_reader import goal_of
 from fulmar_core.robot import load_robot
+from fulmar_core.topics import IMU, MOCAP, SENSOR_WIRES
 from fulmar_ros.controller_node import ControllerNode
 from fulmar_ros.convert import OdometryWriter
 from fulmar_ros.estimator_node import EstimatorNode
+from fulmar_ros.estimator_wires import READERS
 from fulmar_ros.estop_node import EstopNode
 from fulmar_ros.goal_node import GoalNode
 from fulmar_ros.plant_node import PlantNode
@@ -232,13 +234,17 @@ def test_estimator_e_stop_and_teleoperation_survive_anything(
 ) -> None:
     estimator, estop, teleop = others
     published: list[Odometry] = []
-    estimator._publisher.publish = lambda message: published.append(copy.deepcopy(message))  # type: ignore[method-assign]
+    odom, _ = estimator._outputs[0]
+    odom.publish = lambda message: published.append(copy.deepcopy(message))  # type: ignore[method-assign]
     for message in messages:
         with np.errstate(all="ignore"):
             if isinstance(message, PoseStamped):
-                estimator._on_pose(message)
+                estimator._on_message("mocap", MOCAP.name, READERS[MOCAP][1], message)
+                attitude = QuaternionStamped(header=message.header, quaternion=message.pose.orientation)
+                wire = SENSOR_WIRES["star_tracker"]
+                estimator._on_message("star_tracker", wire.name, READERS[wire][1], attitude)
             elif isinstance(message, Imu):
-                estimator._on_imu(message)
+                estimator._on_message("imu", IMU.name, READERS[IMU][1], message)
             elif isinstance(message, JointState):
                 estop._on_command("actuators/command", message)
             elif isinstance(message, TwistStamped):

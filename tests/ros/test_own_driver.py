@@ -12,12 +12,19 @@ from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
 
+import numpy as np
 import pytest
+import yaml
+from geometry_msgs.msg import QuaternionStamped
 
+from fulmar_bags.message_reader import stamp_ns
 from fulmar_bringup.node_table import plant_spec
 from fulmar_bringup.processes import ProcessGroup
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_core.errors import BAD_USAGE, FAILED
+from fulmar_core.paths import config_path
+from fulmar_core.topics import SENSOR_WIRES
+from fulmar_ros.qos import subscriber_qos
 from fulmar_ros.runtime import spinning
 from hardware_drivers.driver_node import DriverNode
 from tests.conftest import RosDomain
@@ -29,6 +36,7 @@ pytestmark = pytest.mark.real_time
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "own-driver.md"
 STARTS_S = 40.0
+ATTITUDE = SENSOR_WIRES["star_tracker"]
 BOARD = """
 import threading
 from hardware_drivers.driver import DeviceDriver
@@ -80,6 +88,45 @@ def node(neighbour: Neighbour, folder: Path, exits: list[int]) -> Iterator[Drive
 def board(node: DriverNode) -> ModuleType:
     """The user's module: what was sent, and what it is to do wrong."""
     return importlib.import_module("own_board")
+
+
+STARS = """
+    def read(self):
+        import time
+        from fulmar_core.sensors.reading import Reading
+        from hardware_drivers.feedback import Report
+        now_ns = time.time_ns()
+        measured_ns = now_ns // 500_000_000 * 500_000_000  # twice a second
+        attitude = (0.0, 0.0, 1.0, 0.0) if measured_ns // 500_000_000 % 2 else (0.0, 0.0, 0.0, 1.0)
+        return Report(None, None, now_ns, {"star_tracker": Reading(attitude, measured_ns)})
+"""
+
+
+def test_a_star_tracker_of_the_device_is_published_once_a_reading_with_its_own_stamp(
+    neighbour: Neighbour, folder: Path, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
+) -> None:
+    """The robot's YAML, outside of the checkout, names the sensor; the class reports it."""
+    robot = yaml.safe_load(config_path("robots", "floating_platform").read_text(encoding="utf-8"))
+    robot["sensors"]["star_tracker"] = {"rate_hz": 2.0}
+    (folder / "robots").mkdir()
+    (folder / "robots" / "floating_platform.yaml").write_text(yaml.safe_dump(robot))
+    monkeypatch.setenv("FULMAR_CONFIGS", str(folder))
+    (folder / "own_board.py").write_text(BOARD + STARS)
+    found: list[tuple[str, int, float]] = []
+    neighbour.node.create_subscription(
+        QuaternionStamped,
+        ATTITUDE.name,
+        lambda message: found.append(
+            (message.header.frame_id, stamp_ns(message.header.stamp), message.quaternion.w)
+        ),
+        subscriber_qos(ATTITUDE, reliable=True, depth=50),
+    )
+    request.getfixturevalue("node")
+    until(lambda: len(found) >= 4)
+    stamps = [stamp for _, stamp, _ in found]
+    assert np.diff(stamps).tolist() == [500_000_000] * (len(stamps) - 1)
+    assert all(frame == "inertial" for frame, *_ in found)
+    assert [w for *_, w in found] == [0.0 if stamp // 500_000_000 % 2 else 1.0 for stamp in stamps]
 
 
 def open_first(neighbour: Neighbour) -> None:

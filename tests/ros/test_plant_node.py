@@ -17,6 +17,7 @@ from fulmar_bags.message_reader import stamp_ns
 from fulmar_core.backend import Sample
 from fulmar_core.safety.actuator_guard import ActuatorGuard
 from fulmar_core.safety.watchdog import Watchdog
+from fulmar_core.sensors.reading import Reading
 from fulmar_core.topics import COMMAND, ODOMETRY, SIMULATION_START_NS
 from fulmar_ros.convert import VectorWriter
 from fulmar_ros.plant_node import PlantNode
@@ -209,7 +210,8 @@ def test_odometry_goes_on_when_somebody_sets_the_clock_back(neighbour) -> None:
         until(lambda: wires.subscribers() > 0)
         time.sleep(0.3)
         for stamp in sent:
-            wires.publish_sample(Sample(planar_state(0.0, 0.0, 0.0), None, None, stamp_ns=stamp), 0)
+            readings = {"odometry": Reading(planar_state(0.0, 0.0, 0.0))}
+            wires.publish_sample(Sample(readings, None, stamp_ns=stamp), 0)
         until(lambda: len(stamps) >= 4)
         time.sleep(0.1)
     finally:

@@ -7,10 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fulmar_core.actuators.rolling import Rolling
 from fulmar_core.dynamics.hydrodynamics import GRAVITY
 from fulmar_core.errors import ConfigError
 from fulmar_core.paths import config_names
-from fulmar_core.robot import Rolling, load_robot
+from fulmar_core.robot import load_robot
 
 mujoco = pytest.importorskip("mujoco")
 

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from fulmar_core.actuators.rolling import Rolling
 from fulmar_core.dynamics.hydrodynamics import GRAVITY
 from fulmar_core.errors import SafetyError
 from fulmar_core.paths import config_names
 from fulmar_core.planar import PlanarState
-from fulmar_core.robot import Rolling, load_robot
+from fulmar_core.robot import load_robot
+from fulmar_core.sensors.star_tracker import StarTrackerSpec
 
 mujoco = pytest.importorskip("mujoco")
 
@@ -127,6 +131,14 @@ def test_two_resets_with_one_seed_give_the_same_samples(episode):
     first = noisy_run(episode, 4, backend=backend)
     np.testing.assert_array_equal(first, noisy_run(episode, 4, backend=backend))
     np.testing.assert_array_equal(first, noisy_run(episode, 4))
+
+
+def test_a_star_tracker_changes_no_bit_of_the_other_sensors(episode):
+    stars = StarTrackerSpec(std=1e-3, bias_std=1e-3, rate_hz=5.0, dropout=0.3)
+    starry = MujocoBackend(replace(ROBOT, sensors=replace(ROBOT.sensors, star_tracker=stars)))
+    np.testing.assert_array_equal(noisy_run(episode, 4, backend=starry), noisy_run(episode, 4))
+    starry.reset(episode(ROBOT), seed=4)
+    assert any("star_tracker" in starry.step(CLOSED).readings for _ in range(20))
 
 
 def test_another_seed_or_episode_gives_other_noise_everywhere(episode):

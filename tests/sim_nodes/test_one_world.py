@@ -7,7 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fulmar_core.disturbances.scenario import load_scenario
+from fulmar_core.episode import draw_episode
 from fulmar_core.robot import load_robot
+from fulmar_core.tasks import load_task
+from sim_nodes.mock_backend import MockBackend
+from sim_nodes.mujoco_backend import MujocoBackend
 from sim_nodes.one_world import OneWorld
 from tests.states import planar_state
 
@@ -102,3 +107,29 @@ def test_lost_measurements_repeat_the_one_before(episode):
         seen.append(one.measure(place(k)).position_in_world[0])
     repeated = np.mean(np.diff(seen) == 0.0)
     assert 0.3 < repeated < 0.7
+
+
+@pytest.mark.parametrize("make", [MujocoBackend, lambda robot, sensor_noise: MockBackend(robot)])
+@pytest.mark.parametrize("factor", [0.5, 2.0])
+def test_a_control_step_of_another_rate_is_the_same_tick_by_tick(make, factor):
+    """Commands stay for two periods, which only the caller can tell from one; noise is drawn for each of them."""
+    robot = load_robot("floating_platform")
+    task, scenario = load_task("go_to_pose"), load_scenario("drift_action_noise")
+    episode = draw_episode(robot, task, scenario, seed=5, number=0)
+    ticks = robot.timing.substeps(factor * robot.timing.control_hz)
+    command = np.array([1.0, 0.0] * 4)
+    ends, inferred = [], []
+    for way in ("at once", "tick by tick", "inferred"):
+        backend = make(robot, sensor_noise=False)
+        backend.reset(episode, seed=5)
+        for step in range(6):
+            held = command * (step // 2 % 2)
+            if way == "at once":
+                sample = backend.step(held, ticks)
+                continue
+            for tick in range(ticks):
+                begins = (0 if tick else ticks) if way == "tick by tick" else None
+                sample = backend.step(held, begins=begins)
+        (inferred if way == "inferred" else ends).append(sample.truth.position_in_world)
+    assert ends[0] == pytest.approx(ends[1], abs=1e-9)
+    assert np.abs(ends[0] - inferred[0]).max() > 1e-6

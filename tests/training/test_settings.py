@@ -10,6 +10,7 @@ from fulmar_core.errors import ConfigError, UnknownNameError
 from fulmar_core.paths import config_names
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
+from tests.new_robots import new_robot
 from training.settings import (
     Annealing,
     StopAtSuccess,
@@ -30,6 +31,11 @@ def test_a_robot_learns_as_its_family_does():
     assert load_training_settings(TURTLEBOT, TASK) == load_training_settings(
         TURTLEBOT, TASK, "differential_drive"
     )
+
+
+def test_a_family_may_learn_as_another_one_does():
+    fans = new_robot("fan_disc")
+    assert load_training_settings(fans, TASK) == load_training_settings(fans, TASK, "thrusters")
 
 
 def test_a_file_of_the_pair_s_own_name_replaces_the_family_s(monkeypatch, tmp_path):

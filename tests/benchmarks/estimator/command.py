@@ -52,13 +52,18 @@ def estimator(
 
     plot = plot or old_plot
     require("filterpy", *(["matplotlib"] if plot else []))
-    from fulmar_core.estimation.settings import load_estimator
+    from fulmar_core.errors import ConfigError
+    from fulmar_core.estimation.kinds import load_estimator
+    from fulmar_core.estimation.settings import PlanarMotionSettings
     from tests.benchmarks.estimator.comparison import MEAN, RATES_HZ, compare, requirements_met
     from tests.benchmarks.estimator.comparison import as_json as rows_of
     from tests.benchmarks.estimator.drive import drives as drive_about
 
     the_robot = load_robot(robot)
-    believed = dataclasses.replace(load_estimator(settings), latency_s=latency_ms / 1e3)
+    loaded = load_estimator(settings)
+    if not isinstance(loaded, PlanarMotionSettings):
+        raise ConfigError(f"{settings}: this benchmark compares estimators of kind 'planar_motion' alone.")
+    believed = dataclasses.replace(loaded, latency_s=latency_ms / 1e3)
     done = iter(range(1, 3 * len(RATES_HZ) + 1))
     with step_bar("estimating", 3 * len(RATES_HZ)) as progress:
         driven = drive_about(the_robot, count=drives, seconds=seconds, seed=seed)

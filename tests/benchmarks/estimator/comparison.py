@@ -8,11 +8,12 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from fulmar_core.estimation.estimator import Estimator
-from fulmar_core.estimation.settings import EstimatorSettings
+from fulmar_core.estimation.planar_motion import PlanarMotionEstimator
+from fulmar_core.estimation.settings import PlanarMotionSettings
 from fulmar_core.robot import Limits
 from fulmar_core.rotation import from_yaw
 from fulmar_core.sensors.imu import ImuSample
+from fulmar_core.sensors.reading import Reading
 from tests.benchmarks.estimator.drive import TICK_S, Drive
 
 POSES = 30
@@ -74,31 +75,43 @@ def estimate_by_mean(drive: Drive, every: int, latency_s: float) -> np.ndarray:
 
 
 def estimate_by_filter(
-    drive: Drive, every: int, latency_s: float, settings: EstimatorSettings, limits: Limits, *, with_imu: bool
+    drive: Drive,
+    every: int,
+    latency_s: float,
+    settings: PlanarMotionSettings,
+    limits: Limits,
+    *,
+    with_imu: bool,
 ) -> np.ndarray:
     """Motion by the estimator at each tick, shape (n, 3); poses are stamped when they come, `latency_s` late."""
-    estimator, late = Estimator(settings, limits), round(latency_s / TICK_S)
+    estimator, late = PlanarMotionEstimator(settings, limits), round(latency_s / TICK_S)
     estimates = np.full((len(drive.time_s), 3), np.nan)
     newest = np.full(3, np.nan)
     for tick in range(len(estimates)):
         now_ns, captured, taken = round(1e9 * float(drive.time_s[tick])), tick - late, False
         if with_imu:
             sample = ImuSample(drive.force[tick], np.array([0.0, 0.0, drive.turn_rate[tick]]))
-            taken = not estimator.see_imu(sample, now_ns)
+            taken = estimator.take("imu", Reading(sample, now_ns)) is None
         if captured >= 0 and captured % every == 0:
             x, y, yaw = drive.measured_place[captured]
-            taken |= not estimator.see_pose(np.array([x, y, 0.0]), from_yaw(np.asarray(yaw)), now_ns)
+            pose = np.array([x, y, 0.0, *from_yaw(np.asarray(yaw))])
+            taken |= estimator.take("mocap", Reading(pose, now_ns)) is None
         estimate = estimator.estimate() if taken else None
         if estimate is not None:
             newest = np.array(
-                [*estimate.state.velocity_in_world[:2], estimate.state.angular_velocity_in_body[2]]
+                [*estimate.value.velocity_in_world[:2], estimate.value.angular_velocity_in_body[2]]
             )
         estimates[tick] = newest
     return estimates
 
 
 def estimate_by(
-    method: str, drive: Drive, rate_hz: float, latency_s: float, settings: EstimatorSettings, limits: Limits
+    method: str,
+    drive: Drive,
+    rate_hz: float,
+    latency_s: float,
+    settings: PlanarMotionSettings,
+    limits: Limits,
 ) -> np.ndarray:
     """Motion of a drive by a method at each tick, with poses at a rate [Hz]; shape (n, 3)."""
     every = round(1.0 / (rate_hz * TICK_S))
@@ -109,7 +122,7 @@ def estimate_by(
 
 def compare(
     all_drives: list[Drive],
-    settings: EstimatorSettings,
+    settings: PlanarMotionSettings,
     limits: Limits,
     latency_s: float,
     progress: Callable[[], None],

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
-from fulmar_core.estimation.settings import EstimatorSettings
+from fulmar_core.estimation.settings import PlanarMotionSettings
 from fulmar_core.robot import Limits
 from fulmar_evaluation.report.style import ALARM, INK, house_style, legend, quiet_grid
 from tests.benchmarks.estimator.comparison import MEAN, RATES_HZ, WITH_IMU, Figures, estimate_by
@@ -16,7 +16,7 @@ COLOURS = {MEAN: ALARM, WITH_IMU: "#3b7ddd"}
 
 
 def draw(
-    drive: Drive, found: list[Figures], settings: EstimatorSettings, limits: Limits, latency_s: float
+    drive: Drive, found: list[Figures], settings: PlanarMotionSettings, limits: Limits, latency_s: float
 ) -> Figure:
     """One drive as both estimate it, at each rate of poses."""
     with house_style():

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -14,6 +16,8 @@ import numpy as np
 from fulmar_core.errors import shortened
 from fulmar_core.robot_name import PLAIN, Frames
 from fulmar_core.safety.input_gate import Measurement
+from fulmar_core.sensors.kind import SensorKind
+from fulmar_core.sensors.reading import Reading
 from fulmar_core.state import RigidBodyState
 
 NS = 1_000_000_000
@@ -51,6 +55,18 @@ def measurement_of(message: Any, frames: Frames = PLAIN) -> Measurement:
         shortened(frames.plain(name)) for name in (message.header.frame_id, message.child_frame_id)
     )
     return Measurement(stamp_ns(message.header.stamp), frame, child_frame, state)
+
+
+def reading_of(message: Any, kind: SensorKind) -> Reading:
+    """Read a sensor's message by the fields that its row of the table names; its frame is not checked.
+
+    Args:
+        message: Of the sensor's wire.
+        kind: Row of the sensor; it names fields.
+    """
+    assert kind.message is not None
+    values = [attrgetter(path)(message) for path in kind.message.paths]
+    return replace(kind.message.read(values), stamp_ns=stamp_ns(message.header.stamp))
 
 
 def goal_of(message: Any, frames: Frames = PLAIN) -> tuple[np.ndarray | None, str]:

@@ -5,6 +5,7 @@ The texts come from the Jazzy type store of `rosbags`, so a bag can be written w
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import struct
 from collections.abc import Sequence
@@ -13,6 +14,7 @@ from typing import Any
 
 import numpy as np
 from rosbags.interfaces import Nodetype
+from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
 
@@ -122,6 +124,29 @@ def _alike(walk: Walk, data: Sequence[bytes]) -> np.ndarray:
     columns = np.concatenate(fixed)
     same[same] = (table[:, columns] == table[0, columns]).all(axis=1)
     return same
+
+
+MOST_ROOM = 32  # that a serialiser leaves at the end [bytes]
+
+
+def canonical(data: bytes, kind: str) -> bytes:
+    """A serialised message as bytes that are equal for equal messages.
+
+    A serialiser leaves what happens to be in memory between fields, and room at the end. Here the former is zero, and
+    there is none of the latter.
+
+    Args:
+        data: CDR of one message.
+        kind: Its type, such as sensor_msgs/msg/Imu.
+
+    Raises:
+        ValueError: The bytes are no such message.
+    """
+    store = type_store()
+    for end in range(len(data), len(data) - MOST_ROOM, -1):
+        with contextlib.suppress(SerdeError):  # bytes are left over
+            return bytes(store.serialize_cdr(store.deserialize_cdr(data[:end], kind), kind))
+    raise ValueError(f"{len(data)} bytes are no {kind}.")
 
 
 class Walk:

@@ -12,6 +12,7 @@ from fulmar_bringup.system import System
 from fulmar_core.calibration import calibration_path
 from fulmar_core.controllers.classical import gains_of, gains_path
 from fulmar_core.disturbances.scenario import scenario_path
+from fulmar_core.estimation.kinds import estimator_path
 from fulmar_core.paths import config_path
 from fulmar_core.policy_bundle import PASSPORT
 from fulmar_core.provenance import fulmar_version, git_revision
@@ -42,7 +43,7 @@ def attachments(plan: RunPlan) -> str:
         "scenario.yaml": scenario_path(plan.scenario),
         **({"goals.yaml": Path(plan.goals)} if plan.goals else {}),
         **({"hardware.yaml": Path(plan.hardware)} if plan.hardware else {}),
-        **({"estimator.yaml": config_path("estimators", estimator)} if estimator else {}),
+        **({"estimator.yaml": estimator_path(estimator)} if estimator else {}),
         **({CALIBRATION: calibration} if calibration else {}),
         **_of_controller(plan),
     }

@@ -9,8 +9,6 @@ from pathlib import Path
 import numpy as np
 
 from fulmar_bringup.system import default_hardware
-from fulmar_core.actuators.ackermann import Ackermann
-from fulmar_core.actuators.differential_drive import DifferentialDrive
 from fulmar_core.errors import ConfigError
 from fulmar_core.goal import PoseTuple
 from fulmar_core.goal_files import FollowedPath, GoalFile, Poses, Positions, Velocities, load_goals
@@ -187,16 +185,15 @@ def check_pace(file: GoalFile, goals: str, robot: Robot) -> None:
 
 def _check_turning(targets: np.ndarray, goals: str, robot: Robot) -> None:
     """The same of turn rates; targets of shape (n, 3)."""
-    drive = robot.actuators
-    most = drive.max_yaw_rate if isinstance(drive, DifferentialDrive) else robot.limits.yaw_rate
+    most = robot.actuators.largest_yaw_rate or robot.limits.yaw_rate
     asked = float(np.abs(targets[:, 2]).max())
     if asked > most:
         raise ConfigError(
             f"the goals '{goals}' ask for {math.degrees(asked):g} deg/s; '{robot.name}' turns with at most "
             f"{math.degrees(most):.1f} deg/s."
         )
-    if isinstance(drive, Ackermann):
-        curvature = math.tan(drive.max_steering) / drive.wheelbase
+    curvature = robot.actuators.largest_curvature
+    if curvature is not None:
         tightest = np.abs(targets[:, 2]) - curvature * np.abs(targets[:, 0])
         if tightest.max() > 1e-9:
             speed, _, rate = targets[int(np.argmax(tightest))].tolist()

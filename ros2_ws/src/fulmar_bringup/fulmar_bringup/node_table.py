@@ -11,7 +11,7 @@ from fulmar_bringup.emulation import Emulation
 from fulmar_bringup.goal_plan import is_path_of_places
 from fulmar_bringup.run_plan import NodeSpec, Parameter, RunPlan, node_row
 from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.estimation.settings import load_estimator
+from fulmar_core.estimation.kinds import estimator_kind, load_estimator
 from fulmar_core.recording import Recording
 from fulmar_core.robot import load_robot
 from fulmar_core.robot_name import namespace_of
@@ -20,17 +20,19 @@ from fulmar_core.tasks import load_task
 from fulmar_core.topics import (
     ACTION,
     ACTUATORS_STATE,
+    ANSWER,
     CLOCK,
     DEVICE_STATE,
     ESTOP,
     GOAL_WIRES,
-    IMU,
     JOY,
     METADATA,
     MOCAP,
     OBSERVATION,
     OBSTACLES,
     ODOMETRY,
+    PERIOD,
+    SENSOR_WIRES,
     STATUS,
     TELEOP,
     TRUTH,
@@ -79,7 +81,7 @@ def controller_spec(plan: RunPlan) -> NodeSpec:
         if hardware.has_bearing:
             parameters["air_bearing"] = True
         # Encoders of a base at rest repeat; motion capture never does.
-        repeats = not guards.estimator and not hardware.seen_from_outside
+        repeats = not estimates_odometry(plan) and not hardware.seen_from_outside
     else:  # a simulation without noise repeats, too
         repeats = plan.backend == "mock" or not load_scenario(plan.scenario).sensor_noise
     if repeats:
@@ -123,11 +125,33 @@ def commander_specs(plan: RunPlan) -> tuple[NodeSpec, ...]:
     return (adapter_spec(plan),) if plan.adapter else ()
 
 
+def estimates_odometry(plan: RunPlan) -> bool:
+    """Whether a node between plant and controller publishes the odometry, in the place of the plant."""
+    estimator = plan.guards.estimator
+    if estimator and ODOMETRY in estimator_kind(estimator).publishes:
+        return True
+    return any(ODOMETRY.name in node.outputs for node in plan.nodes)
+
+
+def chain_of(plan: RunPlan) -> tuple[str, ...]:
+    """Nodes between plant and controller that answer each period of lock step; none by the clock."""
+    if not plan.lockstep:
+        return ()
+    own = (node.name for node in plan.nodes if PERIOD.name in node.inputs)
+    return (*(("estimator",) if plan.guards.estimator else ()), *own)
+
+
 def paced_wire(plan: RunPlan) -> Wire:
-    """The measurement whose subscribers a plant waits for: odometry, poses in its place, or what its actuators do."""
-    if plan.hardware and (plan.guards.estimator or not load_hardware(plan.hardware).measures_odometry):
+    """The measurement whose subscribers a plant waits for.
+
+    Odometry, poses in its place, or what the actuators do; in lock step with nodes between, the periods.
+    """
+    estimated = estimates_odometry(plan)
+    if chain_of(plan):
+        return PERIOD
+    if plan.hardware and (estimated or not load_hardware(plan.hardware).measures_odometry):
         return ACTUATORS_STATE
-    return MOCAP if plan.guards.estimator else ODOMETRY
+    return MOCAP if estimated else ODOMETRY
 
 
 def plant_spec(plan: RunPlan, *, port: str = "") -> NodeSpec:
@@ -152,8 +176,11 @@ def plant_spec(plan: RunPlan, *, port: str = "") -> NodeSpec:
     }
     if plan.guards.estop:
         parameters["estop"] = True
-    if plan.guards.estimator:
+    estimated, chain = estimates_odometry(plan), chain_of(plan)
+    if estimated:
         parameters["estimated"] = True
+    if chain:
+        parameters["chain"] = list(chain)
     if plan.backend == "hardware":
         parameters["hardware"] = plan.hardware
         if plan.arm:
@@ -166,19 +193,38 @@ def plant_spec(plan: RunPlan, *, port: str = "") -> NodeSpec:
             "hardware_drivers.driver_node",
             parameters,
             inputs=(command_wire(load_robot(plan.robot)).name,),
-            outputs=tuple(dict.fromkeys((ACTUATORS_STATE.name, IMU.name, paced_wire(plan).name))),
+            outputs=tuple(
+                dict.fromkeys((ACTUATORS_STATE.name, *_sensor_topics(plan), paced_wire(plan).name))
+            ),
         )
     parameters |= _motion_capture(plan)
     things = tuple(thing.wire.name for thing in load_task(plan.task).things)
-    poses = (MOCAP.name,) if plan.guards.estimator or plan.mocap_hz else ()
-    odometry = () if plan.guards.estimator else (ODOMETRY.name,)
+    poses = (MOCAP.name,) if estimated or plan.mocap_hz else ()
+    odometry = () if estimated else (ODOMETRY.name,)
+    period = (PERIOD.name,) if chain else ()
     return _row(
         plan,
         "plant",
         "sim_nodes.sim_node",
         parameters,
-        inputs=(command_wire(load_robot(plan.robot)).name,),
-        outputs=(CLOCK.name, TRUTH.name, ACTUATORS_STATE.name, IMU.name, *odometry, *poses, *things),
+        inputs=(command_wire(load_robot(plan.robot)).name, *((ANSWER.name,) if chain else ())),
+        outputs=(
+            CLOCK.name,
+            TRUTH.name,
+            ACTUATORS_STATE.name,
+            *_sensor_topics(plan),
+            *odometry,
+            *poses,
+            *things,
+            *period,
+        ),
+    )
+
+
+def _sensor_topics(plan: RunPlan) -> tuple[str, ...]:
+    """Topics of a robot's sensors but the odometry, which may come from another node."""
+    return tuple(
+        SENSOR_WIRES[name].name for name in load_robot(plan.robot).sensors.specs if name != "odometry"
     )
 
 
@@ -231,6 +277,7 @@ def recorder_spec(plan: RunPlan, *, directory: str = "", info: str = "", files: 
         "fulmar_ros.recorder_node",
         {key: text for key, text in texts.items() if text}
         | unusual
+        | ({"lossless": True} if chain_of(plan) else {})
         | ({"things": [thing.name for thing in things]} if things else {}),
         observed=tuple(wire.name for wire in (*WIRES, *(thing.wire for thing in things)) if wire.recorded),
     )
@@ -302,7 +349,26 @@ def guard_specs(plan: RunPlan) -> tuple[NodeSpec, ...]:
             _row(plan, "estop", "fulmar_ros.estop_node", {"robot": plan.robot}, outputs=(ESTOP.name,))
         )
     if plan.guards.estimator:
-        chosen = {"robot": plan.robot, "estimator": plan.guards.estimator}
-        wires = {"inputs": (MOCAP.name, IMU.name), "outputs": (ODOMETRY.name,)}
-        nodes.append(_row(plan, "estimator", "fulmar_ros.estimator_node", chosen, **wires))
+        nodes.append(_estimator_spec(plan, plan.guards.estimator))
     return tuple(nodes)
+
+
+def _estimator_spec(plan: RunPlan, estimator: str) -> NodeSpec:
+    """The node that estimates, by a file of `configs/estimators`."""
+    kind = estimator_kind(estimator)
+    parameters: dict[str, Parameter] = {"robot": plan.robot, "estimator": estimator}
+    inputs = tuple(wire.name for wire in kind.takes.values())
+    observed = tuple(wire.name for wire in kind.takes_if_there.values())
+    outputs = tuple(wire.name for wire in kind.publishes)
+    if plan.lockstep:
+        parameters["lockstep"] = True
+        upstream = [
+            node.name
+            for node in plan.nodes
+            if PERIOD.name in node.inputs and {*node.outputs} & {*inputs, *observed}
+        ]
+        if upstream:
+            parameters["upstream"] = upstream
+        inputs, outputs = (*inputs, PERIOD.name), (*outputs, ANSWER.name)
+    wires = {"inputs": inputs, "observed": observed, "outputs": outputs}
+    return _row(plan, "estimator", "fulmar_ros.estimator_node", parameters, **wires)

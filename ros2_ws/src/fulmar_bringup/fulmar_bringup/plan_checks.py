@@ -20,7 +20,7 @@ from fulmar_bringup.system import (
 from fulmar_core.bundle_signature import verify_bundle
 from fulmar_core.controllers.classical import has_law
 from fulmar_core.errors import BundleError, ConfigError, UnknownNameError
-from fulmar_core.estimation.settings import load_estimator
+from fulmar_core.estimation.kinds import load_estimator
 from fulmar_core.goal import Goal, PoseTuple
 from fulmar_core.own_class import is_own
 from fulmar_core.paths import config_names
@@ -29,14 +29,14 @@ from fulmar_core.robot import Robot
 from fulmar_core.safety.geofence import NO_AREA
 from fulmar_core.safety.watchdog import default_timeout
 from fulmar_core.tasks import Task
-from fulmar_core.topics import COMMAND, IMU, MOCAP, ODOMETRY, TRUTH, VELOCITY_COMMAND
+from fulmar_core.topics import COMMAND, MOCAP, SENSOR_WIRES, TRUTH, VELOCITY_COMMAND
 from hardware_drivers.own_driver import check_own_driver
 from hardware_drivers.settings import TOPIC_DRIVERS, UNARMED, MavlinkBoat, load_hardware
 from policy_server.controllers import EXTERNAL, FALLBACKS, controller_entry, shipped_policies, shipped_policy
 
 # Topics between plant, controller and estimator. Goals, e-stop and status keep their names: the run itself and every
 # other command of `fulmar` use them.
-REMAPPABLE = tuple(wire.name for wire in (MOCAP, ODOMETRY, IMU, TRUTH, COMMAND, VELOCITY_COMMAND))
+REMAPPABLE = tuple(wire.name for wire in (MOCAP, *SENSOR_WIRES.values(), TRUTH, COMMAND, VELOCITY_COMMAND))
 TOPIC = re.compile(r"/?[A-Za-z][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*")
 
 
@@ -189,29 +189,27 @@ def check_arming(hardware: str, *, arm: bool) -> None:
         )
 
 
-def checked_mocap(mocap_hz: float, hardware: str, *, emulate: bool, lockstep: bool) -> float:
+def checked_mocap(mocap_hz: float, hardware: str, *, emulate: bool, lockstep: bool, estimated: bool) -> float:
     """The rate itself, where something simulates a motion capture.
 
     Raises:
-        ConfigError: The robot is real, or time stands still between commands.
+        ConfigError: The robot is real, or in lock step nothing takes the poses.
     """
     if mocap_hz and hardware and not emulate:
         raise ConfigError("--mocap-hz simulates a motion capture; a real robot has its own. Leave it out.")
-    if mocap_hz and lockstep:
+    if mocap_hz and lockstep and not estimated:
         raise ConfigError(
-            "in lock step time stands still between commands, and a motion capture does not. "
-            "Leave --lockstep out; --rate makes a run faster."
+            "in lock step the plant publishes poses for an estimator only. Add --estimator, or leave --lockstep out; "
+            "--rate makes a run faster."
         )
     return mocap_hz
 
 
-def checked_guards(
-    usual: Guards, asked: Mapping[str, Any], robot: Robot, task: Task, *, lockstep: bool
-) -> Guards:
+def checked_guards(usual: Guards, asked: Mapping[str, Any], robot: Robot, task: Task) -> Guards:
     """The usual guards with what was asked for, if they can do what they are for.
 
     Raises:
-        ConfigError: A fallback that has nothing for the pair, no such estimator, or an estimator in lock step.
+        ConfigError: A fallback that has nothing for the pair, or no such estimator.
     """
     fallback = asked.get("fallback")
     if fallback is not None and fallback not in FALLBACKS:
@@ -221,11 +219,6 @@ def checked_guards(
         controller_entry(guards.fallback).check(robot, task)
     if guards.estimator:
         load_estimator(guards.estimator)
-        if lockstep:
-            raise ConfigError(
-                "an estimator needs every measurement in between, and lock step has one a command. "
-                "Leave --lockstep out; --rate makes a run faster."
-            )
     return guards
 
 

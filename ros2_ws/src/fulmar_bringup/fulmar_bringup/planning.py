@@ -28,13 +28,14 @@ from fulmar_bringup.plan_checks import (
     chosen_policy,
     read_remappings,
 )
-from fulmar_bringup.run_plan import RunPlan
+from fulmar_bringup.run_plan import NodeSpec, RunPlan
 from fulmar_bringup.system import (
     check_names,
     default_control_hz,
     default_guards,
     system_of,
 )
+from fulmar_bringup.system_rows import own_nodes
 from fulmar_core.disturbances.scenario import Scenario, load_scenario
 from fulmar_core.episode import draw_episode
 from fulmar_core.errors import ConfigError, UnknownNameError
@@ -147,9 +148,7 @@ def plan_run(
     hz = checked_rate(the_robot, control_hz or default_control_hz(robot, task, controller, backend))
     if not lockstep:
         check_beat(hz, rate)
-    watched = checked_guards(
-        default_guards(controller, backend, hardware), guards, the_robot, the_task, lockstep=lockstep
-    )
+    watched = checked_guards(default_guards(controller, backend, hardware), guards, the_robot, the_task)
     check_external(controller, watched, adapter=adapter, topic=topic, lockstep=lockstep)
     check_node_options(controller, copies=copies, network=controller_network)
     policy = chosen_policy(controller, policy, the_robot, the_task, hz, fallback=watched.fallback)
@@ -187,6 +186,7 @@ def plan_run(
     start = start or drawn_start
     if not goals_later:
         check_distance(the_robot, the_task, mission, start)
+    nodes = _own_nodes(robot, task, controller, backend, own_name)
     plan = RunPlan(
         robot=robot,
         task=task,
@@ -209,10 +209,13 @@ def plan_run(
         recording=_recording_of_run(controller, backend, recording),
         copies=copies,
         controller_network=controller_network,
-        mocap_hz=checked_mocap(mocap_hz, hardware, emulate=emulate, lockstep=lockstep),
+        mocap_hz=checked_mocap(
+            mocap_hz, hardware, emulate=emulate, lockstep=lockstep, estimated=bool(watched.estimator or nodes)
+        ),
         remappings=tuple(read_remappings(remap).items()),
         adapter=adapter_path(robot, adapter),
         adapter_topic=topic or "",
+        nodes=nodes,
     )
     goal = goal or (_pose_of(mission.current) if the_task.goal_topic in PLACES else None)
     return RunRequest(plan, goal, record, command, mission)
@@ -315,6 +318,14 @@ def chosen_recording(usual: Recording, mode: str | None) -> Recording:
     if mode not in MODES:
         raise UnknownNameError("recording", mode, MODES)
     return replace(usual, mode=cast(Mode, mode))
+
+
+def _own_nodes(robot: str, task: str, controller: str, backend: str, name: str) -> tuple[NodeSpec, ...]:
+    """The nodes of its own that the matching system file names, if it is of the same robot and task."""
+    system = system_of(controller, backend)
+    if system is None or (system.robot, system.task) != (robot, task):
+        return ()
+    return own_nodes(replace(system, name=name))
 
 
 def _recording_of_run(controller: str, backend: str, mode: str | None) -> Recording:

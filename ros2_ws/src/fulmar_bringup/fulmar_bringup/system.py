@@ -8,6 +8,7 @@ from typing import Any
 from fulmar_core.config import load_config
 from fulmar_core.controllers.classical import default_gains_note
 from fulmar_core.errors import ConfigError, UnknownNameError, did_you_mean
+from fulmar_core.estimation.kinds import estimator_kind
 from fulmar_core.paths import config_names, config_path
 from fulmar_core.recording import Recording
 from fulmar_core.robot import load_robot
@@ -150,7 +151,7 @@ def modules_of(
     """Modules of extras that the nodes of a controller, a backend, its guards and a hardware file import."""
     simulated = ("mujoco",) if backend == "mujoco" or emulated else ()
     driven = load_hardware(hardware).needs if hardware else ()
-    estimated = ("filterpy",) if guards.estimator else ()
+    estimated = estimator_kind(guards.estimator).needs if guards.estimator else ()
     return (*controller_entry(controller).needs, *simulated, *driven, *estimated)
 
 

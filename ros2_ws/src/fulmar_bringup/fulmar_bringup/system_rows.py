@@ -12,6 +12,7 @@ from pathlib import Path
 
 from fulmar_bringup.emulation import Emulation, emulation_of
 from fulmar_bringup.node_table import (
+    chain_of,
     commander_specs,
     emulator_spec,
     guard_specs,
@@ -26,7 +27,7 @@ from fulmar_core.errors import ConfigError, did_you_mean
 from fulmar_core.robot import load_robot
 from fulmar_core.robot_name import namespace_of
 from fulmar_core.tasks import load_task
-from fulmar_core.topics import CLOCK, WIRES, command_wire
+from fulmar_core.topics import ANSWER, CLOCK, ODOMETRY, PERIOD, WIRES, command_wire
 from hardware_drivers.settings import load_hardware
 from policy_server.controllers import controller_entry
 
@@ -65,6 +66,7 @@ def system_rows(
     if plan.goals:
         rows.append(run_goals_spec(plan))
     rows += plan.nodes
+    _check_chain(plan)
     check_rows(rows, outside=_from_outside(plan))
     return {row.name: row for row in _with_listeners(rows, plan)}
 
@@ -86,7 +88,7 @@ def check_rows(rows: Iterable[NodeSpec], *, outside: Iterable[str] = ()) -> None
         outside: Topics that come from elsewhere, beside those of operators and devices.
 
     Raises:
-        ConfigError: Two have one name or publish the clock, or one has an input that nothing publishes.
+        ConfigError: Two have one name or publish the clock or the odometry, or one has an input that nothing publishes.
     """
     rows = list(rows)
     names = [row.name for row in rows]
@@ -94,11 +96,10 @@ def check_rows(rows: Iterable[NodeSpec], *, outside: Iterable[str] = ()) -> None
         if names.count(name) > 1:
             modules = " and ".join(row.module for row in rows if row.name == name)
             raise ConfigError(f"two nodes are called '{name}': {modules}. Give one of them another name.")
-    clocks = [row.name for row in rows if CLOCK.name in row.outputs]
-    if len(clocks) > 1:
-        raise ConfigError(
-            f"{' and '.join(clocks)} publish {CLOCK.name}, and a system has one clock. Leave one out."
-        )
+    for topic, why in ((CLOCK.name, "a system has one clock"), (ODOMETRY.name, "a controller follows one")):
+        sources = [row.name for row in rows if topic in row.outputs]
+        if len(sources) > 1:
+            raise ConfigError(f"{' and '.join(sources)} publish {topic}, and {why}. Leave one out.")
     published = {topic for row in rows for topic in row.outputs}
     published |= set(outside) | {wire.name for wire in WIRES if wire.source in ("operator", "device")}
     for row in rows:
@@ -110,9 +111,24 @@ def check_rows(rows: Iterable[NodeSpec], *, outside: Iterable[str] = ()) -> None
                 )
 
 
+def _check_chain(plan: RunPlan) -> None:
+    """Refuse nodes of a system's own that would hold up lock step for ever."""
+    for node in plan.nodes if plan.lockstep else ():
+        if PERIOD.name in node.inputs and ANSWER.name not in node.outputs:
+            raise ConfigError(
+                f"node '{node.name}' receives '{PERIOD.name}', and its outputs lack '{ANSWER.name}': in lock step the "
+                "plant waits for its answer. See docs/estimation.md."
+            )
+        if ODOMETRY.name in node.outputs and PERIOD.name not in node.inputs:
+            raise ConfigError(
+                f"node '{node.name}' publishes '{ODOMETRY.name}': in lock step it answers each period of the plant. "
+                f"Add '{PERIOD.name}' to its inputs and '{ANSWER.name}' to its outputs (docs/estimation.md)."
+            )
+
+
 def _from_outside(plan: RunPlan) -> set[str]:
-    """Topics of nodes that Fulmar does not start."""
-    found = set()
+    """Topics of nodes that Fulmar does not start, and those on which nothing comes by the clock."""
+    found = set() if plan.lockstep else {PERIOD.name}
     if controller_entry(plan.controller).is_external:
         found.add(command_wire(load_robot(plan.robot)).name)
     if plan.hardware:  # motion capture, or another node that knows where the robot is
@@ -127,7 +143,13 @@ def _with_listeners(rows: list[NodeSpec], plan: RunPlan) -> list[NodeSpec]:
     command, paced = command_wire(load_robot(plan.robot)).name, paced_wire(plan).name
     # An external controller answers odometry in lock step; by the clock, only its owner knows where it measures.
     answers = plan.lockstep and controller_entry(plan.controller).is_external
-    awaited = {"plant": _listeners(rows, paced) + answers, "controller": _listeners(rows, command)}
+    chained = bool(chain_of(plan))
+    awaited = {
+        "plant": _listeners(rows, paced) + (answers and not chained),
+        "controller": _listeners(rows, command),
+    }
+    if chained:
+        awaited["estimator"] = _listeners(rows, ODOMETRY.name) + answers
     return [
         replace(row, parameters={**row.parameters, "wait_for_subscribers": awaited[row.name]})
         if row.name in awaited

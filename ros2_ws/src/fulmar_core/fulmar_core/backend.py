@@ -5,14 +5,16 @@ The same node runs on any backend; only the constructor argument differs.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
 from fulmar_core.episode import Episode
 from fulmar_core.robot import Robot
 from fulmar_core.sensors.imu import ImuSample
+from fulmar_core.sensors.reading import Reading
 from fulmar_core.state import RigidBodyState
 from fulmar_core.things import Poses
 
@@ -21,19 +23,35 @@ from fulmar_core.things import Poses
 class Sample:
     """What a backend reports at one instant."""
 
-    odometry: RigidBodyState | None  # measured, without a batch axis; None: somebody else measures it
-    imu: ImuSample | None  # None: the robot has no inertial unit
+    readings: Mapping[str, Reading]  # new ones, by the sensor's name in `sensors.table.SENSORS`
     truth: RigidBodyState | None  # None: not a simulator
     things: Poses = field(default_factory=dict)  # where the task's things are, each (3,)
     stamp_ns: int | None = None  # when it was captured; None: just now, by the clock of who asked [ns]
     applied: np.ndarray | None = None  # (n,) commands of the actuators; None: the very command
 
     @property
+    def odometry(self) -> RigidBodyState | None:
+        """Measured motion, without a batch axis; None: somebody else measures it."""
+        value: RigidBodyState | None = self._value("odometry")
+        return value
+
+    @property
     def measured(self) -> RigidBodyState:
         """The odometry of a backend that measures it, such as every simulator."""
-        if self.odometry is None:
+        odometry = self.odometry
+        if odometry is None:
             raise ValueError("this backend does not measure where it is.")
-        return self.odometry
+        return odometry
+
+    @property
+    def imu(self) -> ImuSample | None:
+        """The reading of the inertial unit; None: the robot has none."""
+        value: ImuSample | None = self._value("imu")
+        return value
+
+    def _value(self, sensor: str) -> Any:
+        reading = self.readings.get(sensor)
+        return None if reading is None else reading.value
 
 
 class Backend(Protocol):
@@ -54,7 +72,7 @@ class Backend(Protocol):
         """
         ...
 
-    def step(self, command: np.ndarray, ticks: int = 1) -> Sample:
+    def step(self, command: np.ndarray, ticks: int = 1, *, begins: int | None = None) -> Sample:
         """Apply a command for some physics steps.
 
         Several at once are a control step. One at a time, a command that stays the same goes on as it was.
@@ -62,6 +80,8 @@ class Backend(Protocol):
         Args:
             command: Within the actuators' limits, shape (n,).
             ticks: Number of physics steps, >= 1.
+            begins: Physics steps of the control step that begins with this one, 0 within it; None: a control step
+                begins with a new command, and after the robot's own control period. Hardware ignores it.
 
         Returns:
             Sample at their end.

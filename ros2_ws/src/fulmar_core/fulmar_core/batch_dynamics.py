@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import Any, Generic, TypeVar
 
 from fulmar_core.actuators.actuation import ActuationState
+from fulmar_core.actuators.pushing import Pushing
 from fulmar_core.attitude import Vector, cross, minus, plus, scaled
 from fulmar_core.counter_rng import Draws
 from fulmar_core.disturbances.scenario import Scenario, draw_world, longest_delay
@@ -112,6 +113,8 @@ class SpatialDynamics(Dynamics[SpatialWorld, SpatialState]):
     def __init__(self, robot: Robot, scenario: Scenario) -> None:
         super().__init__(robot, scenario)
         self._off_centre = may_be_off_centre(robot, scenario)
+        assert isinstance(robot.actuators, Pushing)  # as of `Robot.state_type`
+        self._actuators = robot.actuators
         self._full = any(robot.body.tensor[3:])  # whether the inertia has more than its diagonal
 
     def draw_world(self, draws: Draws) -> SpatialWorld:
@@ -151,7 +154,7 @@ class SpatialDynamics(Dynamics[SpatialWorld, SpatialState]):
             applied = actuation.advance(dt, latest_s=self._latest_s)
             if applied is not doing:
                 doing = applied
-                force, torque = self.robot.actuators.spatial_wrench(applied, actuation.gain)
+                force, torque = self._actuators.spatial_wrench(applied, actuation.gain)
                 if self._off_centre:
                     torque = minus(torque, cross(com, force))
                 torque = plus(torque, (world.torque[0], world.torque[1], world.torque[2]))

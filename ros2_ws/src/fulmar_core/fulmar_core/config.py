@@ -2,8 +2,9 @@
 
 Knows types and files, not what a robot or a task is. The supported field types are
 bool, int, float, str, `X | None`, `Literal`, `tuple[X, ...]`, `tuple[X, Y, Z]`, `dict[str, X]`,
-nested dataclasses, unions of dataclasses distinguished by a field `kind`, `Annotated[X, Named({...})]`, and `Any` for
-plain values of any shape. A member of a union whose `kind` is text stands for every dotted path of a class.
+nested dataclasses, unions of dataclasses distinguished by a field `kind`, `Annotated[X, Named({...})]`,
+`Annotated[X, Kinds({...})]`, and `Any` for plain values of any shape. A member of a union whose `kind` is text stands
+for every dotted path of a class.
 """
 
 from __future__ import annotations
@@ -32,6 +33,13 @@ class Named:
     """Values of a field that a file may give by name: `Annotated[X, Named({"name": value})]`."""
 
     values: Mapping[str, Any]
+
+
+@dataclasses.dataclass(frozen=True)
+class Kinds:
+    """Classes of a field of which the file's `kind` picks one: `Annotated[Base, Kinds({"kind": Class})]`."""
+
+    classes: Mapping[str, type]
 
 
 def load_config(cls: type[T], path: Path) -> T:
@@ -114,6 +122,9 @@ class _Builder:
             names = [note.values for note in notes if isinstance(note, Named)]
             if names and isinstance(node, ScalarNode):
                 return names[0][self._choice(tuple(names[0]), self._scalar(node, where), node, where)]
+            for note in notes:
+                if isinstance(note, Kinds):
+                    kind = self._member(list(note.classes.values()), node, where)
             return self.build(kind, node, where)
         if kind is Any:
             return self._plain(node, where)

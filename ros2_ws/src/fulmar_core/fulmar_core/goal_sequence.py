@@ -18,7 +18,6 @@ from fulmar_core.tasks import load_task
 from fulmar_core.tasks.terms import Tolerance, pose_errors
 
 HOLD_S = 1.0  # within the tolerance for so long, a target is reached rather than passed
-SIDEWAYS = ("thrusters",)  # actuators that move a robot to any side
 STANDSTILL = goal_at((0.0, 0.0, 0.0))  # as a velocity
 
 
@@ -204,4 +203,4 @@ def goal_sequence(goals: GoalFile, robot: Robot, *, as_path: bool = False) -> Go
         )
     if isinstance(goals, Velocities):
         return Schedule(goals.targets(), goals.ends())
-    return Following(goals, sideways=robot.actuators.kind in SIDEWAYS)
+    return Following(goals, sideways=robot.actuators.sideways)

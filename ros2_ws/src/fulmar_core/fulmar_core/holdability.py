@@ -12,7 +12,7 @@ import itertools
 
 import numpy as np
 
-from fulmar_core.actuators.thrusters import Thrusters
+from fulmar_core.actuators.pushing import PLANAR, Pushing
 from fulmar_core.errors import ConfigError
 from fulmar_core.planar import to_body
 from fulmar_core.robot import Robot
@@ -43,7 +43,12 @@ def hold_margin(robot: Robot, working: np.ndarray, force: np.ndarray, torque: fl
 
     valves = _valves(robot)
     scale = np.array([robot.performance.force, robot.performance.force, robot.performance.torque])
-    wrench = (valves.thrust * valves.wrench_per_newton[:, [0, 1, 5]] * np.asarray(working)[:, None] / scale).T
+    wrench = (
+        valves.full_thrust[:, None]
+        * valves.wrench_per_newton[:, PLANAR]
+        * np.asarray(working)[:, None]
+        / scale
+    ).T
     push = np.array([*to_body(np.asarray(heading), force[0], force[1]), torque]) / scale
     count, ways = wrench.shape[1], np.vstack((np.eye(3), -np.eye(3)))
     # One set of shares for each of the six ways, and one margin for all: W d_k - margin·way_k = -push.
@@ -84,7 +89,7 @@ def can_hold(
     Raises:
         ConfigError: The robot has no thrusters.
     """
-    working = np.ones(len(_valves(robot).nozzles))
+    working = np.ones(len(_valves(robot).names))
     working[list(lost)] = 0.0
     push = np.asarray(force, dtype=float)
     # Without a force from outside every heading is alike.
@@ -99,13 +104,13 @@ def uncontrollable_losses(robot: Robot, count: int) -> tuple[tuple[int, ...], ..
 
     A robot without thrusters has none.
     """
-    if not isinstance(robot.actuators, Thrusters):
+    if not (isinstance(robot.actuators, Pushing) and robot.actuators.one_way):
         return ()
-    every = itertools.combinations(range(len(robot.actuators.nozzles)), count)
+    every = itertools.combinations(range(len(robot.actuators.names)), count)
     return tuple(lost for lost in every if not can_hold(robot, lost))
 
 
-def _valves(robot: Robot) -> Thrusters:
-    if not isinstance(robot.actuators, Thrusters):
+def _valves(robot: Robot) -> Pushing:
+    if not (isinstance(robot.actuators, Pushing) and robot.actuators.one_way):
         raise ConfigError(f"'{robot.name}' has no thrusters, so that there are no shares of time to choose.")
     return robot.actuators

@@ -5,13 +5,15 @@ from __future__ import annotations
 import dataclasses
 
 from fulmar_core.actuators.actuation import ActuationState
+from fulmar_core.actuators.pushing import Pushing
+from fulmar_core.actuators.rolling import Rolling
 from fulmar_core.arrays import array_namespace
 from fulmar_core.disturbances.scenario import Scenario
 from fulmar_core.disturbances.world import World, outside_wrench
 from fulmar_core.dynamics.free_body import Wrench, free_body_step
 from fulmar_core.dynamics.rolling import rolling_step
 from fulmar_core.planar import PlanarState
-from fulmar_core.robot import Robot, Rolling
+from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
 
 
@@ -90,12 +92,13 @@ def move(
     off_centre: bool,
 ) -> PlanarState:
     """Move under a push that stays the same; arguments as in `control_step`."""
-    dt = robot.timing.physics_dt
-    if isinstance(robot.actuators, Rolling):
+    dt, actuators = robot.timing.physics_dt, robot.actuators
+    if isinstance(actuators, Rolling):
         for _ in range(substeps):
             target = actuation.advance(dt, latest_s=latest_s)
-            state = rolling_step(state, target, actuation.gain, outside, world, robot.actuators, dt)
+            state = rolling_step(state, target, actuation.gain, outside, world, actuators, dt)
         return state
+    assert isinstance(actuators, Pushing)  # what does not roll is pushed
     if off_centre:
         state = to_center(state, world)
     push: Wrench | None = None
@@ -104,7 +107,7 @@ def move(
         applied = actuation.advance(dt, latest_s=latest_s)
         if push is None or applied is not doing:
             doing = applied
-            push = robot.actuators.planar_wrench(applied, actuation.gain)
+            push = actuators.planar_wrench(applied, actuation.gain)
             if off_centre:
                 ahead, left, moment = push
                 push = ahead, left, moment - (world.com_x * left - world.com_y * ahead)

@@ -5,15 +5,16 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated, Any, TypeVar
 
 import numpy as np
 
-from fulmar_core.actuators.ackermann import Ackermann
-from fulmar_core.actuators.differential_drive import DifferentialDrive
-from fulmar_core.actuators.propellers import Propellers
-from fulmar_core.actuators.thrusters import Thrusters
+from fulmar_core.actuators.families import FAMILIES
+from fulmar_core.actuators.family import Actuators
+from fulmar_core.actuators.pushing import Pushing
+from fulmar_core.actuators.rolling import Rolling
 from fulmar_core.calibration import VARIABLE, calibrated, calibration_in_use, load_calibration
-from fulmar_core.config import load_config
+from fulmar_core.config import Kinds, load_config
 from fulmar_core.dynamics.hydrodynamics import Hydrodynamics
 from fulmar_core.errors import ConfigError
 from fulmar_core.paths import config_path
@@ -22,13 +23,13 @@ from fulmar_core.plausibility import check_plausible
 from fulmar_core.plausible_ranges import ROBOT
 from fulmar_core.sensors.imu import ImuSpec
 from fulmar_core.sensors.odometer import OdometrySpec
+from fulmar_core.sensors.table import RANGES, SENSORS
 from fulmar_core.spatial import SpatialState
 from fulmar_core.state import State
 
-Actuators = Thrusters | Propellers | DifferentialDrive | Ackermann
-Rolling = DifferentialDrive | Ackermann  # families whose wheels do not slip sideways
 Range = tuple[float, float]
 Vector3 = tuple[float, float, float]
+Class = TypeVar("Class", bound=type)
 
 
 @dataclass(frozen=True)
@@ -173,12 +174,27 @@ class Timing:
         return round(ratio)
 
 
+def _with_every_sensor(cls: Class) -> Class:
+    """Give a class a field for each row of the table of sensors; a robot has those that its file names."""
+    for name, kind in SENSORS.items():
+        if name not in cls.__annotations__:
+            cls.__annotations__[name] = kind.spec  # not optional: a key without a value is a mistake
+            setattr(cls, name, None)
+    return cls
+
+
 @dataclass(frozen=True)
+@_with_every_sensor
 class Sensors:
-    """What the robot measures."""
+    """What the robot measures: two that every robot has, and by name any other row of `SENSORS`."""
 
     odometry: OdometrySpec
     imu: ImuSpec
+
+    @property
+    def specs(self) -> dict[str, Any]:
+        """The robot's sensors by name, in the order of the table."""
+        return {name: spec for name in SENSORS if (spec := getattr(self, name)) is not None}
 
 
 @dataclass(frozen=True)
@@ -203,7 +219,7 @@ class Robot:
     body: Body
     uncertainty: Uncertainty
     timing: Timing
-    actuators: Actuators
+    actuators: Annotated[Actuators, Kinds(FAMILIES)]
     performance: Performance
     costs: Costs
     sensors: Sensors
@@ -214,7 +230,7 @@ class Robot:
     @property
     def state_type(self) -> type[State]:
         """Form of its states: in the plane, or, of bodies that neither the floor nor water carries, in space."""
-        free = not self.body.planar and self.hydrodynamics is None and not isinstance(self.actuators, Rolling)
+        free = not self.body.planar and self.hydrodynamics is None and isinstance(self.actuators, Pushing)
         return SpatialState if free else PlanarState
 
     def __post_init__(self) -> None:
@@ -225,8 +241,8 @@ class Robot:
             )
         if self.hydrodynamics is not None and isinstance(self.actuators, Rolling):
             raise ValueError("'hydrodynamics' and wheels exclude one another.")
-        if self.air_bearing and not (isinstance(self.actuators, Thrusters) and self.hydrodynamics is None):
-            raise ValueError("'air_bearing' is for robots on the floor with thrusters; leave it out.")
+        if self.air_bearing and not (isinstance(self.actuators, Pushing) and self.hydrodynamics is None):
+            raise ValueError("'air_bearing' is for robots on the floor with thrusters or fans; leave it out.")
         late_s = self.actuators.response.latest_s
         if self.timing.is_over_within(late_s):
             raise ValueError(
@@ -250,7 +266,7 @@ def load_robot(name: str) -> Robot:
         raise ConfigError(
             f"{path}: 'name' is '{robot.name}', the file's own name is '{name}'. Make them equal."
         )
-    check_plausible(robot, ROBOT, path)
+    check_plausible(robot, (*ROBOT, *robot.actuators.plausible, *RANGES), path)
     _check_spans(robot, path)
     calibration = calibration_in_use()
     if calibration is None or calibration.robot != name:

@@ -42,6 +42,9 @@ def namespace_of(name: str) -> str:
     return f"/{name}"
 
 
+SHARED = ("earth", "inertial", "map")  # frames that belong to no robot
+
+
 @dataclass(frozen=True)
 class Frames:
     """Names of a robot's frames; without a prefix those of a robot that is called as its type."""
@@ -58,10 +61,9 @@ class Frames:
         """The body."""
         return f"{self.prefix}base_link"
 
-    @property
-    def imu(self) -> str:
-        """The inertial sensor."""
-        return f"{self.prefix}imu_link"
+    def named(self, frame: str) -> str:
+        """A frame as messages name it: with the prefix, unless all robots share it."""
+        return frame if frame in SHARED else f"{self.prefix}{frame}"
 
     def plain(self, frame: str) -> str:
         """A received frame without the robot's own prefix: senders may leave it out."""

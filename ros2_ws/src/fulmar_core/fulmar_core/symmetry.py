@@ -12,9 +12,6 @@ from typing import Literal
 
 import numpy as np
 
-from fulmar_core.actuators.ackermann import Ackermann
-from fulmar_core.actuators.differential_drive import DifferentialDrive
-from fulmar_core.actuators.propellers import Propellers
 from fulmar_core.errors import ConfigError
 from fulmar_core.observation import Observer
 from fulmar_core.robot import Robot
@@ -64,24 +61,20 @@ class Mirror:
 
 
 def _mirrored_commands(robot: Robot) -> np.ndarray:
-    actuators = robot.actuators
-    if isinstance(actuators, DifferentialDrive | Ackermann):
-        return np.diag([1.0, -1.0])
-    if isinstance(actuators, Propellers):
-        places = [tuple(propeller.position) for propeller in actuators.propellers]
-        others = [(x, -y, z) for x, y, z in places]
-        if set(places) == set(others):
-            return np.eye(len(places))[[places.index(other) for other in others]]
-    raise ConfigError(
-        f"'mirror': the two sides of '{robot.name}' are not each other's mirror image, actuator by actuator. "
-        "Leave 'mirror' out."
-    )
+    done = robot.actuators.mirrored()
+    if done is None:
+        raise ConfigError(
+            f"'mirror': the two sides of '{robot.name}' are not each other's mirror image, actuator by actuator. "
+            "Leave 'mirror' out."
+        )
+    return done
 
 
 def _turned_commands(robot: Robot) -> np.ndarray:
-    if isinstance(robot.actuators, DifferentialDrive):
-        return np.diag([-1.0, 1.0])
-    raise ConfigError(
-        f"'mirror': '{robot.name}' does not drive astern as it drives ahead; robots on two driven wheels do. "
-        "Set 'mirror: sides', or leave it out."
-    )
+    done = robot.actuators.turned()
+    if done is None:
+        raise ConfigError(
+            f"'mirror': '{robot.name}' does not drive astern as it drives ahead; robots on two driven wheels do. "
+            "Set 'mirror: sides', or leave it out."
+        )
+    return done

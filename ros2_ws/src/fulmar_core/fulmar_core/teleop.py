@@ -8,11 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fulmar_core.actuators.ackermann import Ackermann
-from fulmar_core.actuators.differential_drive import DifferentialDrive
-from fulmar_core.actuators.propellers import Propellers
-from fulmar_core.actuators.thrusters import Thrusters
-from fulmar_core.controllers.valve_allocation import ValveAllocation
+from fulmar_core.actuators.pushing import Pushing
+from fulmar_core.controllers.allocation import allocation_of
+from fulmar_core.errors import ConfigError
 from fulmar_core.robot import Robot
 
 VALVE_COST = 0.02  # of an open valve, where a full wish has a cost of 1: small wishes open nothing
@@ -39,21 +37,26 @@ NOTHING = Wish()
 
 
 def hand_mapping(robot: Robot) -> Callable[[Wish], np.ndarray]:
-    """From wishes to commands of a robot, shape (n,), within its limits; no wish is the safe command."""
+    """From wishes to commands of a robot, shape (n,), within its limits; no wish is the safe command.
+
+    Raises:
+        ConfigError: A person cannot drive its family of actuators.
+    """
     actuators = robot.actuators
-    if isinstance(actuators, Thrusters):
-        return _valves(robot, actuators)
-    if isinstance(actuators, Propellers):
-        signs = np.sign(actuators.lever_arms)
-        return lambda wish: np.asarray(actuators.limited(np.asarray(wish.ahead) + signs * wish.turn))
-    assert isinstance(actuators, DifferentialDrive | Ackermann)
-    return lambda wish: np.asarray(actuators.limited(np.array([wish.ahead, wish.turn]) * actuators.scale))
+    try:
+        if actuators.by_hand(*NOTHING.parts) is not None:
+            return lambda wish: np.asarray(actuators.by_hand(*wish.parts))
+        return _allocated(robot)
+    except ValueError as error:
+        raise ConfigError(f"'{robot.name}' cannot be teleoperated: {error}") from error
 
 
-def _valves(robot: Robot, thrusters: Thrusters) -> Callable[[Wish], np.ndarray]:
+def _allocated(robot: Robot) -> Callable[[Wish], np.ndarray]:
+    """Commands that bring up the wrench a person asks for, in shares of the robot's own."""
+    assert isinstance(robot.actuators, Pushing)  # no other family leaves it to an allocation
     full = np.array([robot.performance.force, robot.performance.force, robot.performance.torque])
-    table = ValveAllocation(thrusters, weight=np.diag(1.0 / full**2), valve_cost=VALVE_COST)
-    return lambda wish: np.asarray(table.best(full * np.array(wish.parts)))
+    allocation = allocation_of(robot.actuators, weight=np.diag(1.0 / full**2), cost=VALVE_COST)
+    return lambda wish: np.asarray(allocation.best(full * np.array(wish.parts)))
 
 
 class Keyboard:

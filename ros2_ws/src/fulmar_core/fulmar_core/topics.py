@@ -6,14 +6,11 @@ robot's namespace, except those that begin with a slash.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal
-
-from fulmar_core.actuators.differential_drive import DifferentialDrive
 from fulmar_core.robot import Robot
-
-Source = Literal["plant", "controller", "operator", "every node", "device"]
-Delivery = Literal["stream", "latched", "best_effort"]
+from fulmar_core.sensors.table import SENSORS
+from fulmar_core.wire import Delivery as Delivery
+from fulmar_core.wire import Source as Source
+from fulmar_core.wire import Wire as Wire
 
 # Services, all of std_srvs/Trigger.
 ESTOP_TRIGGER, ESTOP_RESET, GIVE_BACK = "estop/trigger", "estop/reset", "teleop/give_back"
@@ -24,37 +21,8 @@ SIMULATION_START_NS = 1_000_000_000
 # Shares of full command, or m/s, rad/s and rad: by the kind of actuator, as docs/topics.md lists them.
 EFFORT_UNIT = "of each actuator, see above"
 
-
-@dataclass(frozen=True)
-class Wire:
-    """One topic.
-
-    `delivery` is how publishers offer it: "stream" is reliable with the last 50 kept (in lock step with all that a
-    reader has not got), "latched" is reliable and transient-local with the last `latest`, "best_effort" keeps the last
-    50.
-    """
-
-    name: str
-    type: str  # ROS message type
-    source: Source
-    delivery: Delivery
-    rate: str  # for people
-    content: str  # for people
-    recorded: bool = True
-    latest: int = 1  # messages that late subscribers of a latched wire still get
-    unit: str = "none"  # of the message's numbers, for people
-    frame: str = "none"  # that they are given in, for people
-
-
-ODOMETRY = Wire(
-    "odom", "nav_msgs/msg/Odometry", "plant", "stream", "every plant tick",
-    "measured pose and twist, stamped at measurement", unit="m, m/s, rad/s",
-    frame="`odom`; twist in `base_link`",
-)  # fmt: skip
-IMU = Wire(
-    "imu/data", "sensor_msgs/msg/Imu", "plant", "stream", "every plant tick",
-    "specific force (+g at rest) and turn rate; no orientation", unit="m/s², rad/s", frame="`imu_link`",
-)  # fmt: skip
+SENSOR_WIRES: dict[str, Wire] = {name: kind.wire for name, kind in SENSORS.items()}
+ODOMETRY, IMU = SENSOR_WIRES["odometry"], SENSOR_WIRES["imu"]
 MOCAP = Wire(
     "mocap/pose", "geometry_msgs/msg/PoseStamped", "plant", "best_effort",
     "every capture, where an estimator runs or `mocap_hz` is set",
@@ -186,16 +154,27 @@ VELOCITY_COMMAND = Wire(
     "command of a differential drive: `linear.x` and `angular.z`, stamped as the observation it answers",
     unit="m/s, rad/s", frame="`base_link`",
 )  # fmt: skip
+PERIOD = Wire(
+    "lockstep/period", "sensor_msgs/msg/JointState", "plant", "stream",
+    "control rate, in lock step with nodes between plant and controller",
+    "readings of one control period: `name` has topics, `position` the number of messages on each; the stamp ends it",
+)  # fmt: skip
+ANSWER = Wire(
+    "lockstep/answer", "sensor_msgs/msg/JointState", "estimator", "stream",
+    "control rate, from each node between plant and controller in lock step",
+    "the node `header.frame_id` has processed the period of the stamp; `name` and `position` as of `lockstep/period`",
+    recorded=False,
+)  # fmt: skip
 TRANSFORMS = Wire(
     "/tf", "tf2_msgs/msg/TFMessage", "device", "stream", "of its publishers",
     "frames, recorded where tf2_msgs is installed; not used for control", unit="m", frame="each its own",
 )  # fmt: skip
 
 WIRES: tuple[Wire, ...] = (
-    ODOMETRY, IMU, MOCAP, TRUTH, ACTUATORS_STATE, ACTUATORS_HEALTH, CLOCK, COMMAND, VELOCITY_COMMAND,
+    *SENSOR_WIRES.values(), MOCAP, TRUTH, ACTUATORS_STATE, ACTUATORS_HEALTH, CLOCK, COMMAND, VELOCITY_COMMAND,
     OBSERVATION, ACTION, METADATA, STATUS, DIAGNOSTICS, GOAL_POSE, GOAL_POINT, GOAL_PATH, GOAL_POSES,
     GOAL_VELOCITY, OBSTACLES, BLOCK, AIR_BEARING, DEVICE_STATE, ESTOP, ESTOP_RELEASED, TELEOP, JOY, SWAP,
-    TRANSFORMS,
+    TRANSFORMS, PERIOD, ANSWER,
 )  # fmt: skip
 
 GOAL_WIRES: dict[str, Wire] = {wire.name: wire for wire in (GOAL_POSE, GOAL_POINT, GOAL_PATH, GOAL_VELOCITY)}
@@ -208,4 +187,4 @@ def goal_wires(topic: str) -> tuple[Wire, ...]:
 
 def command_wire(robot: Robot) -> Wire:
     """Where a robot's commands come in."""
-    return VELOCITY_COMMAND if isinstance(robot.actuators, DifferentialDrive) else COMMAND
+    return VELOCITY_COMMAND if robot.actuators.takes_velocity else COMMAND

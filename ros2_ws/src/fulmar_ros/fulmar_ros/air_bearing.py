@@ -17,14 +17,20 @@ LOOK_S, AT_LEAST_S = 0.1, 1.0
 class AirBearingWires:
     """Serves `air_bearing/enable` and publishes `air_bearing/state`."""
 
-    def __init__(self, node: Node, bearing: AirBearing) -> None:
-        """Create every endpoint; requests switch `bearing`."""
+    def __init__(self, node: Node, bearing: AirBearing, *, watched: bool = True) -> None:
+        """Create every endpoint; requests switch `bearing`.
+
+        Args:
+            node: Owner of the endpoints.
+            bearing: The bearing.
+            watched: Publish its state by the wall clock, too; if not, its owner publishes each change.
+        """
         self._bearing = bearing
         self._said: bool | None = None
         self._silent_s = 0.0
         self._publisher = node.create_publisher(Bool, AIR_BEARING.name, publisher_qos(AIR_BEARING))
         self._service = node.create_service(SetBool, SERVICE, self._switch)
-        self._timer = node.create_timer(LOOK_S, self._look)
+        self._timer = node.create_timer(LOOK_S, self._look) if watched else None
         self.publish()
 
     def publish(self) -> None:
@@ -39,7 +45,8 @@ class AirBearingWires:
 
     def destroy(self, node: Node) -> None:
         """Destroy every endpoint."""
-        node.destroy_timer(self._timer)
+        if self._timer is not None:
+            node.destroy_timer(self._timer)
         node.destroy_service(self._service)
         node.destroy_publisher(self._publisher)
 

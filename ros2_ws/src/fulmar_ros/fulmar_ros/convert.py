@@ -6,7 +6,6 @@ everything else a control step does. What a control step publishes is written as
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -16,18 +15,14 @@ from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PoseStamped, TwistStamped
 from nav_msgs.msg import Odometry
 from rclpy.serialization import deserialize_message
-from sensor_msgs.msg import Imu, JointState
+from sensor_msgs.msg import JointState
 
 from fulmar_bags.message_reader import BODY_FRAME, FRAME, NS, measurement_of, stamp_ns, turned
-from fulmar_core.robot import Robot
 from fulmar_core.robot_name import PLAIN, Frames
 from fulmar_core.safety.input_gate import Measurement
-from fulmar_core.sensors.imu import ImuSample
 from fulmar_core.sensors.odometer import OdometrySpec
 from fulmar_core.state import RigidBodyState
 from fulmar_ros.wire_image import LATEST_NS, WireImage, marks
-
-UNKNOWN = -1.0  # REP-145: first covariance entry of a field that is absent
 
 
 def stamp_of(time_ns: int) -> Time:
@@ -115,31 +110,6 @@ class PoseWriter:
 
 def _diagonal(stds: Sequence[float]) -> np.ndarray:
     return np.diag(np.square(np.asarray(stds, dtype=float))).ravel()
-
-
-class ImuWriter:
-    """Inertial readings per REP-145, without an orientation; a specific force of NaN is not measured."""
-
-    def __init__(self, robot: Robot, frames: Frames = PLAIN) -> None:
-        """Fill in what never changes."""
-        self._message = Imu()
-        self._message.header.frame_id = frames.imu
-        self._message.orientation_covariance[0] = UNKNOWN
-        spec = robot.sensors.imu
-        self._message.linear_acceleration_covariance = np.eye(3).ravel() * spec.accelerometer.std**2
-        self._message.angular_velocity_covariance = np.eye(3).ravel() * spec.gyroscope.std**2
-
-    def write(self, sample: ImuSample, time_ns: int) -> Imu:
-        """Fill the message; it is overwritten by the next call."""
-        message = self._message
-        message.header.stamp = stamp_of(time_ns)
-        a, w = message.linear_acceleration, message.angular_velocity
-        a.x, a.y, a.z = force = sample.specific_force.tolist()
-        if math.isnan(force[0]):
-            a.x = a.y = a.z = 0.0
-            message.linear_acceleration_covariance[0] = UNKNOWN
-        w.x, w.y, w.z = sample.angular_velocity.tolist()
-        return message
 
 
 class VectorWriter:

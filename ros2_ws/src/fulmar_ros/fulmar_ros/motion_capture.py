@@ -48,6 +48,37 @@ class MotionCapture:
         """Nothing to end."""
 
 
+class SteppedCapture:
+    """Poses at a fixed rate above that of the measurements, in lock step.
+
+    Between two measurements the pose moves on from the first at constant velocity, as of `PacedCapture`.
+    """
+
+    def __init__(self, *, rate_hz: float, late_s: float = 0.0) -> None:
+        """Begin without a pose; arguments as of `MotionCapture`."""
+        self._period_s = 1.0 / rate_hz
+        self._line = MotionCapture(late_s=late_s)
+        self._last: tuple[int, RigidBodyState] | None = None
+        self._first_ns, self._count = 0, 0
+
+    def see(self, state: RigidBodyState, time_ns: int) -> list[tuple[int, RigidBodyState]]:
+        """Note a measurement and its time [ns]; returns poses to send now, each with its stamp [ns]."""
+        if self._last is None or time_ns < self._last[0]:
+            self._first_ns, self._count, self._last = time_ns, 0, (time_ns, state)
+        due = []
+        last_ns, last = self._last
+        while (captured_ns := self._first_ns + round(1e9 * self._count * self._period_s)) <= time_ns:
+            at_once = captured_ns == time_ns
+            pose = state if at_once else moved_on(last, 1e-9 * (captured_ns - last_ns))
+            due += self._line.see(pose, captured_ns)
+            self._count += 1
+        self._last = time_ns, state
+        return due
+
+    def close(self) -> None:
+        """Nothing to end."""
+
+
 Publish = Callable[[int, RigidBodyState], None]  # a stamp [ns] and a pose
 
 
@@ -111,7 +142,7 @@ class PacedCapture:
                 self._publish(stamp_ns, pose)
 
 
-Capture = MotionCapture | PacedCapture
+Capture = MotionCapture | SteppedCapture | PacedCapture
 MakeCapture = Callable[[Publish], Capture]
 
 
@@ -125,11 +156,13 @@ def capture_maker(
         rate_hz: Captures; 0: at every tick [Hz].
         late_s: As of `MotionCapture` [s].
         rate: Simulated seconds a wall-clock second.
-        lockstep: Whether time stands still between commands; then there is a pose with each measurement at most.
+        lockstep: Whether time stands still between commands; then poses are of the plant's own thread.
     """
     dt = robot.timing.physics_dt
-    if rate_hz * dt <= 1.0 or lockstep:
+    if rate_hz * dt <= 1.0:
         return lambda _publish: MotionCapture(rate_hz=rate_hz, late_s=late_s)
+    if lockstep:
+        return lambda _publish: SteppedCapture(rate_hz=rate_hz, late_s=late_s)
     return lambda publish: PacedCapture(publish, rate_hz=rate_hz, late_s=late_s, rate=rate, longest_s=dt)
 
 

@@ -46,7 +46,8 @@ class LockstepLoop:
         self._answer_timeout_s = answer_timeout_s
         self._publish_bearing = publish_bearing
         self._bearing_on: bool | None = None  # as it was published
-        self.steps = 0
+        self._commanded = True  # whether a command came for the step that is under way
+        self.steps = 0  # that a command came for
 
     def run(
         self, sample: Sample, steps: int | None, stop: threading.Event, on_step: OnStep | None = None
@@ -61,14 +62,18 @@ class LockstepLoop:
             command = self._exchange(sample, stop)
             if command is None:
                 return
-            sample = self._backend.step(command, self._substeps)
-            self._clock.advance(self._dt)
+            sample = self._step(command)
             done += 1
-            self.steps += 1
+            self.steps += self._commanded
             if on_step is not None:
                 on_step(sample, command)
         # The last state needs no answer, but belongs into the bag.
         self._wires.publish_truth(sample, self._clock.now_ns)
+
+    def _step(self, command: np.ndarray) -> Sample:
+        sample = self._backend.step(command, self._substeps)
+        self._clock.advance(self._dt)
+        return sample
 
     def _exchange(self, sample: Sample, stop: threading.Event) -> np.ndarray | None:
         stamp = self._clock.now_ns
@@ -112,6 +117,58 @@ class LockstepLoop:
             self._bearing_on = on
             self._publish_bearing()
         return not on
+
+
+class ChainLoop(LockstepLoop):
+    """Lock step with nodes between plant and controller, such as an estimator.
+
+    The plant publishes the readings of every physics step of a control period, then what the period holds. Each node
+    between answers once it has all its inputs, and the controller answers the odometry that comes of it.
+    """
+
+    def _step(self, command: np.ndarray) -> Sample:
+        dt = self._backend.robot.timing.physics_dt
+        sample = self._backend.step(command, begins=self._substeps)
+        self._clock.advance(dt)
+        for _ in range(self._substeps - 1):
+            self._wires.publish_tick(sample, self._clock.now_ns)
+            sample = self._backend.step(command, begins=0)
+            self._clock.advance(dt)
+        return sample
+
+    def _exchange(self, sample: Sample, stop: threading.Event) -> np.ndarray | None:
+        stamp, began, wires = self._clock.now_ns, time.monotonic(), self._wires
+        grounded, before = self._update_bearing(), self._wires.answered_ns
+        wires.publish_period(sample, stamp)
+        with wires.lock:
+            while not wires.wait_for_period(stamp, RESEND_S):
+                waited = time.monotonic() - began
+                if stop.is_set():
+                    return None
+                if waited > self._answer_timeout_s:
+                    raise LockstepError(self._silence(stamp, waited, before))
+                wires.repeat_period()
+            self._commanded = wires.answered_ns == stamp
+            command = self._guard.answer(time.monotonic_ns())
+        if grounded:
+            command = self._backend.robot.actuators.safe_command
+        wires.begin_period()
+        wires.publish_applied(command, stamp)
+        return command
+
+    def _silence(self, stamp: int, waited: float, before: int | None) -> str:
+        """Which link of the chain is silent."""
+        limit, silent = (
+            f"for {waited:.1f} s (limit {self._answer_timeout_s:g} s)",
+            self._wires.silent_nodes(stamp),
+        )
+        if silent:
+            return (
+                f"no answer to the readings up to t = {stamp / 1e9:.2f} s {limit}: {', '.join(silent)} "
+                f"{'is' if len(silent) == 1 else 'are'} silent. Look at the output."
+            )
+        why = self._why_unanswered(before)
+        return f"no command answers the odom of t = {stamp / 1e9:.2f} s {limit}: {why} Look at its output."
 
 
 class RealtimeLoop:

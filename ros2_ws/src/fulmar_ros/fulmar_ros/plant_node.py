@@ -25,7 +25,7 @@ from fulmar_ros.motion_capture import MakeCapture, capture_maker
 from fulmar_ros.parameters import name_of, read_parameters
 from fulmar_ros.plant_clock import SimulatedTime, WallTime, other_clocks
 from fulmar_ros.plant_health import PlantHealth
-from fulmar_ros.plant_loops import LockstepLoop, OnStep, RealtimeLoop
+from fulmar_ros.plant_loops import ChainLoop, LockstepLoop, OnStep, RealtimeLoop
 from fulmar_ros.plant_settings import PlantSettings, first_episode
 from fulmar_ros.plant_wires import PlantWires
 from fulmar_ros.qos import SAFE_REPEATS, subscriber_qos
@@ -126,9 +126,10 @@ class PlantNode(LifecycleNode):
             mocap=self._motion_capture(),
             lockstep=self.settings.lockstep,
             simulated_time=self.clock if isinstance(self.clock, SimulatedTime) else None,
+            chain=self.settings.between,
         )
         if isinstance(self._backend, AirBearing):
-            self._air = AirBearingWires(self, self._backend)
+            self._air = AirBearingWires(self, self._backend, watched=not self.settings.between)
         self._make_loops(self._backend)
         self.health.open(self, started_ns=self._started_ns)
         return DONE
@@ -215,7 +216,8 @@ class PlantNode(LifecycleNode):
 
     def _make_loops(self, backend: Backend) -> None:
         """New loops with new counts and deadlines."""
-        self._lockstep = LockstepLoop(
+        kind = ChainLoop if self.settings.between else LockstepLoop
+        self._lockstep = kind(
             backend,
             self.wires,
             self.guard,

@@ -34,10 +34,11 @@ class PlantSettings:
     duration_s: float = 0.0  # simulated time after which the plant stops; 0: never [s]
     command_timeout_s: float = BY_RATE  # 0 switches the watchdog off
     answer_timeout_s: float = 5.0  # longest wait for a controller in lock step [s]
-    wait_for_subscribers: int = 0  # of odom, or of an estimator's inputs, before the first step
+    wait_for_subscribers: int = 0  # of odom, an estimator's inputs or periods, before the first step
     estimated: bool = False  # publish mocap/pose in the place of odom: an estimator makes odom of it
     mocap_hz: float = 0.0  # publish mocap/pose so often, also beside odom; 0: at every tick in its place [Hz]
     mocap_late_s: float = 0.0  # by which a pose is stamped and sent after its capture [s]
+    chain: tuple[str, ...] = ("",)  # nodes between plant and controller that answer each period of lock step
     estop: bool = False  # nothing moves before a message of an e-stop
     autostart: bool = True
 
@@ -58,8 +59,10 @@ class PlantSettings:
             raise ValueError("mocap_hz and mocap_late_s must not be negative.")
         if self.mocap_hz > MOST_MOCAP_HZ:
             raise ValueError(f"mocap_hz = {self.mocap_hz:g} Hz must be at most {MOST_MOCAP_HZ:g} Hz.")
-        if self.estimated and self.lockstep:
-            raise ValueError("an estimator needs every measurement in between; lock step has none.")
+        if self.estimated and self.lockstep and not self.between:
+            raise ValueError(
+                "in lock step, the nodes that make odometry of poses must be named: give 'chain', such as [estimator]."
+            )
         if self.seed < 0:
             raise ValueError(f"seed = {self.seed} must not be negative.")
 
@@ -67,6 +70,11 @@ class PlantSettings:
     def publishes_odometry(self) -> bool:
         """Whether this plant says where it is, rather than an estimator or somebody else."""
         return not self.estimated
+
+    @property
+    def between(self) -> tuple[str, ...]:
+        """Nodes that take part in lock step between plant and controller."""
+        return tuple(name for name in self.chain if name) if self.lockstep else ()
 
     def control_rate(self, robot: Robot) -> float:
         """Command rate [Hz]."""

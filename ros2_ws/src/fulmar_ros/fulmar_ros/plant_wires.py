@@ -6,6 +6,7 @@ import threading
 import time
 from collections import OrderedDict
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -14,7 +15,7 @@ from nav_msgs.msg import Odometry
 from rclpy.lifecycle import LifecycleNode
 from rclpy.publisher import Publisher
 from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import Imu, JointState
+from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, String
 from std_srvs.srv import Trigger
 
@@ -31,9 +32,7 @@ from fulmar_core.topics import (
     ESTOP,
     ESTOP_RELEASED,
     GIVE_BACK,
-    IMU,
     MOCAP,
-    ODOMETRY,
     TELEOP,
     TRUTH,
     VELOCITY_COMMAND,
@@ -41,7 +40,6 @@ from fulmar_core.topics import (
     thing_wire,
 )
 from fulmar_ros.convert import (
-    ImuWriter,
     OdometryWriter,
     PoseWriter,
     TwistReader,
@@ -55,7 +53,9 @@ from fulmar_ros.motion_capture import MakeCapture
 from fulmar_ros.operator_subscription import subscribe_operator
 from fulmar_ros.parameters import own_frames
 from fulmar_ros.plant_clock import SimulatedTime
+from fulmar_ros.plant_period import PlantPeriod
 from fulmar_ros.qos import FLUSH_S, LAST_WORDS_S, flush, publish_patiently, publisher_qos, subscriber_qos
+from fulmar_ros.sensor_wires import SensorWires
 
 REMEMBERED = 256  # states whose answer may still come, at least
 
@@ -127,6 +127,7 @@ class PlantWires:
         mocap: MakeCapture | None = None,
         lockstep: bool = False,
         simulated_time: SimulatedTime | None = None,
+        chain: Sequence[str] = (),
     ) -> None:
         """Create every endpoint.
 
@@ -141,6 +142,7 @@ class PlantWires:
             lockstep: Whether the plant waits for the controller's answers, and for readers that lag behind. By the
                 clock, without it, a person may take the actuators, and commands go before other work.
             simulated_time: Clock of a simulated plant, by which actuators follow commands.
+            chain: Nodes between plant and controller that take part in lock step.
         """
         self._mocap = mocap(self._publish_pose) if mocap is not None else None
         self._prior = lockstep  # whether the threads that commands pass have what priority they need
@@ -150,7 +152,7 @@ class PlantWires:
         self.latency_ms = Spread()
         self.answers = 0  # states that a command has answered
         self.listening = True  # whether commands of controllers count
-        self._guard = guard
+        self._robot, self._guard = robot, guard
         self._simulated_time = simulated_time
         self._sent = SentStates(guard.watchdog.timeout_ns)
         # Without them, commands answer odometry of another node, whose stamps are of another clock.
@@ -158,22 +160,22 @@ class PlantWires:
         self.answered_ns: int | None = None  # stamp of the newest command that was taken
         self._clock_ns = 0
         self._captured_ns = 0
-        self._qos = qos = partial(publisher_qos, lockstep=lockstep)
-        self._odometry = node.create_publisher(Odometry, ODOMETRY.name, qos(ODOMETRY)) if odometry else None
+        self._qos = qos = partial(publisher_qos, lockstep=lockstep, lossless=bool(chain))
+        self._period = PlantPeriod(node, chain, self.lock) if chain else None
+        if self._period is not None:
+            self._publish = self._period.publish
+        frames = own_frames(node, robot)
+        self._sensors = SensorWires(node, robot, frames, qos, self._publish, odometry=odometry)
         self._poses = (
             node.create_publisher(PoseStamped, MOCAP.name, qos(MOCAP)) if mocap is not None else None
         )
-        self._imu = node.create_publisher(Imu, IMU.name, qos(IMU))
         self._state = node.create_publisher(JointState, ACTUATORS_STATE.name, qos(ACTUATORS_STATE))
         self._truth = node.create_publisher(Odometry, TRUTH.name, qos(TRUTH)) if simulated else None
         self._clock = node.create_publisher(Clock, CLOCK.name, qos(CLOCK)) if clock else None
-        self._frames = frames = own_frames(node, robot)
-        self._write_odometry = OdometryWriter(
-            robot.sensors.odometry, frame=frames.odom, child_frame=frames.base
-        )
+        if self._period is not None:
+            self._period.distinguish(odometry=self._sensors.odometry, truth=self._truth, clock=self._clock)
         self._write_pose = PoseWriter(frames)
         self._write_truth = OdometryWriter(None, frame="map", child_frame=frames.base)
-        self._write_imu = ImuWriter(robot, frames)
         self._write_state = VectorWriter(robot.actuators.names)
         self._node = node
         self._things: dict[str, Publisher] = {}  # each made with its first pose: most robots are alone
@@ -209,17 +211,23 @@ class PlantWires:
         self.end_capture()
         for subscription in (self._commands, *self._operator):
             node.destroy_subscription(subscription)
+        if self._period is not None:
+            node.destroy_subscription(self._period.answers)
         node.destroy_service(self._give_back)
         for publisher in self._publishers():
             node.destroy_publisher(publisher)
 
     def _publishers(self) -> list[Publisher]:
-        made = (self._odometry, self._poses, self._imu, self._state, self._truth, self._clock)
-        return [*(publisher for publisher in made if publisher is not None), *self._things.values()]
+        made = (self._poses, self._state, self._truth, self._clock)
+        rest = (publisher for publisher in made if publisher is not None)
+        period = [self._period.publisher] if self._period is not None else []
+        return [*self._sensors.publishers, *rest, *self._things.values(), *period]
 
     def subscribers(self) -> int:
-        """Matched subscriptions of the odometry, else of the poses, else of the actuators' state."""
-        return int((self._odometry or self._poses or self._state).get_subscription_count())
+        """Matched subscriptions of periods, else of the odometry, of the poses, or of the actuators' state."""
+        if self._period is not None:
+            return int(self._period.publisher.get_subscription_count())
+        return int((self._sensors.odometry or self._poses or self._state).get_subscription_count())
 
     def publish_sample(self, sample: Sample, time_ns: int, *, resend: bool = False) -> None:
         """Publish a sample, the odometry first, since the controller waits for it.
@@ -231,18 +239,17 @@ class PlantWires:
         """
         if sample.stamp_ns is not None:
             if 0 <= self._captured_ns - sample.stamp_ns <= BACK_NS:
-                return  # a device that has nothing new; further back, the clock was set
+                self._sensors.publish_stamped(sample.readings, time_ns)
+                return  # a device that has nothing else that is new; further back, the clock was set
             time_ns = self._captured_ns = sample.stamp_ns
         with self.lock:
             self._sent.note(time_ns, time.monotonic_ns())
         for name, pose in sample.things.items():
             self._publish_thing(name, pose, time_ns)
-        if self._odometry is not None and sample.odometry is not None:
-            self._publish(self._odometry, self._write_odometry.raw(sample.odometry, time_ns))
         if resend:
+            self._sensors.publish_odometry(sample.readings, time_ns)
             return
-        if sample.imu is not None and self._imu.get_subscription_count():
-            self._publish(self._imu, self._write_imu.write(sample.imu, time_ns))
+        self._sensors.publish(sample.readings, time_ns)
         if self._mocap is not None and sample.odometry is not None:
             for stamp, state in self._mocap.see(sample.odometry, time_ns):
                 self._publish_pose(stamp, state)
@@ -289,6 +296,53 @@ class PlantWires:
     def wait_for_answer(self, time_ns: int, timeout_s: float) -> bool:
         """Wait until a command answers the odometry of this stamp; call with `lock` held."""
         return self.lock.wait_for(lambda: self.answered_ns == time_ns, timeout_s)
+
+    def publish_tick(self, sample: Sample, time_ns: int) -> None:
+        """Publish the readings of a physics step within a period; see `PlantPeriod`."""
+        assert self._period is not None
+        self._period.within = True
+        self.publish_sample(replace(sample, things={}), time_ns)
+        self._period.within = False
+
+    def publish_period(self, sample: Sample, time_ns: int) -> None:
+        """Publish the sample that ends a period, and then what the period holds."""
+        assert self._period is not None
+        self.publish_sample(sample, time_ns)
+        self._period.close(time_ns)
+
+    def repeat_period(self) -> None:
+        """Publish the period once more."""
+        assert self._period is not None
+        self._period.repeat()
+
+    def begin_period(self) -> None:
+        """Let what is published from here on belong to the next period."""
+        assert self._period is not None
+        self._period.begin()
+
+    def silent_nodes(self, time_ns: int) -> list[str]:
+        """Nodes that have not answered the period that ends at a time [ns]; call with `lock` held."""
+        assert self._period is not None
+        return self._period.silent(time_ns)
+
+    def wait_for_period(self, time_ns: int, timeout_s: float) -> bool:
+        """Wait until every node has answered the period that ends at a time [ns], and a command has come.
+
+        Without odometry no command comes: the safe one is taken in its place. Call with `lock` held.
+        """
+        return self.lock.wait_for(lambda: self._is_answered(time_ns), timeout_s)
+
+    def _is_answered(self, time_ns: int) -> bool:
+        assert self._period is not None
+        if self._period.silent(time_ns):
+            return False
+        if self._sensors.odometry is None and not self._period.has_odometry():
+            actuators = self._robot.actuators
+            self._guard.offer(
+                actuators.names, actuators.safe_command.tolist(), time.monotonic_ns(), plant_ns=time_ns
+            )
+            return True
+        return self.answered_ns == time_ns
 
     def _on_command(self, data: bytes) -> None:
         command = self._reader.read(data)

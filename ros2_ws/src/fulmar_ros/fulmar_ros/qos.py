@@ -22,23 +22,30 @@ STREAM_DEPTH = 50  # a recorder that the machine holds up for as many steps stil
 EVERYTHING = 0  # as depth: whatever has not been taken yet; the middleware sets an end to it at 5000
 
 
-def publisher_qos(wire: Wire, *, lockstep: bool = False) -> QoSProfile:
+def publisher_qos(wire: Wire, *, lockstep: bool = False, lossless: bool = False) -> QoSProfile:
     """How publishers of a wire offer it.
 
     Args:
         wire: The wire.
         lockstep: Overwrite nothing that a reliable reader has not got; see `publish_patiently`.
+        lossless: Offer best-effort wires as streams: nodes between plant and controller count their messages.
     """
-    stream = EVERYTHING if lockstep and wire.delivery == "stream" else STREAM_DEPTH
+    is_stream = wire.delivery == "stream" or (lossless and wire.delivery == "best_effort")
+    stream = EVERYTHING if lockstep and is_stream else STREAM_DEPTH
     return _profile(
-        reliable=wire.delivery != "best_effort",
+        reliable=wire.delivery != "best_effort" or lossless,
         latched=wire.delivery == "latched",
         depth=wire.latest if wire.delivery == "latched" else stream,
     )
 
 
 def subscriber_qos(
-    wire: Wire, *, reliable: bool | None = None, depth: int | None = None, latched: bool | None = None
+    wire: Wire,
+    *,
+    reliable: bool | None = None,
+    depth: int | None = None,
+    latched: bool | None = None,
+    lossless: bool = False,
 ) -> QoSProfile:
     """How subscribers of a wire ask for it.
 
@@ -50,13 +57,14 @@ def subscriber_qos(
         reliable: Ask for every message again that got lost; only where publishers offer it.
         depth: Messages that may wait for the callback, >= 1, or `EVERYTHING`.
         latched: Ask for what was published before; as the wire is by default.
+        lossless: Let `reliable` hold for best-effort wires, too; as of `publisher_qos`.
 
     Returns:
         A profile that matches `publisher_qos(wire)`.
     """
     latched = wire.delivery == "latched" if latched is None else latched
     return _profile(
-        reliable=latched if reliable is None else reliable and wire.delivery != "best_effort",
+        reliable=latched if reliable is None else reliable and (lossless or wire.delivery != "best_effort"),
         latched=latched,
         depth=wire.latest if depth is None else depth,
     )

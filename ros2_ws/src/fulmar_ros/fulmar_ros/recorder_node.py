@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import importlib
 import sys
 import threading
 import time
@@ -19,7 +18,20 @@ from fulmar_bags.writer import BagWriter, check_free
 from fulmar_bags.writer_thread import BagThread
 from fulmar_core.errors import DONE, FAILED, BagError
 from fulmar_core.provenance import attachments
-from fulmar_core.topics import COMMAND, GOAL_POSES, GOAL_WIRES, VELOCITY_COMMAND, WIRES, Wire, thing_wire
+from fulmar_core.topics import (
+    ACTUATORS_STATE,
+    AIR_BEARING,
+    COMMAND,
+    GOAL_POSES,
+    GOAL_WIRES,
+    MOCAP,
+    PERIOD,
+    SENSOR_WIRES,
+    VELOCITY_COMMAND,
+    WIRES,
+    thing_wire,
+)
+from fulmar_ros.message_class import message_class
 from fulmar_ros.operator_subscription import subscribe_operator, with_message_info
 from fulmar_ros.parameters import read_parameters
 from fulmar_ros.qos import EVERYTHING, subscriber_qos
@@ -29,6 +41,16 @@ from fulmar_ros.runtime import RequestExit, run_node
 
 QUIET_S = 0.2  # nothing came for this long: what was published before the stop is here
 LONGEST_GOODBYE_S = 5.0
+REMEMBERED = 1024  # messages of a topic: more than one period has
+# What plant and estimators publish once more in lock step, and among how many of the newest messages it is looked for.
+# Each has a stamp, but for the air bearing: of its states the changes count.
+REPEATED = {
+    **dict.fromkeys(
+        (*SENSOR_WIRES.values(), MOCAP, ACTUATORS_STATE, COMMAND, VELOCITY_COMMAND, PERIOD), REMEMBERED
+    ),
+    AIR_BEARING: 1,
+}
+Keep = Callable[[bytes, dict[str, int]], None]
 
 
 class RecorderNode(Node):
@@ -50,7 +72,7 @@ class RecorderNode(Node):
         self._directory = Path(settings.directory or f"runs/{self._robot}_{time.strftime('%Y%m%d_%H%M%S')}")
         self._run_info, self._attachments = settings.run(), settings.files()
         wires = dict.fromkeys((*WIRES, *(thing_wire(name) for name in settings.things if name)))
-        found = {wire: _message_class(wire) for wire in wires if wire.recorded}
+        found = {wire: message_class(wire) for wire in wires if wire.recorded}
         classes = {wire: kind for wire, kind in found.items() if kind is not None}
         # The bag names topics as every reader of bags knows them, whatever they are remapped to on the wire.
         self._topics = {wire: self.resolve_topic_name(wire.name, only_expand=True) for wire in classes}
@@ -66,8 +88,11 @@ class RecorderNode(Node):
                     self, classes[wire], wire, self._keep(topic), depth=EVERYTHING, raw=True, with_info=True
                 )
                 continue
-            qos = subscriber_qos(wire, reliable=True, depth=EVERYTHING)
-            keep = with_message_info(self._keep(topic))
+            qos = subscriber_qos(wire, reliable=True, depth=EVERYTHING, lossless=settings.lossless)
+            put = self._keep(topic)
+            if settings.lossless and wire in REPEATED:
+                put = once(put, REPEATED[wire])
+            keep = with_message_info(put)
             made = self.create_subscription(classes[wire], wire.name, keep, qos, raw=True)
             commands += [made] if wire in (COMMAND, VELOCITY_COMMAND) else []
         self._health = RecorderHealth(
@@ -138,7 +163,7 @@ class RecorderNode(Node):
             fault_in=fault_finder(self._robot, self._topics),
         )
 
-    def _keep(self, topic: str) -> Callable[[bytes, dict[str, int]], None]:
+    def _keep(self, topic: str) -> Keep:
         """A callback that puts a topic's messages into the bag.
 
         `log_time` is when the message was received, by the wall clock of this machine; `publish_time` is when it was
@@ -176,13 +201,19 @@ class RecorderNode(Node):
         return FAILED if account.lost else DONE
 
 
-def _message_class(wire: Wire) -> type | None:
-    """The class of a wire's messages; None where the package of a foreign one is not installed."""
-    package, kind, name = wire.type.split("/")
-    try:
-        return getattr(importlib.import_module(f"{package}.{kind}"), name)
-    except ModuleNotFoundError:
-        return None
+def once(keep: Keep, remembered: int) -> Keep:
+    """A callback that leaves out what equals one of so many newest messages, to the last byte."""
+    newest: dict[bytes, None] = {}  # in the order in which they came
+
+    def keep_once(data: bytes, info: dict[str, int]) -> None:
+        if data in newest:
+            return
+        newest[data] = None
+        if len(newest) > remembered:
+            del newest[next(iter(newest))]
+        keep(data, info)
+
+    return keep_once
 
 
 def main() -> None:

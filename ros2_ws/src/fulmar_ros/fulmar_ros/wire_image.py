@@ -110,6 +110,16 @@ class WireImage:
         return seconds * NS + rest, runs
 
 
+def canonical_bytes(message: Any) -> bytes:
+    """A message as bytes, equal for equal messages; see `message_types.canonical`."""
+    from fulmar_bags.message_types import (
+        canonical,  # of an extra, and slow to import: only lock step needs it
+    )
+
+    cls = type(message)
+    return canonical(serialize_message(message), f"{cls.__module__.partition('.')[0]}/msg/{cls.__name__}")
+
+
 def _holds(data: bytearray, message: Any) -> bool:
     """Whether bytes are a message."""
     try:

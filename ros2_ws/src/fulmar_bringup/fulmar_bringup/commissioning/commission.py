@@ -24,12 +24,14 @@ from fulmar_bringup.system import Guards
 from fulmar_bringup.system_rows import system_rows
 from fulmar_core.actuators.thrusters import Thrusters
 from fulmar_core.commissioning.match import indistinct, left_over
+from fulmar_core.errors import ConfigError
 from fulmar_core.robot import Robot, load_robot
 from fulmar_ros.runtime import ros_node
 from hardware_drivers.settings import GpioValves, Hardware, hardware_path, load_hardware
 from hardware_drivers.wiring import SIDES
 from policy_server.controllers import EXTERNAL
 
+PULSED = ("thrusters", "propellers", "differential_drive")  # families that `procedure.py` moves
 WIRINGS = ("as_written", "shuffled", "inverted", "dead")  # of an emulated device
 CONTROL_HZ = 10.0  # that the driver's watchdog follows from: 0.2 s
 Say = Callable[[str], None]
@@ -57,6 +59,12 @@ def commission(request: Request, say: Say) -> dict[str, Any]:
     """
     path = str(hardware_path(request.hardware).absolute())
     hardware = load_hardware(path)
+    kind = load_robot(hardware.robot).actuators.kind
+    if kind not in PULSED:
+        raise ConfigError(
+            f"{path}: no pulses are known for '{hardware.robot}', which has {kind}; there are some for "
+            f"{', '.join(PULSED)}. Try each actuator by a command of your own."
+        )
     began_s = time.monotonic()
     scratch = tempfile.TemporaryDirectory(prefix="fulmar_", ignore_cleanup_errors=True)
     with scratch as name, claimed_domain(hardware.robot):

@@ -68,7 +68,7 @@ def _family(family: str) -> tuple[list[str], Callable[[str], str]]:
     """Names of one family, and what loads one of them and gives its title."""
     from fulmar_bringup.system import load_system
     from fulmar_core.disturbances.scenario import load_scenario
-    from fulmar_core.estimation.settings import load_estimator
+    from fulmar_core.estimation.kinds import load_estimator
     from fulmar_core.goal_files import load_goals
     from fulmar_core.policy_bundle import read_passport
     from fulmar_core.robot import load_robot

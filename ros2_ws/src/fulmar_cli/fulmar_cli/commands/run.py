@@ -28,7 +28,7 @@ RECORDING_HELP = (
     "for the goal, and the exit code is 0. The system file's `recorder:` by default."
 )
 REMAP_HELP = (
-    "Another name for mocap/pose, odom, imu/data, ground_truth/odom or a command topic, for every node; "
+    "Another name for mocap/pose, a sensor's topic such as odom, ground_truth/odom or a command topic, for every node; "
     "the bag keeps the usual one. Give it once for each topic."
 )
 ADAPTER_HELP = (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -9,15 +10,18 @@ import numpy as np
 from array_api_compat import device
 
 from fulmar_core.actuators.response import Response
+from fulmar_core.actuators.rolling import Rolling
 from fulmar_core.arrays import array_namespace, clip
+from fulmar_core.disturbances.world import World
 from fulmar_core.dynamics.hydrodynamics import GRAVITY
+from fulmar_core.planar import PlanarState
 from fulmar_core.rotation import Array
 
 GRIP = 0.6  # of what friction gives, in curves; the rest is for the motors, which push along the way; our value [-]
 
 
 @dataclass(frozen=True)
-class Ackermann:
+class Ackermann(Rolling):
     """A command is (speed ahead [m/s], steering angle of the middle front wheel [rad]), left positive.
 
     The body's origin is above the middle of the rear axle.
@@ -33,6 +37,8 @@ class Ackermann:
     friction: float  # of the tyres on the floor [-]
     response: Response = Response()
 
+    law = "pure_pursuit"
+
     def __post_init__(self) -> None:
         positive = (
             self.wheel_radius, self.track, self.wheelbase, self.max_speed,
@@ -45,8 +51,6 @@ class Ackermann:
         if self.response.slew and len(self.response.slew) != 2:
             raise ValueError("'slew' needs two values: of the speed and of the steering angle.")
 
-    binary = False
-
     @property
     def names(self) -> tuple[str, ...]:
         """Names of a command's entries."""
@@ -56,11 +60,6 @@ class Ackermann:
     def scale(self) -> np.ndarray:
         """Largest command [m/s, rad]."""
         return np.array([self.max_speed, self.max_steering])
-
-    @property
-    def safe_command(self) -> np.ndarray:
-        """Standing still with the wheels straight."""
-        return np.zeros(2)
 
     def limited(self, command: Array) -> Array:
         """Nearest command that the car can carry out, shape (..., 2).
@@ -76,3 +75,25 @@ class Ackermann:
         widest = xp.atan(grip / clip(speed * speed, 1e-6, None))
         both = xp.stack((speed, clip(steering, -widest, widest)))
         return both.T if both.ndim == 2 else xp.moveaxis(both, 0, -1)  # worlds side by side in memory
+
+    @property
+    def largest_curvature(self) -> float | None:
+        """See `Actuators.largest_curvature` [1/m]."""
+        return math.tan(self.max_steering) / self.wheelbase
+
+    @property
+    def pull(self) -> float:
+        """The most that all wheels push together [N]."""
+        return self.wheel_force
+
+    def next_yaw_rate(
+        self, state: PlanarState, speed: Array, turn: Array, twist: Array, world: World, dt: float
+    ) -> Array:
+        """Bicycle model with the rear axle as reference; see `Rolling.next_yaw_rate`.
+
+        Source: Rajamani, "Vehicle Dynamics and Control", 2012, §2.2. Tyres push sideways with friction at most; beyond
+        it the car goes wider than it steers.
+        """
+        xp = array_namespace(speed)
+        widest = self.friction * GRAVITY / clip(xp.abs(speed), 1e-3, None)
+        return clip(speed * xp.tan(turn) / self.wheelbase, -widest, widest)

@@ -1,8 +1,6 @@
-"""Between a command and what the actuators do: failures, noise, delay, slew and lag; and how they stop."""
+"""Between a command and what the actuators do: failures, noise, delay, slew and lag."""
 
 from __future__ import annotations
-
-from collections.abc import Iterator
 
 import numpy as np
 from array_api_compat import device
@@ -11,7 +9,6 @@ from fulmar_core.actuators.response import Response
 from fulmar_core.arrays import array_namespace, clip
 from fulmar_core.disturbances.world import World
 from fulmar_core.mutable_state import MutableState
-from fulmar_core.robot import Actuators, Rolling
 from fulmar_core.rotation import Array
 
 
@@ -116,33 +113,3 @@ class ActuationState(MutableState):
             target = self.applied + (target - self.applied) * min(1.0, dt / self._response.lag_s)
         self.applied = target
         return target
-
-
-def slowed(actuators: Actuators, command: np.ndarray, since_s: float) -> np.ndarray:
-    """What is left of a command some time after it ended.
-
-    Args:
-        actuators: What they are, and how fast they may follow.
-        command: At the end, shape (n,).
-        since_s: Time since then, >= 0 [s].
-
-    Returns:
-        Shape (n,); the safe command where nothing is left.
-    """
-    slew = actuators.response.slew
-    if not slew or not isinstance(actuators, Rolling):
-        return actuators.safe_command
-    left = np.maximum(np.abs(command) - since_s * np.asarray(slew), 0.0)
-    return np.where(left > 0.0, np.copysign(left, command), 0.0)
-
-
-def slowdown(actuators: Actuators, command: np.ndarray, period_s: float) -> Iterator[np.ndarray]:
-    """Commands between one and the safe one, a period apart [s]; none where actuators stop at once.
-
-    Yields:
-        Shape (n,), never the safe command itself.
-    """
-    steps = 1
-    while (left := slowed(actuators, command, steps * period_s)).any():
-        yield left
-        steps += 1

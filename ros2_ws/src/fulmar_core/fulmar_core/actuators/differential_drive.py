@@ -9,12 +9,15 @@ import numpy as np
 from array_api_compat import device
 
 from fulmar_core.actuators.response import Response
+from fulmar_core.actuators.rolling import Rolling
 from fulmar_core.arrays import array_namespace, clip
+from fulmar_core.disturbances.world import World
+from fulmar_core.planar import PlanarState
 from fulmar_core.rotation import Array
 
 
 @dataclass(frozen=True)
-class DifferentialDrive:
+class DifferentialDrive(Rolling):
     """A command is (speed ahead [m/s], turn rate [rad/s]), turning left counted positive (REP-103)."""
 
     kind: Literal["differential_drive"]
@@ -28,6 +31,9 @@ class DifferentialDrive:
     caster_x: float  # where the casters are, ahead and behind the axle; negative: behind alone [m]
     response: Response = Response()
 
+    law = "polar"
+    takes_velocity = True
+
     def __post_init__(self) -> None:
         positive = (
             self.wheel_radius, self.track, self.max_speed, self.max_yaw_rate,
@@ -37,8 +43,6 @@ class DifferentialDrive:
             raise ValueError("sizes, speeds, force and friction must be greater than 0.")
         if self.response.slew and len(self.response.slew) != 2:
             raise ValueError("'slew' needs two values: of the speed and of the turn rate.")
-
-    binary = False
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -50,11 +54,6 @@ class DifferentialDrive:
         """Largest command [m/s, rad/s]."""
         return np.array([self.max_speed, self.max_yaw_rate])
 
-    @property
-    def safe_command(self) -> np.ndarray:
-        """Standing still."""
-        return np.zeros(2)
-
     def limited(self, command: Array) -> Array:
         """Nearest command that the wheels can carry out, shape (..., 2).
 
@@ -65,6 +64,29 @@ class DifferentialDrive:
         within = clip(command, -most, most)
         outer = xp.abs(within[..., 0:1]) + 0.5 * self.track * xp.abs(within[..., 1:2])
         return within / clip(outer / (self.max_wheel_speed * self.wheel_radius), 1.0, None)
+
+    @property
+    def largest_yaw_rate(self) -> float | None:
+        """See `Actuators.largest_yaw_rate` [rad/s]."""
+        return self.max_yaw_rate
+
+    @property
+    def pull(self) -> float:
+        """The most that both wheels push together [N]."""
+        return 2.0 * self.wheel_force
+
+    def next_yaw_rate(
+        self, state: PlanarState, speed: Array, turn: Array, twist: Array, world: World, dt: float
+    ) -> Array:
+        """The turn rate follows its servo as hard as wheels push; see `Rolling.next_yaw_rate`."""
+        fastest = self.wheel_force * self.track / world.yaw_inertia
+        twist = twist / world.yaw_inertia
+        turning = clip((turn - state.yaw_rate) / self.servo_s, twist - fastest, twist + fastest)
+        return state.yaw_rate + dt * turning
+
+    def turned(self) -> np.ndarray | None:
+        """It drives astern as it drives ahead; see `Actuators.turned`."""
+        return np.diag([-1.0, 1.0])
 
     def wheel_speeds(self, command: Array) -> Array:
         """Speeds of the left and the right wheel.

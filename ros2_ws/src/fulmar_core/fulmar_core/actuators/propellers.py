@@ -10,11 +10,11 @@ from typing import Any, Literal
 import numpy as np
 from array_api_compat import device
 
+from fulmar_core.actuators.excitation import Excitation
+from fulmar_core.actuators.pushing import Push, Pushing, Vector3
 from fulmar_core.actuators.response import Response
 from fulmar_core.arrays import array_namespace, clip, sum_of
 from fulmar_core.rotation import Array
-
-Vector3 = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -26,13 +26,19 @@ class Propeller:
 
 
 @dataclass(frozen=True)
-class Propellers:
+class Propellers(Pushing):
     """A command is -1 (full astern) to 1 (full ahead) for each."""
 
     kind: Literal["propellers"]
     propellers: tuple[Propeller, ...]
     curve: tuple[float, ...]  # thrust at evenly spaced commands from -1 to 1 [N]
     response: Response = Response()
+
+    law = "line_of_sight"
+    excitation = Excitation(
+        hold_s=6.0, foresight_s=2.0, calm=0.0
+    )  # long enough to come up to speed, and to stop
+    shared_pressure = False
 
     def __post_init__(self) -> None:
         if not self.propellers or len(set(self.names)) != len(self.propellers):
@@ -45,22 +51,15 @@ class Propellers:
         if self.thrust(self.safe_command).any():
             raise ValueError("'curve' must be 0 in its middle: a command of 0 stops a propeller.")
 
-    binary = False
+    @functools.cached_property
+    def pushes(self) -> tuple[Push, ...]:
+        """Place of each propeller; all push ahead."""
+        return tuple(Push(each.name, each.position, (1.0, 0.0, 0.0)) for each in self.propellers)
 
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the propellers, in the order of every command vector."""
         return tuple(propeller.name for propeller in self.propellers)
-
-    @property
-    def scale(self) -> np.ndarray:
-        """Largest command of each, shape (n,) [-]."""
-        return np.ones(len(self.propellers))
-
-    @property
-    def safe_command(self) -> np.ndarray:
-        """All propellers stopped, shape (n,)."""
-        return np.zeros(len(self.propellers))
 
     @functools.cached_property
     def lever_arms(self) -> np.ndarray:
@@ -86,6 +85,14 @@ class Propellers:
         below = xp.floor(place)
         i = xp.astype(below, xp.int64)
         return start[i] + rise[i] * (place - below)
+
+    def thrusts(self, command: Array) -> Array:
+        """Thrust of each propeller, shape (..., n) [N]; see `Pushing.thrusts`."""
+        return self.thrust(command)
+
+    def by_hand(self, ahead: float, left: float, turn: float) -> np.ndarray | None:
+        """Both ahead, and one of them more where the boat turns; see `Actuators.by_hand`."""
+        return np.asarray(self.limited(np.asarray(ahead) + np.sign(self.lever_arms) * turn))
 
     def planar_wrench(self, applied: Array, gain: Array) -> tuple[Array, Array, Array]:
         """Force and moment in the body's plane.

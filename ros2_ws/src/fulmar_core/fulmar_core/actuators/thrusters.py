@@ -7,14 +7,13 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from array_api_compat import device
 
+from fulmar_core.actuators.pushing import Push, Pushing, Vector3, unit
 from fulmar_core.actuators.response import Response
 from fulmar_core.arrays import array_namespace, clip
 from fulmar_core.attitude import Vector
 from fulmar_core.rotation import Array
 
-Vector3 = tuple[float, float, float]
 Row = tuple[tuple[float, list[int], list[int]], ...]  # a weight, and the nozzles it counts for and against
 
 
@@ -32,7 +31,7 @@ class Nozzle:
 
 
 @dataclass(frozen=True)
-class Thrusters:
+class Thrusters(Pushing):
     """A bank of valves; a command is 0 (closed) to 1 (open) for each, and nothing between for on/off valves.
 
     With a shared pressure line, n open valves give 1/n of the full thrust each (thesis §3.5.1;
@@ -46,6 +45,10 @@ class Thrusters:
     nozzles: tuple[Nozzle, ...]
     continuous: bool = False  # valves open by degrees
     response: Response = Response()
+
+    law = "lqr"
+    one_way = True
+    opens_late = True
 
     def __post_init__(self) -> None:
         if self.thrust <= 0.0:
@@ -61,20 +64,15 @@ class Thrusters:
         """Whether valves know only open and closed."""
         return not self.continuous
 
-    @property
-    def scale(self) -> np.ndarray:
-        """Largest command of each, shape (n,) [-]."""
-        return np.ones(len(self.nozzles))
+    @functools.cached_property
+    def pushes(self) -> tuple[Push, ...]:
+        """Place and direction of each nozzle."""
+        return tuple(Push(each.name, each.position, unit(each.direction)) for each in self.nozzles)
 
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the valves, in the order of every command vector."""
         return tuple(nozzle.name for nozzle in self.nozzles)
-
-    @property
-    def safe_command(self) -> np.ndarray:
-        """All valves closed, shape (n,)."""
-        return np.zeros(len(self.nozzles))
 
     @functools.cached_property
     def wrench_per_newton(self) -> np.ndarray:
@@ -116,20 +114,6 @@ class Thrusters:
         """How far valves are open: whatever errors add, a valve does not suck."""
         return clip(applied, 0.0, 1.0) if self.continuous else applied
 
-    def wrench_in_body(self, command: Array) -> tuple[Array, Array]:
-        """Total force and torque of a command.
-
-        Args:
-            command: Open (1) or closed (0), shape (..., n).
-
-        Returns:
-            Force (..., 3) [N] and torque about the body's origin (..., 3) [N·m], both in the body frame.
-        """
-        xp = array_namespace(command)
-        matrix = xp.asarray(self.wrench_per_newton, dtype=command.dtype, device=device(command))
-        wrench = self.thrusts(command) @ matrix
-        return wrench[..., 0:3], wrench[..., 3:6]
-
     def planar_wrench(self, applied: Array, gain: Array) -> tuple[Array, Array, Array]:
         """Force and moment in the body's plane.
 
@@ -148,15 +132,7 @@ class Thrusters:
         return ahead, left, moment
 
     def spatial_wrench(self, applied: Array, gain: Array) -> tuple[Vector, Vector]:
-        """Force and torque in the body's frame.
-
-        Args:
-            applied: How far each valve is open, shape (n, ...).
-            gain: Factor on each thrust, same shape.
-
-        Returns:
-            Force [N] and torque about the body's origin [N·m], each three arrays of shape (...,).
-        """
+        """Force and torque in the body's frame; see `Pushing.spatial_wrench`."""
         applied = self._opening(applied)
         thrust = applied * gain
         if self.shared_pressure:
@@ -169,6 +145,10 @@ class Thrusters:
     def _spatial_rows(self) -> tuple[Row, ...]:
         """Three forces and three torques as sums over the nozzles."""
         return tuple(_row(self.thrust * column) for column in self.wrench_per_newton.T)
+
+    def mirrored(self) -> np.ndarray | None:
+        """None: what policies learn of dead valves has no mirror image."""
+        return None
 
     @functools.cached_property
     def _planar_rows(self) -> tuple[Row, ...]:

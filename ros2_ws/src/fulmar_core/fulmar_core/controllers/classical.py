@@ -1,6 +1,6 @@
-"""The classical law for each family of robots, and the tasks that it does.
+"""The classical laws, and the tasks that each does; a family of actuators names the one that drives it.
 
-The explicit table. A law for another family or task is one file here and one entry below.
+The explicit table. Another law is one file here and one entry below.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from fulmar_core.actuators.families import FAMILIES
 from fulmar_core.config import load_config
 from fulmar_core.controllers.default_gains import (
     line_of_sight_gains,
@@ -46,11 +47,13 @@ class Entry:
 
 
 LAWS = {
-    "thrusters": Entry(Lqr, LqrWeights, POSITIONS + POSES + VELOCITIES, lqr_weights),
-    "differential_drive": Entry(Polar, PolarGains, POSITIONS + POSES + VELOCITIES, polar_gains),
-    "propellers": Entry(LineOfSight, LineOfSightGains, POSITIONS + POSES + VELOCITIES, line_of_sight_gains),
+    "lqr": Entry(Lqr, LqrWeights, POSITIONS + POSES + VELOCITIES, lqr_weights),
+    "polar": Entry(Polar, PolarGains, POSITIONS + POSES + VELOCITIES, polar_gains),
+    "line_of_sight": Entry(
+        LineOfSight, LineOfSightGains, POSITIONS + POSES + VELOCITIES, line_of_sight_gains
+    ),
     # No law here parks a car.
-    "ackermann": Entry(PurePursuit, PurePursuitGains, POSITIONS + VELOCITIES, pure_pursuit_gains),
+    "pure_pursuit": Entry(PurePursuit, PurePursuitGains, POSITIONS + VELOCITIES, pure_pursuit_gains),
 }
 
 # Laws beside that of the family, by their own names.
@@ -58,6 +61,13 @@ OTHERS = {
     "mpc": ("thrusters", Entry(Mpc, MpcGains, ("go_to_pose",))),
     "lqr_drift": ("thrusters", Entry(LqrDrift, DriftWeights, ("go_to_pose",))),
 }
+
+
+def families_of(law: str | None) -> tuple[str, ...]:
+    """Families of actuators that a law is for; with None those that any of `LAWS` is for."""
+    if law in OTHERS:
+        return (OTHERS[law][0],)
+    return tuple(kind for kind, each in FAMILIES.items() if each.law and law in (None, each.law))
 
 
 def entry_of(robot: Robot, law: str | None) -> Entry:
@@ -68,12 +78,13 @@ def entry_of(robot: Robot, law: str | None) -> Entry:
     """
     if law in OTHERS:
         return OTHERS[law][1]
-    if robot.actuators.kind not in LAWS:
+    if robot.actuators.law not in LAWS:
         raise ConfigError(
-            f"no classical law is for '{robot.name}' ({robot.actuators.kind}); there is one for: {', '.join(LAWS)}. "
+            f"no classical law is for '{robot.name}' ({robot.actuators.kind}); there is one for: "
+            f"{', '.join(families_of(None))}. "
             "Use --controller policy, or your own: --controller mypackage.mymodule:MyController."
         )
-    return LAWS[robot.actuators.kind]
+    return LAWS[robot.actuators.law]
 
 
 def check_pair(robot: Robot, task: Task, *, law: str | None = None) -> None:
@@ -82,15 +93,11 @@ def check_pair(robot: Robot, task: Task, *, law: str | None = None) -> None:
     Raises:
         ConfigError: With what would be allowed.
     """
-    family = robot.actuators.kind
+    family, families = robot.actuators.kind, families_of(law)
     entry = entry_of(robot, law)
-    if law in OTHERS:
-        families = OTHERS[law][0]
-    else:
-        families = ", ".join(name for name, other in LAWS.items() if law in (None, other.law.law))
-    if family not in families.split(", "):
+    if family not in families:
         raise ConfigError(
-            f"controller '{law}' is for robots with {families}; '{robot.name}' has {family}. "
+            f"controller '{law}' is for robots with {' or '.join(families)}; '{robot.name}' has {family}. "
             "Use --controller classical."
         )
     if task.kind not in entry.tasks:
@@ -104,7 +111,7 @@ def check_pair(robot: Robot, task: Task, *, law: str | None = None) -> None:
 
 def has_law(robot: Robot, task: Task) -> bool:
     """Whether there is a classical law for a pair."""
-    entry = LAWS.get(robot.actuators.kind)
+    entry = LAWS.get(robot.actuators.law)
     return entry is not None and task.kind in entry.tasks
 
 

@@ -18,7 +18,7 @@ import numpy as np
 from fulmar_core.actuators.ackermann import GRIP, Ackermann
 from fulmar_core.actuators.differential_drive import DifferentialDrive
 from fulmar_core.actuators.propellers import Propellers
-from fulmar_core.actuators.thrusters import Thrusters
+from fulmar_core.actuators.pushing import Pushing
 from fulmar_core.controllers.line_of_sight import LineOfSightGains
 from fulmar_core.controllers.lqr import LqrWeights
 from fulmar_core.controllers.polar import PolarGains
@@ -39,21 +39,22 @@ DIRECTIONS = np.stack([(np.cos(angle), np.sin(angle)) for angle in np.radians(np
 
 
 def lqr_weights(robot: Robot) -> LqrWeights:
-    """Weights of the LQR by Bryson's rule, for a planar robot with thrusters.
+    """Weights of the LQR by Bryson's rule, for a planar robot with thrusters or fans.
 
-    The largest force and torque are what the valves bring up in their weakest direction. The largest velocity is the
+    The largest force and torque are what these bring up in their weakest direction. The largest velocity is the
     largest error divided by the time in which full thrust crosses it, and that time spans a few control steps at least:
     on/off valves cannot act within one.
 
     Raises:
-        ValueError: Its valves do not push in every direction, or do not turn it both ways.
+        ValueError: They do not push in every direction, or do not turn it both ways.
     """
     thrusters = robot.actuators
-    assert isinstance(thrusters, Thrusters)
+    assert isinstance(thrusters, Pushing)
     force = _least(thrusters, [0, 1], DIRECTIONS)
     torque = _least(thrusters, [5], np.array([[1.0], [-1.0]]))
-    if force < 1e-3 * thrusters.thrust or torque < 1e-3 * thrusters.thrust * robot.body.radius:
-        raise ValueError("the valves do not push in every direction and turn both ways.")
+    strongest = float(thrusters.full_thrust.max())
+    if force < 1e-3 * strongest or torque < 1e-3 * strongest * robot.body.radius:
+        raise ValueError(f"the {thrusters.kind} do not push in every direction and turn both ways.")
     step = robot.timing.control_s
     settling = max(3.0 * step, math.sqrt(2.0 * PRECISION * robot.body.mass / force))
     turning = max(2.5 * step, math.sqrt(2.0 * HEADING_PRECISION * robot.body.inertia[2] / torque))
@@ -78,24 +79,27 @@ def lqr_weights(robot: Robot) -> LqrWeights:
     )
 
 
-def _least(thrusters: Thrusters, columns: list[int], directions: np.ndarray) -> float:
-    """Largest force or torque that the valves bring up in every direction.
+def _least(thrusters: Pushing, columns: list[int], directions: np.ndarray) -> float:
+    """Largest force or torque that valves or fans bring up in every direction.
 
     Args:
         thrusters: The bank.
         columns: Of the wrench [N, N, N, N·m, N·m, N·m].
         directions: Unit vectors of these columns, shape (k, columns).
     """
-    along = np.maximum(thrusters.thrust * thrusters.wrench_per_newton[:, columns] @ directions.T, 0.0)
+    along = np.maximum(
+        thrusters.full_thrust[:, None] * thrusters.wrench_per_newton[:, columns] @ directions.T, 0.0
+    )
     most = along.max(axis=0) if thrusters.shared_pressure else along.sum(axis=0)
     return float(most.min())
 
 
-def _health_settings(robot: Robot, thrusters: Thrusters) -> HealthSettings:
+def _health_settings(robot: Robot, thrusters: Pushing) -> HealthSettings:
     """The observer's own defaults, in proportion to one valve, and no less noise than the robot's sensors have."""
     usual, sensors = HealthSettings(), robot.sensors.odometry
-    pushes = thrusters.thrust / SUSPECTED_FORCE
-    turns = thrusters.thrust * float(np.abs(thrusters.wrench_per_newton[:, 5]).max()) / SUSPECTED_TORQUE
+    thrust = float(thrusters.full_thrust.max())
+    pushes = thrust / SUSPECTED_FORCE
+    turns = thrust * float(np.abs(thrusters.wrench_per_newton[:, 5]).max()) / SUSPECTED_TORQUE
     return HealthSettings(
         position=max(usual.position, 1.5 * sensors.position.std),
         heading=max(usual.heading, 1.5 * sensors.heading.std),
@@ -146,7 +150,8 @@ def line_of_sight_gains(robot: Robot) -> LineOfSightGains:
     top = min(_terminal(robot, 0, count * ahead), robot.performance.top_speed)
     top_astern = min(_terminal(robot, 0, count * astern), robot.performance.top_speed)
     turn = min(_terminal(robot, 5, moment), robot.limits.yaw_rate)
-    heading = min(FASTEST, 0.8 / _reaction_s(robot), 0.5 * moment / inertia / turn)
+    slew_s = 1.0 / min(propellers.response.slew) if propellers.response.slew else 0.0
+    heading = min(FASTEST, 0.8 / (_reaction_s(robot) + slew_s), 0.5 * moment / inertia / turn)
     return LineOfSightGains(
         cruise=0.6 * top,
         astern=0.75 * top_astern,
@@ -199,10 +204,9 @@ def pure_pursuit_gains(robot: Robot) -> PurePursuitGains:
 
 
 def _reaction_s(robot: Robot) -> float:
-    """From an error to the actuators' answer: a control step, delays, the lag, and the slew of propellers [s]."""
+    """From an error to the actuators' answer, slew aside: a control step, delays and the lag [s]."""
     response = robot.actuators.response
-    slew = 1.0 / min(response.slew) if response.slew and isinstance(robot.actuators, Propellers) else 0.0
-    return robot.timing.control_s + response.latest_s + response.lag_s + slew
+    return robot.timing.control_s + response.latest_s + response.lag_s
 
 
 def _near(robot: Robot) -> float:

@@ -8,11 +8,10 @@ few candidates near the goal, which leaves most of the randomness, more of them 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from fulmar_core.actuators.thrusters import Thrusters
+from fulmar_core.actuators.excitation import Excitation
+from fulmar_core.actuators.families import FAMILIES
 from fulmar_core.controllers.controller import Inputs
 from fulmar_core.controllers.law import Law
 from fulmar_core.identification.model import nominal_world
@@ -23,27 +22,6 @@ from fulmar_core.tasks import Task
 
 TASKS = ("go_to_position", "go_to_pose")  # kinds with one place to stay around
 SEED = 5  # of the commands: any number
-
-
-@dataclass(frozen=True)
-class Excitation:
-    """How restless; our values."""
-
-    hold_s: float  # longest time that a command is held [s]
-    foresight_s: float  # how long a candidate's last velocity is thought to go on [s]
-    near: int = 3  # candidates around the goal
-    far: int = 24  # candidates at the end of the room and beyond
-    room: float = 0.25  # radius to stay in, of the geofence's [-]
-    calm: float = 1.0  # weight of turning against a candidate; water and wheels end it by themselves [-]
-
-
-# A platform's valves in the rhythm of its commands; propellers and wheels long enough to come up to speed, and to stop.
-EXCITATIONS = {
-    "thrusters": Excitation(hold_s=0.6, foresight_s=2.0),
-    "propellers": Excitation(hold_s=6.0, foresight_s=2.0, calm=0.0),
-    "differential_drive": Excitation(hold_s=1.5, foresight_s=1.0),
-    "ackermann": Excitation(hold_s=1.5, foresight_s=1.0),
-}
 
 
 class Excite(Law):
@@ -65,11 +43,11 @@ class Excite(Law):
         """
         if task.kind not in TASKS:
             raise ValueError(f"'excite' stays around one place; tasks for that are {', '.join(TASKS)}.")
-        if robot.actuators.kind not in EXCITATIONS:
-            raise ValueError(
-                f"'excite' drives {', '.join(EXCITATIONS)}; '{robot.name}' has {robot.actuators.kind}."
-            )
-        self._how = gains or EXCITATIONS[robot.actuators.kind]
+        how = gains or robot.actuators.excitation
+        if how is None:
+            families = ", ".join(kind for kind, family in FAMILIES.items() if family.excitation)
+            raise ValueError(f"'excite' drives {families}; '{robot.name}' has {robot.actuators.kind}.")
+        self._how = how
         super().__init__(robot, task, self._how, control_hz=control_hz)
         self._world = nominal_world(robot)
         self._off_centre = any(robot.body.center_of_mass)
@@ -98,7 +76,7 @@ class Excite(Law):
         share = np.minimum(np.hypot(x, y) / room, 1.0) ** 2
         allowed = how.near + np.floor((how.far - how.near) * share)  # candidates, shape (rows,)
         # The same ones for every row, so that a row's answer does not depend on its neighbours.
-        candidates = np.repeat(self._drawn(how.far), count, axis=0)
+        candidates = np.repeat(self.robot.actuators.random_commands(self._rng, how.far), count, axis=0)
         before = PlanarState(*(np.tile(part, how.far) for part in (-x, -y, 0.0 * x, u, v, r)))
         safe = np.tile(inputs.previous, (how.far, 1)).T
         actuation = actuation_of(self.robot, safe)
@@ -121,13 +99,3 @@ class Excite(Law):
         cost = np.where(np.arange(how.far)[:, None] < allowed, cost, np.inf)
         best = np.argmin(cost, axis=0)
         return np.asarray(candidates.reshape(how.far, count, -1)[best, np.arange(count)])
-
-    def _drawn(self, count: int) -> np.ndarray:
-        """Random commands, shape (count, m): one to three valves, or anything between full astern and full ahead."""
-        actuators, scale = self.robot.actuators, self.robot.actuators.scale
-        if isinstance(actuators, Thrusters):
-            order = np.argsort(self._rng.random((count, len(scale))), axis=1)
-            opened = order < self._rng.integers(1, 4, size=(count, 1))
-            degree = self._rng.random((count, len(scale))) if actuators.continuous else 1.0
-            return np.asarray(opened * degree, dtype=float)
-        return np.asarray(actuators.limited(self._rng.uniform(-1.0, 1.0, (count, len(scale))) * scale))

@@ -1,4 +1,4 @@
-"""How hard a bank of valves can push a body in a direction against what pushes from outside."""
+"""How hard one-way actuators can push a body in a direction against what pushes from outside."""
 
 from __future__ import annotations
 
@@ -6,21 +6,21 @@ import itertools
 
 import numpy as np
 
-from fulmar_core.actuators.thrusters import Thrusters
+from fulmar_core.actuators.pushing import Pushing
 
 UNBOUNDED = 1e6  # where no side stands in the way, as for a direction of length 0 [N]
 
 
 class ForceAuthority:
-    """The forces that valves can bring up in the plane, as a convex polygon."""
+    """The forces that valves or fans can bring up in the plane, as a convex polygon."""
 
-    def __init__(self, thrusters: Thrusters) -> None:
+    def __init__(self, thrusters: Pushing) -> None:
         """Find the polygon's sides.
 
         With a shared pressure line it is the hull of what single valves do; without, the sum of what each does or
         leaves undone (a zonotope), whose sides lie along the nozzles.
         """
-        alone = thrusters.wrench_in_body(np.eye(len(thrusters.nozzles)))[0][:, :2]
+        alone = thrusters.wrench_in_body(np.eye(len(thrusters.names)))[0][:, :2]
         sides = _hull(alone) if thrusters.shared_pressure else _zonotope(alone)
         table = np.unique(np.round(np.array(sides), 6), axis=0)
         self._normals, self._levels = table[:, :2], table[:, 2]

@@ -1,7 +1,7 @@
-"""Discrete linear-quadratic regulator for a planar robot with thrusters.
+"""Discrete linear-quadratic regulator for a planar robot that thrusters or fans push.
 
 The linear model comes from the core's own dynamics, the gain from the discrete algebraic Riccati equation,
-and the valves from the LQR's own cost-to-go: for x⁺ = A x + B w the cost of a wrench w is, up to a constant,
+and the commands from the LQR's own cost-to-go: for x⁺ = A x + B w the cost of a wrench w is, up to a constant,
 (w - w*)ᵀ (R + BᵀPB) (w - w*) with w* = -K x (complete the square in Bertsekas, "Dynamic Programming and
 Optimal Control", vol. 1, §4.1), so the best reachable wrench is the one nearest to w* in that metric.
 """
@@ -13,19 +13,15 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_core.actuators.thrusters import Thrusters
+from fulmar_core.actuators.pushing import Pushing
+from fulmar_core.controllers.allocation import allocation_of
 from fulmar_core.controllers.body_frame import BodyState, Vector
 from fulmar_core.controllers.controller import Inputs
 from fulmar_core.controllers.force_authority import ForceAuthority
 from fulmar_core.controllers.law import Law
-from fulmar_core.controllers.opening_allocation import OpeningAllocation
-from fulmar_core.controllers.valve_allocation import ValveAllocation
-from fulmar_core.counter_rng import Draws
-from fulmar_core.disturbances.scenario import Scenario, draw_world
-from fulmar_core.dynamics.free_body import free_body_step
+from fulmar_core.dynamics.linear_model import linearise_wrench
 from fulmar_core.health.filters import HealthSettings
-from fulmar_core.planar import PlanarState
-from fulmar_core.robot import Robot
+from fulmar_core.planar import at_rest
 
 
 @dataclass(frozen=True)
@@ -98,30 +94,6 @@ class LqrWeights:
             raise ValueError("'braking' must lie in [0, 1].")
 
 
-def linear_model(robot: Robot, control_dt: float) -> tuple[np.ndarray, np.ndarray]:
-    """Linearise the core's dynamics about rest by central differences.
-
-    Args:
-        robot: A planar robot with its nominal body.
-        control_dt: Time of one control step, a multiple of the physics step [s].
-
-    Returns:
-        A (6, 6) and B (6, 3) of x⁺ = A x + B w, with x = [x, y, yaw, v_x, v_y, yaw rate] and
-        w = [F_x, F_y, M_z], all in the body frame at rest.
-    """
-    delta = 1e-4
-    inputs = delta * np.concatenate((np.eye(9), -np.eye(9))).T
-    calm = Scenario("calm", sensor_noise=False, body="nominal")
-    world = draw_world(robot, calm, Draws(0, np.zeros(18), np.zeros(18)))
-    push, still = (inputs[6], inputs[7], inputs[8]), (np.zeros(18),) * 3
-    state = PlanarState(*inputs[:6])
-    for _ in range(robot.timing.substeps(1.0 / control_dt)):
-        state = free_body_step(state, push, still, world, robot.hydrodynamics, robot.timing.physics_dt)
-    after = np.stack((state.x, state.y, state.yaw, state.vx, state.vy, state.yaw_rate))
-    slopes = (after[:, :9] - after[:, 9:]) / (2.0 * delta)
-    return slopes[:, :6], slopes[:, 6:]
-
-
 class Lqr(Law):
     """LQR on the estimated or measured state; holds the heading where the task has one."""
 
@@ -133,27 +105,26 @@ class Lqr(Law):
     def prepare(self) -> None:
         """Solve for the gain and list the valve combinations."""
         robot, gains = self.robot, self.gains
-        if not isinstance(robot.actuators, Thrusters):
-            raise ValueError("the LQR allocates valves; this robot has none.")
+        if not isinstance(robot.actuators, Pushing):
+            raise ValueError("the LQR allocates valves or fans; this robot has neither.")
         self._most_turn = np.deg2rad(gains.heading_error_limit_deg)
         dt = 1.0 / self.control_hz
-        a, b = linear_model(robot, dt)
+        model = linearise_wrench(robot, at_rest(*np.zeros(3)), np.zeros(3), dt)
         velocity = (self.frame.tracks and gains.tracking_velocity) or gains.velocity
         q = np.array([gains.position] * 2 + [gains.heading] + [velocity] * 2 + [gains.yaw_rate])
         torque = (self.frame.tracks and gains.tracking_torque) or gains.torque
         r = dt * np.diag([gains.force, gains.force, torque])
         # What has no goal is not a state.
         used = [3, 4, 5] if self.frame.tracks else [0, 1, 2, 3, 4, 5] if self.frame.heads else [0, 1, 3, 4, 5]
-        a, b = a[np.ix_(used, used)], b[used]
+        a, b = model.a[np.ix_(used, used)], model.b[used]
         best = regulator(a, b, dt * np.diag(q[used]), r)
         self.cost_to_go, self.gain = best.cost_to_go, best.gain
         self._hessian = hessian = best.hessian
-        allocation = OpeningAllocation if robot.actuators.continuous else ValveAllocation
         self.authority = ForceAuthority(robot.actuators)
         # How far from the goal the law asks for 1 m/s [s].
         self.lead = 1.0 if self.frame.tracks else float(self.gain[0, used.index(3)] / self.gain[0, 0])
         self.estimator = gains.observer
-        self.allocation = allocation(robot.actuators, weight=hessian, valve_cost=dt * gains.open_valve)
+        self.allocation = allocation_of(robot.actuators, weight=hessian, cost=dt * gains.open_valve)
 
     def reset(self) -> None:
         """Forget the past."""

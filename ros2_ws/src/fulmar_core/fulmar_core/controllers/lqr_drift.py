@@ -38,15 +38,20 @@ from typing import Any
 
 import numpy as np
 
+from fulmar_core.actuators.pushing import PLANAR
 from fulmar_core.actuators.thrusters import Thrusters
 from fulmar_core.controllers.controller import Inputs
 from fulmar_core.controllers.law import Law
 from fulmar_core.controllers.lqr import regulator
+from fulmar_core.dynamics.free_body import free_body_step
+from fulmar_core.dynamics.linear_model import nominal_worlds, slopes
+from fulmar_core.planar import PlanarState
 from fulmar_core.rotation import wrap_angle
 
 STEP, LEAST_STEP = 0.01, 1e-3  # differences of states, relative and at least; inputs: STEP
 SHORT = np.sqrt(0.5)  # of the negative difference of inputs
 INSTEAD_OF_ZERO = 1e-4
+STILL = (np.zeros(1),) * 3  # no push from outside
 SAME_HEADING, SAME_RATE = np.deg2rad(1.0), 0.05  # [rad], [rad/s]
 
 
@@ -77,6 +82,7 @@ class LqrDrift(Law):
         if not isinstance(self.robot.actuators, Thrusters) or self.robot.actuators.continuous:
             raise ValueError("DRIFT's LQR opens and closes valves; this robot has none of that kind.")
         self._valves = self.robot.actuators
+        self._world = nominal_worlds(self.robot, 1)
         self._known: dict[tuple[int, int], np.ndarray] = {}
 
     def reset(self) -> None:
@@ -143,32 +149,35 @@ class LqrDrift(Law):
             A (7, 7) and B (7, n) of x⁺ = A x + B u.
         """
         state = np.array([0.0, 0.0, 0.0, 0.0, np.cos(0.5 * yaw), np.sin(0.5 * yaw), rate])
-        steps = np.maximum(LEAST_STEP, state * STEP)
-        closed, one = np.zeros(len(self._valves.nozzles)), STEP * np.eye(len(self._valves.nozzles))
-        either = self._moved(state + np.diag(steps), closed) - self._moved(state - np.diag(steps), closed)
-        a = (either / (2.0 * steps)[:, None]).T
+        steps, closed = np.maximum(LEAST_STEP, state * STEP), np.zeros(len(self._valves.names))
+        a = slopes(
+            lambda states: self._moved(states, closed[:, None]),
+            state - steps,
+            state + steps,
+            around=state,
+            spans=2.0 * steps,
+        )
         a[4, 4] = 1.0
-        b = (self._moved(state, one) - self._moved(state, -SHORT * one)).T / (2.0 * STEP)
+        one = np.full(len(closed), STEP)
+        b = slopes(
+            lambda inputs: self._moved(state[:, None], inputs),
+            -SHORT * one,
+            one,
+            around=closed,
+            spans=2.0 * one,
+        )
         b[b == 0.0] = INSTEAD_OF_ZERO
         return a, b
 
     def _moved(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
-        """States (..., 7) one control step later, under inputs (..., n) that do not share pressure."""
-        body, dt = self.robot.body, self.robot.timing.physics_dt
-        wrench = self._valves.thrust * inputs @ self._valves.wrench_per_newton
-        ahead, left, moment = wrench[..., 0], wrench[..., 1], wrench[..., 5]
-        x, y, vx, vy, w, z, rate = np.moveaxis(states, -1, 0)
-        yaw = 2.0 * np.arctan2(z, w)
+        """States (7, k) one control step later, under inputs (n, k) that do not share pressure."""
+        wrench = self._valves.thrust * inputs.T @ self._valves.wrench_per_newton
+        x, y, vx, vy, w, z, rate = np.broadcast_arrays(*states, inputs[0])[:7]
+        now, push = PlanarState(x, y, 2.0 * np.arctan2(z, w), vx, vy, rate), tuple(wrench[:, PLANAR].T)
         for _ in range(self.robot.timing.substeps(self.control_hz)):
-            c, s = np.cos(yaw), np.sin(yaw)
-            vx, vy = (
-                vx + dt * (c * ahead - s * left) / body.mass,
-                vy + dt * (s * ahead + c * left) / body.mass,
-            )
-            rate = rate + dt * moment / body.inertia[2]
-            x, y, yaw = x + dt * vx, y + dt * vy, yaw + dt * rate
-        parts = (x, y, vx, vy, np.cos(0.5 * yaw), np.sin(0.5 * yaw), rate)
-        return np.stack(np.broadcast_arrays(*parts), axis=-1)
+            now = free_body_step(now, push, STILL, self._world, None, self.robot.timing.physics_dt)
+        half = 0.5 * now.yaw
+        return np.stack((now.x, now.y, now.vx, now.vy, np.cos(half), np.sin(half), now.yaw_rate))
 
     def derived(self) -> dict[str, Any]:
         """What else the commands depend on."""

@@ -13,7 +13,7 @@ import itertools
 
 import numpy as np
 
-from fulmar_core.actuators.thrusters import Thrusters
+from fulmar_core.actuators.pushing import Pushing
 from fulmar_core.rotation import Array
 
 MOST = 4  # corners in a mixture: one more than a wrench has numbers
@@ -23,7 +23,7 @@ ROUNDING = 1e-9  # a part this far below 0 is 0, and costs this near to each oth
 class OpeningAllocation:
     """Table of every set of valves that may work together."""
 
-    def __init__(self, thrusters: Thrusters, *, weight: np.ndarray, valve_cost: float) -> None:
+    def __init__(self, thrusters: Pushing, *, weight: np.ndarray, valve_cost: float) -> None:
         """List the sets.
 
         Args:
@@ -31,7 +31,7 @@ class OpeningAllocation:
             weight: Cost of a wrench error [F_x, F_y, M_z], symmetric positive definite, shape (3, 3).
             valve_cost: Cost of a fully open valve, >= 0.
         """
-        count = len(thrusters.nozzles)
+        count = len(thrusters.names)
         if not thrusters.shared_pressure:
             raise ValueError(
                 "valves that open by degrees need 'shared_pressure'; there is no allocation without."

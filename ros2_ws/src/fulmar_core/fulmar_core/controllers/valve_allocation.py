@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from fulmar_core.actuators.thrusters import Thrusters
+from fulmar_core.actuators.pushing import Pushing
 from fulmar_core.rotation import Array
 
 MOST_IN_TABLE = 2**16  # combinations; 16 valves take 0.2 ms a wrench, and more are searched for in less
@@ -31,7 +31,7 @@ class ValveAllocation:
         weight: Cost of a wrench error, shape (3, 3).
     """
 
-    def __init__(self, thrusters: Thrusters, *, weight: np.ndarray, valve_cost: float) -> None:
+    def __init__(self, thrusters: Pushing, *, weight: np.ndarray, valve_cost: float) -> None:
         """List the combinations.
 
         Args:
@@ -39,7 +39,7 @@ class ValveAllocation:
             weight: Cost of a wrench error [F_x, F_y, M_z], symmetric positive definite, shape (3, 3).
             valve_cost: Cost of each open valve, >= 0; settles ties in favour of fewer valves.
         """
-        count = len(thrusters.nozzles)
+        count = len(thrusters.names)
         self._thrusters, self._valve_cost, self.weight = thrusters, valve_cost, weight
         self._whole = 2**count <= MOST_IN_TABLE
         few = self._listed(_few(count) if 2**count > MOST_LISTED else _all(count))

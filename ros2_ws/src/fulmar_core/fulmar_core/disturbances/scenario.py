@@ -10,7 +10,6 @@ from typing import Literal
 
 import numpy as np
 
-from fulmar_core.actuators.thrusters import Thrusters
 from fulmar_core.arrays import array_namespace
 from fulmar_core.config import load_config
 from fulmar_core.counter_rng import Draws
@@ -211,7 +210,7 @@ def bearing_late_s(scenario: Scenario, *, seed: int, number: int) -> float:
 def longest_delay(robot: Robot, scenario: Scenario) -> float:
     """Until the latest command of any world acts; only valves open late [s]."""
     actuation = scenario.actuation
-    opening_s = actuation.opening_delay_s[1] if isinstance(robot.actuators, Thrusters) else 0.0
+    opening_s = actuation.opening_delay_s[1] if robot.actuators.opens_late else 0.0
     return robot.actuators.response.latest_s + actuation.delay_s + opening_s
 
 
@@ -308,7 +307,7 @@ def draw_world(robot: Robot, scenario: Scenario, draws: Draws) -> World:
     velocity_noise = draws.uniform(*sensing.velocity_noise)
     yaw_rate_noise = draws.uniform(*sensing.yaw_rate_noise)
     downhill = mass * GRAVITY * xp.sin(fall)
-    valves = 1.0 if isinstance(robot.actuators, Thrusters) else 0.0
+    valves = 1.0 if robot.actuators.opens_late else 0.0
     low, high = faults.gain
     # Sums with 1.0 keep their roundings, here and below: policies have learned from these very draws.
     gain = 1.0 + (low + (high - low) * gain_share - 1.0)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from fulmar_core.actuators.rolling import Rolling
 from fulmar_core.arrays import array_namespace, clip
 from fulmar_core.dynamics.hydrodynamics import GRAVITY
 from fulmar_core.planar import PlanarState, to_body
-from fulmar_core.robot import Robot, Rolling
+from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
 
 

@@ -6,16 +6,12 @@ allow. A push from outside only counts along the way the wheels roll, and only w
 
 from __future__ import annotations
 
-from fulmar_core.actuators.ackermann import Ackermann
-from fulmar_core.actuators.differential_drive import DifferentialDrive
+from fulmar_core.actuators.rolling import Rolling
 from fulmar_core.arrays import array_namespace, clip
 from fulmar_core.disturbances.world import World
 from fulmar_core.dynamics.free_body import Wrench
-from fulmar_core.dynamics.hydrodynamics import GRAVITY
 from fulmar_core.planar import PlanarState
 from fulmar_core.rotation import Array
-
-SERVO_S = 0.05  # time constant of a wheel's speed servo where the drive names none [s]
 
 
 def rolling_step(
@@ -24,7 +20,7 @@ def rolling_step(
     gain: Array,
     outside: Wrench,
     world: World,
-    drive: DifferentialDrive | Ackermann,
+    drive: Rolling,
     dt: float,
 ) -> PlanarState:
     """Move the body through one integration step.
@@ -42,24 +38,13 @@ def rolling_step(
         State after `dt`.
     """
     xp = array_namespace(state.x)
-    lag = max(drive.response.lag_s, SERVO_S)
     c, s = xp.cos(state.yaw), xp.sin(state.yaw)
     speed = c * state.vx + s * state.vy
     wanted = target[0] * gain[0]
-    wheels = 2.0 if isinstance(drive, DifferentialDrive) else 1.0
-    most = wheels * drive.wheel_force / world.mass
+    most = drive.pull / world.mass
     along = (c * outside[0] + s * outside[1]) / world.mass
-    speed = speed + dt * clip((wanted - speed) / lag, along - most, along + most)
-    if isinstance(drive, DifferentialDrive):
-        fastest = drive.wheel_force * drive.track / world.yaw_inertia
-        twist = outside[2] / world.yaw_inertia
-        turning = clip((target[1] * gain[1] - state.yaw_rate) / lag, twist - fastest, twist + fastest)
-        yaw_rate = state.yaw_rate + dt * turning
-    else:
-        # Bicycle model (Rajamani, "Vehicle Dynamics and Control", 2012, §2.2), rear axle as reference.
-        # Tyres push sideways with friction at most; beyond it the car goes wider than it steers.
-        widest = drive.friction * GRAVITY / clip(xp.abs(speed), 1e-3, None)
-        yaw_rate = clip(speed * xp.tan(target[1] * gain[1]) / drive.wheelbase, -widest, widest)
+    speed = speed + dt * clip((wanted - speed) / drive.servo_s, along - most, along + most)
+    yaw_rate = drive.next_yaw_rate(state, speed, target[1] * gain[1], outside[2], world, dt)
     yaw = state.yaw + dt * yaw_rate
     c, s = xp.cos(yaw), xp.sin(yaw)
     vx, vy = speed * c, speed * s

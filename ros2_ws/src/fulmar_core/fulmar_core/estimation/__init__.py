@@ -1,1 +1,1 @@
-"""State estimation: from poses that come late and an inertial unit to position and velocity, without ROS."""
+"""State estimation without ROS: readings of sensors in, one estimate out; in a node, a batch, a re-run or offline."""

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from filterpy.kalman import ExtendedKalmanFilter
 
-from fulmar_core.estimation.settings import EstimatorSettings
+from fulmar_core.estimation.settings import PlanarMotionSettings
 
 STATES = 9
 X, Y, YAW, VX, VY, RATE, BIAS_X, BIAS_Y, BIAS_RATE = range(STATES)
@@ -31,7 +31,7 @@ class MotionFilter(ExtendedKalmanFilter):  # type: ignore[misc]
     accelerometer along the body's axes [m/s²] and of the gyroscope [rad/s].
     """
 
-    def __init__(self, settings: EstimatorSettings, pose: np.ndarray) -> None:
+    def __init__(self, settings: PlanarMotionSettings, pose: np.ndarray) -> None:
         """Begin at rest at a pose (x [m], y [m], yaw [rad]), knowing little else."""
         super().__init__(dim_x=STATES, dim_z=3)
         self._settings = settings
@@ -75,6 +75,21 @@ class MotionFilter(ExtendedKalmanFilter):  # type: ignore[misc]
             lambda _x: _GYRO_ROW,
             lambda x: np.array([x[RATE] + x[BIAS_RATE]]),
             R=self._gyro_noise,
+        )
+
+    def heading_distance2(self, yaw: float, std: float) -> float:
+        """Squared Mahalanobis distance of a heading with its deviation [rad] from what is expected [-]."""
+        error = math.remainder(yaw - float(self.x[YAW]), 2.0 * math.pi)
+        return float(error**2 / (self.P[YAW, YAW] + std**2))
+
+    def see_heading(self, yaw: float, std: float) -> None:
+        """Correct by a heading with its standard deviation [rad]."""
+        error = math.remainder(yaw - float(self.x[YAW]), 2.0 * math.pi)
+        self.update(
+            np.array([float(self.x[YAW]) + error]),
+            lambda _x: _POSE_ROWS[2:],
+            lambda x: np.array([x[YAW]]),
+            R=np.array([[std**2]]),
         )
 
     def distance2(self, pose: np.ndarray) -> float:

@@ -1,25 +1,38 @@
-"""What an estimator assumes of its sensors, as read from `configs/estimators`; without the filter's libraries."""
+"""What every estimator's settings have, as read from `configs/estimators`; without the filters' libraries."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
-
-from fulmar_core.config import load_config
-from fulmar_core.paths import config_path
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class EstimatorSettings:
-    """One file of `configs/estimators`.
+    """One file of `configs/estimators`; each kind of estimator adds its own keys."""
+
+    title: str
+    bridge_s: float  # longest time without a believed reading before the estimate is stale [s]
+    latency_s: float = (
+        0.0  # from capture to the stamp of a pose, as measured; 0: sources stamp at capture [s]
+    )
+
+    def __post_init__(self) -> None:
+        if not self.bridge_s > 0.0:
+            raise ValueError(f"'bridge_s' = {self.bridge_s:g} must be greater than 0.")
+        if not 0.0 <= self.latency_s <= 1.0:
+            raise ValueError(f"'latency_s' = {self.latency_s:g} must be from 0 to 1 s.")
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlanarMotionSettings(EstimatorSettings):
+    """Settings of `PlanarMotionEstimator`.
 
     Densities are those of white noise: over a time t they spread what they drive by density · √t.
     """
 
-    title: str
-    latency_s: float  # from capture to the stamp of a pose, as measured; 0 where sources stamp at capture [s]
+    kind: str = "planar_motion"
     position_std: float  # of a pose, each axis [m]
     heading_std: float  # of a pose [rad]
+    star_tracker_std: float = 0.0005  # heading of an attitude whose reading states no covariance [rad]
     gyroscope_std: float  # of a reading [rad/s]
     acceleration_noise: float  # of the inertial unit, with what its mounting adds [m/s²/√Hz]
     manoeuvre: float  # acceleration that nobody measures, where there is no inertial unit [m/s²/√Hz]
@@ -27,24 +40,15 @@ class EstimatorSettings:
     accelerometer_drift: float  # of its bias [m/s²/√s]
     gyroscope_drift: float  # of its bias [rad/s/√s]
     gate: float  # squared Mahalanobis distance of a pose beyond which it is an outlier; 3 degrees of freedom [-]
-    bridge_s: float  # longest time without a believed pose before the estimate is stale [s]
 
     def __post_init__(self) -> None:
-        positive = ("position_std", "heading_std", "gyroscope_std", "acceleration_noise", "manoeuvre", "spin")
-        for name in (*positive, "gate", "bridge_s"):
+        super().__post_init__()
+        positive = (
+            "position_std", "heading_std", "star_tracker_std", "gyroscope_std", "acceleration_noise", "manoeuvre",
+            "spin", "gate",
+        )  # fmt: skip
+        for name in positive:
             if not getattr(self, name) > 0.0:
                 raise ValueError(f"'{name}' = {getattr(self, name):g} must be greater than 0.")
         if min(self.accelerometer_drift, self.gyroscope_drift) < 0.0:
             raise ValueError("accelerometer_drift and gyroscope_drift must not be negative.")
-        if not 0.0 <= self.latency_s <= 1.0:
-            raise ValueError(f"'latency_s' = {self.latency_s:g} must be from 0 to 1 s.")
-
-
-def load_estimator(name: str) -> EstimatorSettings:
-    """Read `configs/estimators/<name>.yaml`, or the file itself where the name ends in `.yaml`.
-
-    Raises:
-        ConfigError: Unknown name, or a mistake in the file.
-    """
-    path = Path(name) if name.endswith(".yaml") else config_path("estimators", name)
-    return load_config(EstimatorSettings, path)

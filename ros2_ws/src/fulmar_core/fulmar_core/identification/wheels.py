@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from fulmar_core.actuators.differential_drive import DifferentialDrive
-from fulmar_core.dynamics.rolling import SERVO_S
+from fulmar_core.actuators.rolling import SERVO_S
 from fulmar_core.identification.drives import Windows
 from fulmar_core.identification.held_input import followed, for_each_copy
 from fulmar_core.identification.model import USEFUL_DELAY_S, Unknown, Values

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fulmar_core.actuators.actuation import slowed
-from fulmar_core.robot import Actuators, Rolling
+from fulmar_core.actuators.family import Actuators
 from fulmar_core.safety.command_gate import CommandPublishers, command_problem, name_problem
 from fulmar_core.safety.estop import EstopMonitor
 from fulmar_core.safety.watchdog import Watchdog
+from fulmar_core.state import RigidBodyState
 
 LAST_WORDS_NS = 200_000_000  # so long after a person gave back, safe commands by hand may be under way
 LEFTOVERS_NS = 2_000_000_000  # so long after the last command, an older one may come out of a queue
@@ -140,16 +140,20 @@ class ActuatorGuard:
         self._given_back_ns = now_ns
         return ""
 
-    def output(self, now_ns: int) -> np.ndarray:
-        """What to apply at this time of the steady clock [ns].
+    def output(self, now_ns: int, state: RigidBodyState | None = None) -> np.ndarray:
+        """What to apply at this time of the steady clock.
 
-        After a silence and under the e-stop the safe command; wheels slow down to it as fast as they may, so that they
-        do not lock.
+        After a silence and under the e-stop that is the family's own safe controller (`actuators/refuge.py`): valves
+        close at once, wheels slow down as fast as they may.
+
+        Args:
+            now_ns: Steady clock [ns].
+            state: Newest measured state, for families whose safe controller steers; None without one.
         """
         since_ns = self._ended_ns(now_ns)
         if since_ns is None:
             return self.command
-        return slowed(self._actuators, self.command, max(0, now_ns - since_ns) / 1e9)
+        return self._actuators.refuge.command(max(0, now_ns - since_ns) / 1e9, self.command, state)
 
     def answer(self, now_ns: int) -> np.ndarray:
         """What to apply in lock step, where time stands still between commands and only the e-stop may end one."""
@@ -177,7 +181,7 @@ class ActuatorGuard:
             return False
         return self._is_safe(values)
 
-    def _is_safe(self, values: Sequence[float]) -> bool:
+    def _is_safe(self, values: Sequence[float] | np.ndarray) -> bool:
         safe = self._actuators.safe_command
         return len(values) == len(safe) and bool(np.all(np.asarray(values, dtype=float) == safe))
 
@@ -201,7 +205,7 @@ class ActuatorGuard:
         """Take a good command; `seconds` is the time it has had to change in, None for that since the last one."""
         time_ns = now_ns if plant_ns is None else plant_ns
         if self._stopped(now_ns) is not None:
-            if not isinstance(self._actuators, Rolling) or not np.any(self.output(now_ns)):
+            if self._is_safe(self.output(now_ns)):
                 self.command = self._actuators.safe_command  # nothing is left to slow down from
         else:
             if self.watchdog.expired(now_ns) and not self._lockstep:

@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+import functools
+import math
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from fulmar_core.counter_rng import NOISE
+from fulmar_core.sensors.kind import MessageFields, SensorKind, Truth
 from fulmar_core.sensors.odometer import Channel, largest_reading
+from fulmar_core.sensors.reading import Reading
+from fulmar_core.wire import Wire
 
 INERTIAL = 4  # stream of the unit's random numbers, beside that of the odometry
+UNKNOWN = -1.0  # REP-145: first covariance entry of a field that is absent
 
 
 @dataclass(frozen=True)
@@ -35,7 +43,7 @@ class ImuSpec:
 class ImuSample:
     """One reading, in the frame of the unit."""
 
-    specific_force: np.ndarray  # (3,) acceleration minus gravity [m/s²]
+    specific_force: np.ndarray  # (3,) acceleration minus gravity; NaN: not measured [m/s²]
     angular_velocity: np.ndarray  # (3,) [rad/s]
 
 
@@ -81,3 +89,73 @@ class InertialUnit:
         reading = reading * self._scale + self._bias + self._std * self._rng.standard_normal(6)
         reading = reading.clip(-self._most, self._most)
         return np.where(self._quantum > 0.0, (reading / self._step).round() * self._step, reading)
+
+
+class SimulatedImu:
+    """The unit of one simulated robot, whose reading of the true motion is that of its body's origin."""
+
+    def __init__(self, spec: ImuSpec, noisy: bool) -> None:
+        """Prepare; without noise every reading is the truth."""
+        self._unit = InertialUnit(spec) if noisy else None
+
+    def reset(self, seed: int, number: int) -> None:
+        """Begin an episode; see `SimulatedSensor`."""
+        if self._unit is not None:
+            self._unit.reset(seed, number)
+
+    def measure(self, truth: Truth, time_s: float) -> Reading | None:
+        """An `ImuSample`, repeated until there is a newer one; None where the simulator knows no specific force."""
+        if truth.specific_force is None:
+            return None
+        sample = ImuSample(truth.specific_force, truth.state.angular_velocity_in_body)
+        return Reading(sample if self._unit is None else self._unit.measure(sample, time_s))
+
+
+PATHS = (
+    *(f"{vector}.{axis}" for vector in ("linear_acceleration", "angular_velocity") for axis in "xyz"),
+    "orientation_covariance",
+    "linear_acceleration_covariance",
+    "angular_velocity_covariance",
+)
+
+
+@functools.cache
+def _covariances(spec: ImuSpec, force_is_known: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Of orientation, specific force and turn rate, shapes (9,); absent ones are marked as REP-145 says."""
+    force = np.eye(3).ravel() * spec.accelerometer.std**2
+    turn = np.eye(3).ravel() * spec.gyroscope.std**2
+    absent = np.zeros(9)
+    absent[0] = UNKNOWN
+    if not force_is_known:
+        force[0] = UNKNOWN
+    return absent, force, turn
+
+
+def _write(reading: Reading, spec: ImuSpec) -> Sequence[Any]:
+    sample: ImuSample = reading.value
+    force = sample.specific_force.tolist()
+    known = not math.isnan(force[0])
+    return (
+        *(force if known else (0.0, 0.0, 0.0)),
+        *sample.angular_velocity.tolist(),
+        *_covariances(spec, known),
+    )
+
+
+def _read(values: Sequence[Any]) -> Reading:
+    force, turn = np.array(values[:3], dtype=float), np.array(values[3:6], dtype=float)
+    if values[PATHS.index("linear_acceleration_covariance")][0] == UNKNOWN:
+        force[:] = np.nan
+    return Reading(ImuSample(force, turn))
+
+
+KIND = SensorKind(
+    spec=ImuSpec,
+    wire=Wire(
+        "imu/data", "sensor_msgs/msg/Imu", "plant", "stream", "every plant tick",
+        "specific force (+g at rest) and turn rate; no orientation", unit="m/s², rad/s", frame="`imu_link`",
+    ),
+    frame="imu_link",
+    message=MessageFields(PATHS, _write, _read),
+    simulate=SimulatedImu,
+)  # fmt: skip

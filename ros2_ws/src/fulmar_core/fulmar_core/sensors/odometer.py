@@ -22,7 +22,9 @@ from fulmar_core.counter_rng import (
 from fulmar_core.disturbances.world import World
 from fulmar_core.mutable_state import MutableState
 from fulmar_core.rotation import Array, wrap_angle
+from fulmar_core.sensors.kind import SensorKind
 from fulmar_core.state import S
+from fulmar_core.wire import Wire
 
 
 @dataclass(frozen=True)
@@ -266,3 +268,16 @@ class Odometer(MutableState, Generic[S]):
     def _state(truth: S, columns: Array) -> S:
         """A state in the form of the true one; its arrays are rows of the columns."""
         return type(truth)(*(columns[i] for i in range(columns.shape[0])))
+
+
+KIND = SensorKind(
+    spec=OdometrySpec,
+    wire=Wire(
+        "odom", "nav_msgs/msg/Odometry", "plant", "stream", "every plant tick",
+        "measured pose and twist, stamped at measurement", unit="m, m/s, rad/s",
+        frame="`odom`; twist in `base_link`",
+    ),
+    frame="odom",
+    message=None,
+    simulate=None,  # part of the batch, as an `Odometer`
+)  # fmt: skip

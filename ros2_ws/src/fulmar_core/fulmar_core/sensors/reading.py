@@ -10,10 +10,20 @@ import numpy as np
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """One measurement of one sensor."""
+    """One measurement of one sensor.
+
+    A device stamps its readings by a clock. A simulated sensor knows only how old its reading is.
+    """
 
     value: Any  # of the sensor's own type, without a batch axis; see the sensor's file
-    stamp_ns: int | None = None  # when it was measured, on the plant's clock; None: with its sample [ns]
+    stamp_ns: int | None = (
+        None  # when it was measured, on the plant's clock; None: `age_s` before its sample [ns]
+    )
     covariance: np.ndarray | None = (
         None  # of the value, about the axes that the sensor's file names; None: unknown
     )
+    age_s: float = 0.0  # of a reading without a stamp, when its sample was taken [s]
+
+    def stamp(self, sample_ns: int) -> int:
+        """When it was measured, with the time of its sample, on the plant's clock [ns]."""
+        return self.stamp_ns if self.stamp_ns is not None else sample_ns - round(1e9 * self.age_s)

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fulmar_core.actuators.thrusters import Thrusters
 from fulmar_core.robot import Robot
 from fulmar_evaluation.bounds.motions import motions_of
 from fulmar_evaluation.bounds.time_optimal import time_optimal_bound
@@ -37,10 +36,10 @@ def bound_of(
 ) -> NamedBound:
     """Most waypoints that a robot can visit in a loop, by what limits its family.
 
-    Thrusters: time-optimal travel of a point mass with the force in the strongest direction, whichever way it faces.
-    Propellers in water and wheels: travel along the heading at the speeds and turn rates that the robot can hold, with
-    the time that starting and stopping take. Any other: travel at top speed. The body is the nominal one, in a still
-    world.
+    What pushes to every side: time-optimal travel of a point mass with the force in the strongest direction, whichever
+    way it faces. Propellers in water and wheels: travel along the heading at the speeds and turn rates that the robot
+    can hold, with the time that starting and stopping take. Any other: travel at top speed. The body is the nominal
+    one, in a still world.
 
     Args:
         robot: The robot.
@@ -49,7 +48,7 @@ def bound_of(
         radius: How near a visit is [m].
         duration_s: Length of an episode [s].
         start_yaw: Heading at the start, shape (...,); any by default [rad].
-        start_velocity: In the world, shape (..., 2), for thrusters; at rest by default [m/s].
+        start_velocity: In the world, shape (..., 2), where actuators push to every side; at rest by default [m/s].
 
     Returns:
         The bound with its name.
@@ -57,7 +56,7 @@ def bound_of(
     Raises:
         ValueError: Something is not positive, or the number has no bound.
     """
-    if isinstance(robot.actuators, Thrusters):
+    if robot.actuators.sideways:
         acceleration = robot.performance.force / robot.body.mass
         bound = time_optimal_bound(
             start_xy,

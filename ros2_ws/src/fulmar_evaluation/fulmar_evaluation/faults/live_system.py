@@ -22,7 +22,7 @@ from fulmar_bringup.supervisor import Supervisor, supervisor
 from fulmar_bringup.system_rows import system_rows
 from fulmar_core.controller_settings import MOST_COPIES
 from fulmar_core.errors import RunFailed
-from fulmar_core.robot import Robot, Rolling, load_robot
+from fulmar_core.robot import Robot, load_robot
 from fulmar_core.safety.watchdog import default_timeout
 from fulmar_core.topics import (
     ACTUATORS_STATE,
@@ -71,7 +71,7 @@ class LiveSystem:
         pairs = zip(actuators.scale, actuators.response.slew, strict=False)
         # As fast as commands may change. A plant that stops by itself asks for it only where wheels would slide.
         slew_s = max((float(most / rate) for most, rate in pairs), default=0.0)
-        self.ramp_s = slew_s if isinstance(actuators, Rolling) else 0.0
+        self.ramp_s = actuators.refuge.longest_s
         # From the last command to standstill.
         self.silenced_s = self.watchdog_s + self.tick_s + self.ramp_s
         # From what a controller notices to the same.

@@ -10,7 +10,7 @@ from collections.abc import Callable
 import psutil
 
 from fulmar_bringup.system import DEFAULT_ESTIMATOR
-from fulmar_core.estimation.settings import load_estimator
+from fulmar_core.estimation.kinds import load_estimator
 from fulmar_core.safety.estop import TIMEOUT_NS
 from fulmar_core.topics import MOCAP
 from fulmar_evaluation.faults.fault import STAYS_S, WORDS_S, Fault, Outcome, stopped, went_on

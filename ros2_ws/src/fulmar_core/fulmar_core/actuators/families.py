@@ -1,0 +1,18 @@
+"""The families of actuators, by the `kind` of a robot's YAML: another one is its own file and a row here."""
+
+from __future__ import annotations
+
+from fulmar_core.actuators.ackermann import Ackermann
+from fulmar_core.actuators.differential_drive import DifferentialDrive
+from fulmar_core.actuators.family import Actuators
+from fulmar_core.actuators.fans import Fans
+from fulmar_core.actuators.propellers import Propellers
+from fulmar_core.actuators.thrusters import Thrusters
+
+FAMILIES: dict[str, type[Actuators]] = {
+    "thrusters": Thrusters,
+    "propellers": Propellers,
+    "differential_drive": DifferentialDrive,
+    "ackermann": Ackermann,
+    "fans": Fans,
+}

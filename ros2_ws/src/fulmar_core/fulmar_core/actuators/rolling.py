@@ -1,0 +1,71 @@
+"""Families on wheels that do not slip sideways; `dynamics/rolling.py` moves them."""
+
+from __future__ import annotations
+
+import functools
+from abc import abstractmethod
+
+import numpy as np
+
+from fulmar_core.actuators.excitation import Excitation
+from fulmar_core.actuators.family import Actuators
+from fulmar_core.actuators.refuge import RampDown, Refuge
+from fulmar_core.disturbances.world import World
+from fulmar_core.planar import PlanarState
+from fulmar_core.rotation import Array
+
+SERVO_S = 0.05  # time constant of a wheel's speed servo where the drive names none [s]
+
+
+class Rolling(Actuators):
+    """A command is (speed ahead [m/s], how to turn), by servos of which the dynamics have the lag.
+
+    Attributes:
+        track: Between left and right wheels [m].
+        wheel_force: The most that wheels push, as the family counts it [N].
+        friction: Of the tyres on the floor [-].
+    """
+
+    track: float
+    wheel_force: float
+    friction: float
+    excitation = Excitation(hold_s=1.5, foresight_s=1.0)  # long enough to come up to speed, and to stop
+
+    @property
+    @abstractmethod
+    def pull(self) -> float:
+        """The most that all wheels push together [N]."""
+
+    @abstractmethod
+    def next_yaw_rate(
+        self, state: PlanarState, speed: Array, turn: Array, twist: Array, world: World, dt: float
+    ) -> Array:
+        """Turn rate after one integration step, shape (...,) [rad/s].
+
+        Args:
+            state: Before it.
+            speed: Ahead, after it [m/s].
+            turn: Second value of what the servos are asked for.
+            twist: Moment from outside [N·m].
+            world: Mass and inertia.
+            dt: Integration step, > 0 [s].
+        """
+
+    @property
+    def servo_s(self) -> float:
+        """Time constant of the wheels' speed servos [s]."""
+        return max(self.response.lag_s, SERVO_S)
+
+    @functools.cached_property
+    def refuge(self) -> Refuge:
+        """Slow down, so that wheels do not lock; see `Actuators.refuge`."""
+        slew = self.response.slew
+        return RampDown(self.scale, slew) if slew else super().refuge
+
+    def by_hand(self, ahead: float, left: float, turn: float) -> np.ndarray | None:
+        """Speed and turn; see `Actuators.by_hand`."""
+        return np.asarray(self.limited(np.array([ahead, turn]) * self.scale))
+
+    def mirrored(self) -> np.ndarray | None:
+        """The same speed, and the turn to the other side; see `Actuators.mirrored`."""
+        return np.diag([1.0, -1.0])

@@ -1,0 +1,88 @@
+"""The table of estimators: what each takes and publishes, its settings, and how it is made. Knows no ROS."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from fulmar_core.config import line_of, load_config
+from fulmar_core.errors import ConfigError, did_you_mean
+from fulmar_core.estimation.estimator import Estimator
+from fulmar_core.estimation.settings import EstimatorSettings, PlanarMotionSettings
+from fulmar_core.paths import config_path
+from fulmar_core.robot import Robot
+from fulmar_core.topics import IMU, MOCAP, ODOMETRY, SENSOR_WIRES, Wire
+
+DEFAULT_KIND = "planar_motion"  # of a file that names none
+
+
+@dataclass(frozen=True)
+class EstimatorKind:
+    """One row: everything that nodes, plans and scripts need to know of a kind of estimator."""
+
+    settings: type[EstimatorSettings]  # keys of its files
+    make: Callable[[Any, Robot], Estimator]  # from such settings
+    takes: Mapping[str, Wire]  # readings without which it is of no use, by name
+    publishes: tuple[Wire, ...]  # each from the same estimate
+    takes_if_there: Mapping[str, Wire] = field(default_factory=dict)  # readings that improve the estimate
+    needs: tuple[str, ...] = ()  # modules of extras
+
+    @property
+    def readings(self) -> dict[str, Wire]:
+        """All that it takes, by name."""
+        return {**self.takes, **self.takes_if_there}
+
+
+def _planar_motion(settings: PlanarMotionSettings, robot: Robot) -> Estimator:
+    from fulmar_core.estimation.planar_motion import PlanarMotionEstimator
+
+    return PlanarMotionEstimator(settings, robot.limits)
+
+
+KINDS: dict[str, EstimatorKind] = {
+    "planar_motion": EstimatorKind(
+        PlanarMotionSettings,
+        _planar_motion,
+        takes={"mocap": MOCAP, "imu": IMU},
+        publishes=(ODOMETRY,),
+        takes_if_there={"star_tracker": SENSOR_WIRES["star_tracker"]},
+        needs=("filterpy",),
+    ),
+}
+
+
+def estimator_path(name: str) -> Path:
+    """Path of `configs/estimators/<name>.yaml`, or the file itself where the name ends in `.yaml`."""
+    return Path(name) if name.endswith(".yaml") else config_path("estimators", name)
+
+
+def estimator_kind(name: str) -> EstimatorKind:
+    """The row of an estimator's file; `name` as of `load_estimator`.
+
+    Raises:
+        ConfigError: No such file or kind, or the file is not YAML.
+    """
+    path = estimator_path(name)
+    kind = load_config(dict[str, Any], path).get("kind", DEFAULT_KIND)
+    if kind not in KINDS:
+        raise ConfigError(
+            f"{path}:{line_of(path, ['kind'])}: unknown kind of estimator '{kind}'. "
+            f"Known: {', '.join(KINDS)}.{did_you_mean(str(kind), KINDS)}"
+        )
+    return KINDS[kind]
+
+
+def load_estimator(name: str) -> EstimatorSettings:
+    """Read `configs/estimators/<name>.yaml`, or the file itself where the name ends in `.yaml`.
+
+    Raises:
+        ConfigError: Unknown name or kind, or a mistake in the file.
+    """
+    return load_config(estimator_kind(name).settings, estimator_path(name))
+
+
+def make_estimator(name: str, robot: Robot) -> Estimator:
+    """A new estimator of a robot with the settings of a file; errors as of `load_estimator`."""
+    return estimator_kind(name).make(load_estimator(name), robot)

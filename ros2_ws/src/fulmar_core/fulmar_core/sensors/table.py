@@ -1,0 +1,20 @@
+"""The table of sensors: a row makes a sensor known to robots, simulators, drivers, nodes and bags."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from fulmar_core.plausible_ranges import Plausible
+from fulmar_core.sensors import imu, odometer, star_tracker
+from fulmar_core.sensors.kind import SensorKind
+
+# By the name in a robot's YAML, in the order in which a plant publishes: controllers wait for the odometry.
+SENSORS: dict[str, SensorKind] = {
+    "odometry": odometer.KIND,
+    "imu": imu.KIND,
+    "star_tracker": star_tracker.KIND,
+}
+
+RANGES: tuple[Plausible, ...] = tuple(
+    replace(row, key=f"sensors.{name}.{row.key}") for name, kind in SENSORS.items() for row in kind.plausible
+)

@@ -1,0 +1,74 @@
+"""Messages to readings of estimators, and estimates to messages: a row for each wire that is no sensor's."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from geometry_msgs.msg import PoseStamped
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import Imu
+
+from fulmar_bags.message_reader import reading_of, stamp_ns
+from fulmar_core.errors import shortened
+from fulmar_core.estimation.estimator import Estimate
+from fulmar_core.robot_name import Frames
+from fulmar_core.rotation import rotate_inverse
+from fulmar_core.sensors.kind import SensorKind
+from fulmar_core.sensors.reading import Reading
+from fulmar_core.sensors.table import SENSORS
+from fulmar_core.topics import IMU, MOCAP, ODOMETRY, Wire
+from fulmar_ros.convert import OdometryWriter
+from fulmar_ros.message_class import message_class
+
+FRAMES = ("odom", "map", "world")  # names of the room in motion captures; all with Z up
+Read = Callable[[Any, Frames], Reading | str | None]  # a reading, why there is none, or None without either
+Write = Callable[[Estimate], Any]
+
+
+def _pose(message: PoseStamped, frames: Frames) -> Reading | str:
+    frame = frames.plain(message.header.frame_id)
+    if frame not in FRAMES:
+        return f"pose is in '{shortened(frame)}', must be in one of {', '.join(FRAMES)}"
+    p, q = message.pose.position, message.pose.orientation
+    return Reading(np.array([p.x, p.y, p.z, q.x, q.y, q.z, q.w]), stamp_ns(message.header.stamp))
+
+
+def _sensor(kind: SensorKind) -> Read:
+    return lambda message, _frames: reading_of(message, kind)
+
+
+def _imu(message: Imu, _frames: Frames) -> Reading | None:
+    if message.linear_acceleration_covariance[0] == -1.0 or message.angular_velocity_covariance[0] == -1.0:
+        return None  # REP-145: marks fields that are absent
+    return reading_of(message, SENSORS["imu"])
+
+
+def _odometry_writer(frames: Frames) -> Write:
+    """Writes a `RigidBodyState` with its covariance of shape (12, 12)."""
+    writer = OdometryWriter(None, frame=frames.odom, child_frame=frames.base)
+
+    def write(estimate: Estimate) -> Odometry:
+        message = writer.write(estimate.value, estimate.stamp_ns)
+        message.pose.covariance = estimate.covariance[:6, :6].ravel()
+        turn = np.eye(6)
+        turn[:3, :3] = rotate_inverse(estimate.value.quat_xyzw, np.eye(3)).T  # velocity: world to body
+        message.twist.covariance = (turn @ estimate.covariance[6:, 6:] @ turn.T).ravel()
+        return message
+
+    return write
+
+
+READERS: dict[Wire, tuple[type, Read]] = {
+    **{
+        kind.wire: (message_class(kind.wire), _sensor(kind))
+        for kind in SENSORS.values()
+        if kind.message is not None
+    },
+    MOCAP: (PoseStamped, _pose),
+    IMU: (Imu, _imu),
+}
+WRITERS: dict[Wire, tuple[type, Callable[[Frames], Write]]] = {
+    ODOMETRY: (Odometry, _odometry_writer),
+}

@@ -1,0 +1,137 @@
+"""Publishers of a robot's sensors, by the table of sensors."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import QoSProfile
+
+from fulmar_core.robot import Robot
+from fulmar_core.robot_name import PLAIN, Frames
+from fulmar_core.safety.input_gate import BACK_NS
+from fulmar_core.sensors.kind import SensorKind
+from fulmar_core.sensors.reading import Reading
+from fulmar_core.sensors.table import SENSORS
+from fulmar_core.wire import Wire
+from fulmar_ros.convert import OdometryWriter, stamp_of
+from fulmar_ros.message_class import message_class
+
+Encode = Callable[[Reading, int], Any]  # a reading and its stamp [ns] to a message, or to its bytes
+ODOMETRY = "odometry"
+
+
+class ReadingWriter:
+    """Readings of one sensor as messages, by the fields that its row of the table names."""
+
+    def __init__(self, kind: SensorKind, spec: Any, frames: Frames = PLAIN) -> None:
+        """Prepare the message.
+
+        Args:
+            kind: Row of the sensor; it names fields.
+            spec: What the robot's file says of the sensor.
+            frames: Of the robot.
+        """
+        assert kind.message is not None
+        self._message = message_class(kind.wire)()
+        self._spec, self._values = spec, kind.message.write
+        self._message.header.frame_id = frames.named(kind.frame)
+        self._fields: list[tuple[Any, str]] = []
+        for path in kind.message.paths:
+            *outer, last = path.split(".")
+            part = self._message
+            for name in outer:
+                part = getattr(part, name)
+            self._fields.append((part, last))
+
+    def write(self, reading: Reading, time_ns: int) -> Any:
+        """Fill the message; it is overwritten by the next call."""
+        self._message.header.stamp = stamp_of(time_ns)
+        for (part, name), value in zip(self._fields, self._values(reading, self._spec), strict=True):
+            setattr(part, name, value)
+        return self._message
+
+
+class SensorWires:
+    """Publishers of the sensors that a robot's file names, in the order of the table."""
+
+    def __init__(
+        self,
+        node: Node,
+        robot: Robot,
+        frames: Frames,
+        qos: Callable[[Wire], QoSProfile],
+        publish: Callable[[Publisher, Any], None],
+        *,
+        odometry: bool,
+    ) -> None:
+        """Create the publishers.
+
+        Args:
+            node: Their owner.
+            robot: The robot.
+            frames: Of the robot.
+            qos: Quality of service of a wire.
+            publish: Publishes a message, or its bytes.
+            odometry: Whether to publish the odometry; if not, another node does.
+        """
+        self._publish = publish
+        self._made: dict[str, Publisher] = {}
+        self._encode: dict[str, Encode] = {}
+        self._newest_ns: dict[str, int] = {}  # newest stamp of a sensor that stamps its own readings
+        for name, spec in robot.sensors.specs.items():
+            if name != ODOMETRY or odometry:
+                wire = SENSORS[name].wire
+                self._made[name] = node.create_publisher(message_class(wire), wire.name, qos(wire))
+                self._encode[name] = _encoder(name, spec, frames)
+
+    @property
+    def publishers(self) -> list[Publisher]:
+        """All of them."""
+        return list(self._made.values())
+
+    @property
+    def odometry(self) -> Publisher | None:
+        """That of the odometry; None: another node publishes it."""
+        return self._made.get(ODOMETRY)
+
+    def publish(self, readings: Mapping[str, Reading], sample_ns: int) -> None:
+        """Publish the readings of a sample.
+
+        Args:
+            readings: By the sensors' names.
+            sample_ns: Time of the sample [ns].
+        """
+        self.publish_odometry(readings, sample_ns)
+        for name in self._made:
+            if name in readings and name != ODOMETRY:
+                self._publish_if_new(name, readings[name], sample_ns)
+
+    def publish_odometry(self, readings: Mapping[str, Reading], sample_ns: int) -> None:
+        """Publish the odometry of a sample, subscribed or not; arguments as of `publish`."""
+        if ODOMETRY in self._made and ODOMETRY in readings:
+            self._publish(self._made[ODOMETRY], self._encode[ODOMETRY](readings[ODOMETRY], sample_ns))
+
+    def publish_stamped(self, readings: Mapping[str, Reading], sample_ns: int) -> None:
+        """Publish the readings that have a stamp of their own, of a sample that came before; as `publish`."""
+        self.publish({name: each for name, each in readings.items() if each.stamp_ns is not None}, sample_ns)
+
+    def _publish_if_new(self, name: str, reading: Reading, sample_ns: int) -> None:
+        """Publish a reading that has subscribers and, if it is stamped, comes for the first time."""
+        if not self._made[name].get_subscription_count():
+            return
+        if reading.stamp_ns is not None:
+            newest_ns = self._newest_ns.get(name)
+            if newest_ns is not None and 0 <= newest_ns - reading.stamp_ns <= BACK_NS:
+                return  # further back, the clock was set
+            self._newest_ns[name] = reading.stamp_ns
+        self._publish(self._made[name], self._encode[name](reading, reading.stamp(sample_ns)))
+
+
+def _encoder(name: str, spec: Any, frames: Frames) -> Encode:
+    if name == ODOMETRY:  # on the path of control, where a message costs more than its bytes
+        writer = OdometryWriter(spec, frame=frames.odom, child_frame=frames.base)
+        return lambda reading, time_ns: writer.raw(reading.value, time_ns)
+    return ReadingWriter(SENSORS[name], spec, frames).write

@@ -1,0 +1,123 @@
+"""Readings of sensors as messages, and which of them a plant publishes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fulmar_bags.message_reader import reading_of
+from fulmar_core.robot import load_robot
+from fulmar_core.robot_name import PLAIN, Frames
+from fulmar_core.sensors.reading import Reading
+from fulmar_core.sensors.star_tracker import StarTrackerSpec
+from fulmar_core.sensors.table import SENSORS
+from fulmar_ros.sensor_wires import ReadingWriter, SensorWires
+from tests.states import planar_state
+
+ATTITUDE = np.array([0.0, 0.6, 0.0, 0.8])
+PLATFORM = load_robot("floating_platform")
+ROBOT = replace(PLATFORM, sensors=replace(PLATFORM.sensors, star_tracker=StarTrackerSpec()))
+KIND = SENSORS["star_tracker"]
+
+
+def test_an_attitude_is_written_and_read_by_its_row():
+    message = ReadingWriter(KIND, StarTrackerSpec(), Frames("alpha/")).write(Reading(ATTITUDE), 3_000_000_007)
+    assert type(message).__name__ == "QuaternionStamped"
+    assert message.header.frame_id == "inertial"
+    read = reading_of(message, KIND)
+    assert read.stamp_ns == 3_000_000_007
+    np.testing.assert_array_equal(read.value, ATTITUDE)
+
+
+def test_frames_of_a_robot_have_its_prefix():
+    assert ReadingWriter(SENSORS["imu"], ROBOT.sensors.imu, Frames("alpha/"))._message.header.frame_id == (
+        "alpha/imu_link"
+    )
+
+
+class Topic:
+    """A publisher that keeps what it publishes."""
+
+    def __init__(self, name, listeners):
+        self.name, self.listeners, self.sent = name, listeners, []
+
+    def get_subscription_count(self):
+        return self.listeners
+
+
+class Node:
+    def __init__(self):
+        self.topics = {}
+
+    def create_publisher(self, _kind, name, _qos):
+        return self.topics.setdefault(name, Topic(name, 1))
+
+
+def publish(topic, message):
+    stamp = None if isinstance(message, bytes) else message.header.stamp
+    topic.sent.append(stamp and stamp.sec * 1_000_000_000 + stamp.nanosec)
+
+
+@pytest.fixture
+def node():
+    return Node()
+
+
+def wires_of(node, odometry=True, robot=ROBOT):
+    return SensorWires(node, robot, PLAIN, lambda wire: wire, publish, odometry=odometry)
+
+
+def sample(**star):
+    return {"odometry": Reading(planar_state(0.0, 0.0, 0.0)), "star_tracker": Reading(ATTITUDE, **star)}
+
+
+def test_a_robot_publishes_the_sensors_of_its_file_and_no_others(node):
+    wires_of(node, robot=PLATFORM).publish(sample(), 5)
+    assert list(node.topics) == ["odom", "imu/data"]
+    assert len(node.topics["odom"].sent) == 1
+
+
+def test_odometry_of_another_node_is_not_published(node):
+    wires = wires_of(node, odometry=False)
+    wires.publish(sample(), 5)
+    assert wires.odometry is None
+    assert list(node.topics) == ["imu/data", "attitude"]
+    assert node.topics["attitude"].sent == [5]
+
+
+def test_a_simulated_reading_is_stamped_by_its_age(node):
+    wires_of(node).publish(sample(age_s=0.25), 1_000_000_000)
+    assert node.topics["attitude"].sent == [750_000_000]
+
+
+def test_a_resent_sample_repeats_the_odometry_alone(node):
+    wires = wires_of(node)
+    wires.publish(sample(), 5)
+    wires.publish_odometry(sample(), 5)
+    assert (len(node.topics["odom"].sent), len(node.topics["attitude"].sent)) == (2, 1)
+
+
+def test_a_reading_with_a_stamp_of_its_own_is_published_once_until_the_clock_is_set(node):
+    wires, second = wires_of(node), 1_000_000_000
+    for stamp in (50 * second, 50 * second, 51 * second, 50 * second, 1 * second):
+        wires.publish(sample(stamp_ns=stamp), 60 * second)
+    assert node.topics["attitude"].sent == [50 * second, 51 * second, second]
+    assert len(node.topics["odom"].sent) == 5
+
+
+def test_of_a_sample_that_comes_again_only_stamped_readings_count(node):
+    wires = wires_of(node)
+    wires.publish_stamped(sample(stamp_ns=7), 5)
+    wires.publish_stamped(sample(), 5)
+    assert node.topics["odom"].sent == []
+    assert node.topics["attitude"].sent == [7]
+
+
+def test_a_sensor_without_a_subscriber_is_not_written_and_odometry_always_is(node):
+    wires = wires_of(node)
+    for topic in node.topics.values():
+        topic.listeners = 0
+    wires.publish(sample(), 5)
+    assert (len(node.topics["odom"].sent), len(node.topics["attitude"].sent)) == (1, 0)
