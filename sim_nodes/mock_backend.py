@@ -6,13 +6,12 @@ import numpy as np
 
 from fulmar_core.backend import Sample
 from fulmar_core.episode import Episode
-from fulmar_core.motion import move
-from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
 from fulmar_core.sensors.kind import Truth
 from fulmar_core.sensors.reading import Reading
 from fulmar_core.sensors.simulated import SimulatedSensors
-from fulmar_core.things import Poses, Thing, push_things
+from fulmar_core.state import State
+from fulmar_core.things import Poses, Thing
 from sim_nodes.one_world import OneWorld
 
 
@@ -26,10 +25,7 @@ class MockBackend:
 
     def reset(self, episode: Episode, *, seed: int, number: int = 0) -> Sample:
         """Begin anew; see `Backend.reset`."""
-        start = episode.start
-        self._state = PlanarState(
-            *(np.array([getattr(start, name)], dtype=float) for name in PlanarState.__slots__)
-        )
+        self._state: State = episode.start.mapped(lambda part: np.array([part], dtype=float))
         self._poses: Poses = {
             thing.name: np.array([episode.goal.things[thing.name]], dtype=float) for thing in self._things
         }
@@ -42,25 +38,23 @@ class MockBackend:
         """Apply a command; see `Backend.step`."""
         world, before = self._world, self._state
         world.begin(np.asarray(command, dtype=float), ticks, before[0].to_rigid(), begins=begins)
-        self._state = move(
-            self.robot,
+        after = world.dynamics.move(
             before,
             world.actuation,
             world.world,
             world.outside,
             substeps=ticks,
             latest_s=world.latest_s,
-            off_centre=bool(world.world.com_x[0] or world.world.com_y[0]),
+            off_centre=world.dynamics.is_off_centre(world.world),
         )
-        self._poses, self._state = push_things(self._things, self._poses, before, self._state, self.robot)
+        self._poses, self._state = world.dynamics.push_things(self._things, self._poses, before, after)
         return self._sample(ticks)
 
     def stand(self, ticks: int = 1, *, begins: int | None = None) -> Sample:
         """Let time pass for a body that nothing moves; see `CanStand.stand`."""
-        zero = np.zeros(1)
         rest = np.array(self.robot.actuators.safe_command)
         self._world.begin(rest, ticks, self._state[0].to_rigid(), begins=begins)
-        self._state = PlanarState(self._state.x, self._state.y, self._state.yaw, zero, zero, zero)
+        self._state = self._state.stopped()
         return self._sample(ticks)
 
     def make_safe(self) -> None:

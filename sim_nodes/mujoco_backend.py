@@ -66,13 +66,13 @@ class MujocoBackend:
         """
         model, data, robot_model, world = self.model, self.data, self._scene.robot_model, self._world
         world.begin(np.asarray(command, dtype=float), ticks, self._truth, begins=begins)
-        fx, fy, torque = (float(part[0]) for part in world.outside)
+        outside = tuple(float(part[0]) for part in world.outside)
         dt = self.robot.timing.physics_dt
         last = None
         for _ in range(ticks):
             applied = world.actuation.advance(dt, latest_s=world.latest_s)
             if applied is not last or not robot_model.steady:
-                robot_model.drive(model, data, applied[:, 0], world.actuation.gain[:, 0], (fx, fy, torque))
+                robot_model.drive(model, data, applied[:, 0], world.actuation.gain[:, 0], outside)
                 last = applied
             mujoco.mj_step(model, data, robot_model.steps_per_tick)
         if not np.isfinite(data.qpos).all():

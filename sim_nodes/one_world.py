@@ -5,17 +5,15 @@ Every simulator thus has the failures, noise, delays, pushes and sensors of the 
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
+from fulmar_core.batch_dynamics import dynamics_of
 from fulmar_core.counter_rng import uniform_from, words, world_keys
-from fulmar_core.disturbances.world import FIELDS, World, outside_wrench, push_is_constant
-from fulmar_core.dynamics.free_body import Wrench
 from fulmar_core.episode import Episode
 from fulmar_core.motion import actuation_of
-from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
-from fulmar_core.rotation import from_yaw, multiply
-from fulmar_core.sensors.odometer import Odometer
 from fulmar_core.simulation import ACTUATOR_NOISE
 from fulmar_core.state import RigidBodyState
 
@@ -26,12 +24,14 @@ class OneWorld:
     Attributes:
         world: What was drawn for the episode, as a batch of one.
         actuation: What the actuators do.
-        outside: Push of the surroundings in this control step: force along x and y [N], yaw moment [N·m], shapes (1,).
+        dynamics: Of the robot.
+        outside: Push of the surroundings in this control step, as of `Dynamics.outside`, shapes (1,).
         latest_s: How late commands act [s].
     """
 
     def __init__(self, robot: Robot, *, noisy: bool) -> None:
         self._robot, self._noisy = robot, noisy
+        self.dynamics = dynamics_of(robot)
         self._safe = np.array(robot.actuators.safe_command)[:, None]
 
     def reset(self, episode: Episode, truth: RigidBodyState, *, seed: int, number: int) -> RigidBodyState:
@@ -46,15 +46,14 @@ class OneWorld:
         Returns:
             First measurement.
         """
-        drawn = episode.world
-        self.world = World(*(np.asarray(getattr(drawn, name), dtype=float)[..., None] for name in FIELDS))
+        self.world = episode.world.mapped(lambda part: np.asarray(part, dtype=float)[..., None])
         self.actuation = actuation_of(self._robot, self._safe)
         late = self.world.action_delay[0] + self.world.opening_delay[0]
         response = self._robot.actuators.response
         self.latest_s = float(response.delay_s + response.opening_delay_s + late)
-        self.outside: Wrench = np.zeros(1), np.zeros(1), np.zeros(1)
-        self._constant_push = push_is_constant(self.world)
-        self._blurred = bool(self.world.velocity_noise[0] or self.world.yaw_rate_noise[0])
+        self.outside: Any = None  # before the first command
+        self._constant_push = self.dynamics.push_is_constant(self.world)
+        self._blurred = self.dynamics.blurs(self.world)
         self._seed, self._numbers, self._repeats = seed, np.array([number]), np.array([0])
         self._ticks = 0
         self._begun = 0  # control steps
@@ -100,11 +99,9 @@ class OneWorld:
         """What the odometry reports now; called once for each `begin`, at its end."""
         return self._measure(truth)
 
-    def _push(self, truth: RigidBodyState, ticks: int) -> Wrench:
-        dt = self._robot.timing.physics_dt
-        return outside_wrench(
-            PlanarState.from_rigid(truth)[None], self.world, np.array([self._ticks * dt]), ticks * dt
-        )
+    def _push(self, truth: RigidBodyState, ticks: int) -> Any:
+        dt, state = self._robot.timing.physics_dt, self.dynamics.state_type.from_rigid(truth)
+        return self.dynamics.outside(state[None], self.world, np.array([self._ticks * dt]), ticks * dt)
 
     def _noise(self) -> np.ndarray | None:
         if not self.world.action_noise[0]:
@@ -115,7 +112,7 @@ class OneWorld:
 
     def _start_odometer(self, ticks: int) -> None:
         self._period = ticks
-        self._odometer = Odometer(
+        self._odometer = self.dynamics.odometer(
             self._robot.sensors.odometry,
             seed=self._seed,
             period=ticks * self._robot.timing.physics_dt,
@@ -127,20 +124,8 @@ class OneWorld:
     def _measure(self, truth: RigidBodyState) -> RigidBodyState:
         if not (self._noisy or self._blurred):
             return truth
-        true = PlanarState.from_rigid(truth)
+        true = self.dynamics.state_type.from_rigid(truth)
         steps = np.array([self._measured])
         self._measured += 1
         batch = self._odometer.measure(true[None], self.world, self._numbers, self._repeats, steps)
-        return _tilted(batch[0], truth, true)
-
-
-def _tilted(measured: PlanarState, truth: RigidBodyState, true: PlanarState) -> RigidBodyState:
-    """A planar measurement with the true height, roll and pitch."""
-    position, velocity = truth.position_in_world, truth.velocity_in_world
-    omega = truth.angular_velocity_in_body
-    return RigidBodyState(
-        np.array([measured.x, measured.y, position[2]]),
-        multiply(from_yaw(measured.yaw - true.yaw), truth.quat_xyzw),
-        np.array([measured.vx, measured.vy, velocity[2]]),
-        np.array([omega[0], omega[1], measured.yaw_rate]),
-    )
+        return self.dynamics.reported(batch[0], truth)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import mujoco
 import numpy as np
 
 from fulmar_core.actuators.pushing import Push, Pushing
-from fulmar_core.disturbances.world import World
 from fulmar_core.dynamics.hydrodynamics import GRAVITY
-from fulmar_core.planar import PlanarState, PlanarWrench
 from fulmar_core.robot import Robot
 from sim_nodes.mujoco_model.scenery import BODY, add_hull
 from sim_nodes.mujoco_model.water import Water
@@ -84,7 +84,7 @@ class Floater:
         """Look up the body."""
         self._body = model.body(BODY).id
 
-    def take_world(self, model: mujoco.MjModel, world: World) -> None:
+    def take_world(self, model: mujoco.MjModel, world: Any) -> None:
         """Take mass, inertia and centre of mass; the whole inertia grows and shrinks with that about z."""
         nominal = np.array(self._robot.body.inertia)
         model.body_mass[self._body] = world.mass
@@ -93,7 +93,7 @@ class Floater:
         if self.water is not None:
             self.water.take_world(world, model.body_inertia[self._body])
 
-    def place(self, model: mujoco.MjModel, data: mujoco.MjData, start: PlanarState) -> None:
+    def place(self, model: mujoco.MjModel, data: mujoco.MjData, start: Any) -> None:
         """Put the body where it starts, upright and at rest height."""
         if self._planar:
             data.qpos[:3] = start.x, start.y, start.yaw
@@ -109,7 +109,7 @@ class Floater:
         data: mujoco.MjData,
         applied: np.ndarray,
         gain: np.ndarray,
-        outside: PlanarWrench,
+        outside: tuple[float, ...],
     ) -> None:
         """Set thrusts, the push of the surroundings and the forces of the water; see `RobotModel.drive`."""
         data.ctrl[:] = self._actuators.thrusts(applied) * gain

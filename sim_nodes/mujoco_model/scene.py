@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol
+from typing import Any, Protocol
 
 import mujoco
 import numpy as np
 
 from fulmar_core.actuators.pushing import Pushing
-from fulmar_core.disturbances.world import World
 from fulmar_core.episode import Episode
 from fulmar_core.errors import ConfigError
-from fulmar_core.planar import PlanarState, PlanarWrench
 from fulmar_core.robot import Robot
+from fulmar_core.spatial import SpatialState
 from fulmar_core.things import Thing
 from sim_nodes.mujoco_model.car import Car
 from sim_nodes.mujoco_model.differential_base import DifferentialBase
 from sim_nodes.mujoco_model.floater import Floater
+from sim_nodes.mujoco_model.free_flyer import FreeFlyer
 from sim_nodes.mujoco_model.objects import (
     add_block,
     add_obstacles,
@@ -100,10 +100,14 @@ def _spec(
     spec = mujoco.MjSpec()
     spec.modelname = robot.name
     spec.option.timestep = robot.timing.physics_dt / robot_model.steps_per_tick
-    spec.option.integrator = mujoco.mjtIntegrator.mjINT_EULER
+    in_space = robot.state_type is SpatialState
+    # Euler's method as in the core's plane; a free body tumbles, and would gain energy by it.
+    kinds = mujoco.mjtIntegrator
+    spec.option.integrator = kinds.mjINT_RK4 if in_space else kinds.mjINT_EULER
     # A diverged state has to stay, so that the backend sees it; MuJoCo would silently reset it.
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
-    add_scenery(spec, PALE if robot.hydrodynamics is None else WATER)
+    floor = PALE if robot.hydrodynamics is None else WATER
+    add_scenery(spec, None if in_space else floor)
     add_sensors(spec, robot_model.add(spec))
     add_obstacles(spec, radii)
     for thing in things:
@@ -134,11 +138,11 @@ class RobotModel(Protocol):
         """Look up in a compiled model what the other methods need."""
         ...
 
-    def take_world(self, model: mujoco.MjModel, world: World) -> None:
+    def take_world(self, model: mujoco.MjModel, world: Any) -> None:
         """Take mass, inertia and centre of mass of an episode, without a batch axis."""
         ...
 
-    def place(self, model: mujoco.MjModel, data: mujoco.MjData, start: PlanarState) -> None:
+    def place(self, model: mujoco.MjModel, data: mujoco.MjData, start: Any) -> None:
         """Put the robot where an episode starts, without a batch axis."""
         ...
 
@@ -148,7 +152,7 @@ class RobotModel(Protocol):
         data: mujoco.MjData,
         applied: np.ndarray,
         gain: np.ndarray,
-        outside: PlanarWrench,
+        outside: Any,
     ) -> None:
         """Set every force of the coming tick.
 
@@ -157,7 +161,7 @@ class RobotModel(Protocol):
             data: Its state.
             applied: What each actuator does, shape (n,).
             gain: Factor on it, shape (n,).
-            outside: Push of the surroundings.
+            outside: Push of the surroundings, as of `batch_dynamics.Dynamics.outside`, of one world.
         """
         ...
 
@@ -174,7 +178,7 @@ def robot_model_of(robot: Robot) -> RobotModel:
         ConfigError: The family has none.
     """
     if isinstance(robot.actuators, Pushing):
-        return Floater(robot)
+        return FreeFlyer(robot) if robot.state_type is SpatialState else Floater(robot)
     kind = robot.actuators.kind
     if kind not in WHEELED:
         raise ConfigError(

@@ -11,21 +11,22 @@ HULL_COLOUR = [0.25, 0.45, 0.7, 1.0]
 DARK = [0.15, 0.15, 0.17, 1.0]
 
 
-def add_scenery(spec: mujoco.MjSpec, colour: list[float]) -> None:
+def add_scenery(spec: mujoco.MjSpec, colour: list[float] | None) -> None:
     """Add a floor at z = 0, a sun and a camera above.
 
     Args:
         spec: Model under construction.
-        colour: Of the floor, or of the water; red, green, blue, opacity.
+        colour: Of the floor, or of the water; red, green, blue, opacity. None: there is no floor.
     """
-    spec.worldbody.add_geom(
-        name="floor",
-        type=mujoco.mjtGeom.mjGEOM_PLANE,
-        size=[10, 10, 0.1],
-        rgba=colour,
-        contype=0,
-        conaffinity=FLOOR_BIT,
-    )
+    if colour is not None:
+        spec.worldbody.add_geom(
+            name="floor",
+            type=mujoco.mjtGeom.mjGEOM_PLANE,
+            size=[10, 10, 0.1],
+            rgba=colour,
+            contype=0,
+            conaffinity=FLOOR_BIT,
+        )
     spec.worldbody.add_light(name="sun", pos=[0, 0, 6], dir=[0, 0, -1])
     spec.worldbody.add_camera(name="above", pos=[0, 0, 9], fovy=50)
     spec.visual.global_.offwidth, spec.visual.global_.offheight = 1280, 960

@@ -1,61 +1,107 @@
-"""How robots of one kind are disturbed, move and are measured in a batch; one class for each state type."""
+"""How robots of one kind are disturbed, move and are measured in a batch; one class for each state type.
+
+Simulators that integrate bodies themselves take disturbances and odometry from here, on a batch of one.
+"""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Generic, TypeVar
 
 from fulmar_core.actuators.actuation import ActuationState
 from fulmar_core.actuators.pushing import Pushing
 from fulmar_core.attitude import Vector, cross, minus, plus, scaled
 from fulmar_core.counter_rng import Draws
-from fulmar_core.disturbances.scenario import Scenario, draw_world, longest_delay
+from fulmar_core.disturbances.scenario import Scenario, draw_world
 from fulmar_core.disturbances.spatial_world import SpatialWorld, draw_spatial_world, push_in_world
-from fulmar_core.disturbances.world import Drawn, World
+from fulmar_core.disturbances.world import Drawn, World, outside_wrench, push_is_constant
+from fulmar_core.dynamics.free_body import Wrench
 from fulmar_core.dynamics.rigid_body import inertia_of, rigid_body_step, shifted
-from fulmar_core.motion import control_step, may_be_off_centre
+from fulmar_core.motion import move
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
-from fulmar_core.rotation import Array
+from fulmar_core.rotation import Array, from_yaw, multiply
 from fulmar_core.sensors.odometer import Odometer
 from fulmar_core.sensors.spatial_odometer import SpatialOdometer
 from fulmar_core.spatial import SpatialState
-from fulmar_core.state import S
+from fulmar_core.state import RigidBodyState, S
 from fulmar_core.things import Poses, Thing, push_things
 
 W = TypeVar("W", bound=Drawn)
 
 
 class Dynamics(ABC, Generic[W, S]):
-    """Worlds, motion and odometry of one robot in one scenario, for many worlds at once; free of side effects."""
+    """Worlds, motion and odometry of one robot, for many worlds at once; free of side effects.
 
-    def __init__(self, robot: Robot, scenario: Scenario) -> None:
-        self.robot, self.scenario = robot, scenario
-        self._latest_s = longest_delay(robot, scenario)
+    Attributes:
+        state_type: Form of the states.
+        odometer: Class of the odometry.
+    """
+
+    state_type: type[S]
+    odometer: Callable[..., Odometer[S]]
+
+    def __init__(self, robot: Robot) -> None:
+        self.robot = robot
 
     @abstractmethod
-    def draw_world(self, draws: Draws) -> W:
-        """Draw worlds, one for each row of the draws, as NumPy float64."""
+    def draw_world(self, scenario: Scenario, draws: Draws) -> W:
+        """Draw worlds of a scenario, one for each row of the draws, as NumPy float64."""
 
     @abstractmethod
-    def odometer(self, *, seed: int, period: float) -> Odometer[S]:
-        """The odometry of the worlds of a seed, read every `period` [s]."""
+    def blurs(self, world: W) -> bool:
+        """Whether measured velocities err beyond the robot's own sensors in any world, of NumPy arrays."""
 
     @abstractmethod
-    def step(self, state: S, actuation: ActuationState, world: W, *, time_s: Array, substeps: int) -> S:
-        """Move through one control step; the actuators have their command already.
+    def outside(self, state: S, world: W, time_s: Array, control_dt: float) -> Any:
+        """Push of the surroundings, held over a control step, in the form that `move` takes.
+
+        Args:
+            state: Where the body is, shapes (worlds,).
+            world: What surrounds it.
+            time_s: Time in each episode [s].
+            control_dt: Length of a kick [s].
+        """
+
+    @abstractmethod
+    def push_is_constant(self, world: W) -> bool:
+        """Whether every world is pushed in the same way wherever its body is, at any time; of NumPy arrays."""
+
+    @abstractmethod
+    def is_off_centre(self, world: W) -> bool:
+        """Whether the centre of mass is beside the body's origin in any world, of NumPy arrays."""
+
+    @abstractmethod
+    def move(
+        self,
+        state: S,
+        actuation: ActuationState,
+        world: W,
+        outside: Any,
+        *,
+        substeps: int,
+        latest_s: float,
+        off_centre: bool,
+    ) -> S:
+        """Move under a push that stays the same; the actuators have their command already.
 
         Args:
             state: Of the body's origin, shapes (worlds,).
             actuation: What the actuators do.
             world: Bodies and surroundings.
-            time_s: Time in each episode [s].
+            outside: As of `outside`.
             substeps: Integration steps.
+            latest_s: As of `longest_delay` [s].
+            off_centre: As of `is_off_centre`.
 
         Returns:
             State after `substeps` physics steps.
         """
+
+    @abstractmethod
+    def reported(self, measured: S, truth: RigidBodyState) -> RigidBodyState:
+        """Odometry of one body, without a batch axis: what is measured, and of the rest the truth."""
 
     def push_things(self, things: Sequence[Thing], poses: Poses, before: S, after: S) -> tuple[Poses, S]:
         """Move the things of a task; arguments and result as of `things.push_things`. By default they stay."""
@@ -65,39 +111,61 @@ class Dynamics(ABC, Generic[W, S]):
 class PlanarDynamics(Dynamics[World, PlanarState]):
     """Bodies on air, water or wheels that move in the plane."""
 
-    def __init__(self, robot: Robot, scenario: Scenario) -> None:
-        super().__init__(robot, scenario)
-        self._off_centre = may_be_off_centre(robot, scenario)
+    state_type = PlanarState
+    odometer = Odometer
 
-    def draw_world(self, draws: Draws) -> World:
+    def draw_world(self, scenario: Scenario, draws: Draws) -> World:
         """See `Dynamics.draw_world`."""
-        return draw_world(self.robot, self.scenario, draws)
+        return draw_world(self.robot, scenario, draws)
 
-    def odometer(self, *, seed: int, period: float) -> Odometer[PlanarState]:
-        """See `Dynamics.odometer`."""
-        scenario = self.scenario
-        return Odometer(
-            self.robot.sensors.odometry,
-            seed=seed,
-            period=period,
-            max_delay_s=scenario.sensing.delay_s,
-            noisy=scenario.sensor_noise,
-            blurred=scenario.sensing.blurred,
-        )
+    def blurs(self, world: World) -> bool:
+        """See `Dynamics.blurs`."""
+        return bool(world.velocity_noise.any() or world.yaw_rate_noise.any())
 
-    def step(
-        self, state: PlanarState, actuation: ActuationState, world: World, *, time_s: Array, substeps: int
+    def outside(self, state: PlanarState, world: World, time_s: Array, control_dt: float) -> Wrench:
+        """Force along the world's x and y [N], and yaw moment [N·m]; see `Dynamics.outside`."""
+        return outside_wrench(state, world, time_s, control_dt)
+
+    def push_is_constant(self, world: World) -> bool:
+        """See `Dynamics.push_is_constant`."""
+        return push_is_constant(world)
+
+    def is_off_centre(self, world: World) -> bool:
+        """See `Dynamics.is_off_centre`."""
+        return bool(world.com_x.any() or world.com_y.any())
+
+    def move(
+        self,
+        state: PlanarState,
+        actuation: ActuationState,
+        world: World,
+        outside: Wrench,
+        *,
+        substeps: int,
+        latest_s: float,
+        off_centre: bool,
     ) -> PlanarState:
-        """See `Dynamics.step`."""
-        return control_step(
+        """See `Dynamics.move`."""
+        return move(
             self.robot,
             state,
             actuation,
             world,
-            time_s=time_s,
+            outside,
             substeps=substeps,
-            latest_s=self._latest_s,
-            off_centre=self._off_centre,
+            latest_s=latest_s,
+            off_centre=off_centre,
+        )
+
+    def reported(self, measured: PlanarState, truth: RigidBodyState) -> RigidBodyState:
+        """A planar measurement with the true height, roll and pitch."""
+        true = PlanarState.from_rigid(truth)
+        flat, above = measured.to_rigid(), truth.position_in_world[2]
+        flat.position_in_world[2], flat.velocity_in_world[2] = above, truth.velocity_in_world[2]
+        flat.angular_velocity_in_body[:2] = truth.angular_velocity_in_body[:2]
+        turned = multiply(from_yaw(measured.yaw - true.yaw), truth.quat_xyzw)
+        return RigidBodyState(
+            flat.position_in_world, turned, flat.velocity_in_world, flat.angular_velocity_in_body
         )
 
     def push_things(
@@ -110,62 +178,69 @@ class PlanarDynamics(Dynamics[World, PlanarState]):
 class SpatialDynamics(Dynamics[SpatialWorld, SpatialState]):
     """Rigid bodies that float free."""
 
-    def __init__(self, robot: Robot, scenario: Scenario) -> None:
-        super().__init__(robot, scenario)
-        self._off_centre = may_be_off_centre(robot, scenario)
+    state_type = SpatialState
+    odometer = SpatialOdometer
+
+    def __init__(self, robot: Robot) -> None:
+        super().__init__(robot)
         assert isinstance(robot.actuators, Pushing)  # as of `Robot.state_type`
         self._actuators = robot.actuators
         self._full = any(robot.body.tensor[3:])  # whether the inertia has more than its diagonal
 
-    def draw_world(self, draws: Draws) -> SpatialWorld:
+    def draw_world(self, scenario: Scenario, draws: Draws) -> SpatialWorld:
         """See `Dynamics.draw_world`."""
-        return draw_spatial_world(self.robot, self.scenario, draws)
+        return draw_spatial_world(self.robot, scenario, draws)
 
-    def odometer(self, *, seed: int, period: float) -> SpatialOdometer:
-        """See `Dynamics.odometer`."""
-        scenario = self.scenario
-        return SpatialOdometer(
-            self.robot.sensors.odometry,
-            seed=seed,
-            period=period,
-            max_delay_s=scenario.sensing.delay_s,
-            noisy=scenario.sensor_noise,
-            blurred=scenario.sensing.blurred,
-        )
+    def blurs(self, world: SpatialWorld) -> bool:
+        """See `Dynamics.blurs`."""
+        return bool(world.velocity_noise.any() or world.rate_noise.any())
 
-    def step(
+    def outside(self, state: SpatialState, world: SpatialWorld, time_s: Array, control_dt: float) -> Vector:
+        """Force along the world's axes [N]; see `Dynamics.outside`. A constant torque turns with the body."""
+        return push_in_world(world, time_s, control_dt)
+
+    def push_is_constant(self, world: SpatialWorld) -> bool:
+        """See `Dynamics.push_is_constant`."""
+        return not world.kick.any()
+
+    def is_off_centre(self, world: SpatialWorld) -> bool:
+        """See `Dynamics.is_off_centre`."""
+        return bool(world.com.any())
+
+    def move(
         self,
         state: SpatialState,
         actuation: ActuationState,
         world: SpatialWorld,
+        outside: Vector,
         *,
-        time_s: Array,
         substeps: int,
+        latest_s: float,
+        off_centre: bool,
     ) -> SpatialState:
-        """See `Dynamics.step`."""
+        """See `Dynamics.move`."""
         dt = self.robot.timing.physics_dt
-        outside = push_in_world(world, time_s, substeps * dt)
         inertia = inertia_of(tuple(world.inertia)[: 6 if self._full else 3])
         com: Vector = (world.com[0], world.com[1], world.com[2])
-        if self._off_centre:
+        if off_centre:
             state = shifted(state, com)
         doing, force, torque = None, outside, outside
         for _ in range(substeps):
-            applied = actuation.advance(dt, latest_s=self._latest_s)
+            applied = actuation.advance(dt, latest_s=latest_s)
             if applied is not doing:
                 doing = applied
                 force, torque = self._actuators.spatial_wrench(applied, actuation.gain)
-                if self._off_centre:
+                if off_centre:
                     torque = minus(torque, cross(com, force))
                 torque = plus(torque, (world.torque[0], world.torque[1], world.torque[2]))
             state = rigid_body_step(state, force, torque, outside, world.mass, inertia, dt)
-        return shifted(state, scaled(-1.0, com)) if self._off_centre else state
+        return shifted(state, scaled(-1.0, com)) if off_centre else state
+
+    def reported(self, measured: SpatialState, truth: RigidBodyState) -> RigidBodyState:
+        """See `Dynamics.reported`."""
+        return measured.to_rigid()
 
 
-def dynamics_of(robot: Robot, scenario: Scenario) -> Dynamics[Any, Any]:
-    """The dynamics of a robot's kind in a scenario."""
-    return (
-        SpatialDynamics(robot, scenario)
-        if robot.state_type is SpatialState
-        else PlanarDynamics(robot, scenario)
-    )
+def dynamics_of(robot: Robot) -> Dynamics[Any, Any]:
+    """The dynamics of a robot's kind."""
+    return SpatialDynamics(robot) if robot.state_type is SpatialState else PlanarDynamics(robot)

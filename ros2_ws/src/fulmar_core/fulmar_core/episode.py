@@ -76,7 +76,7 @@ def draw_episodes(
     numbers = np.asarray(numbers)
     repeats = np.zeros_like(numbers) if repeats is None else repeats
     start, goal = task.draw(Draws(seed, numbers, repeats, START), robot, training=training)
-    world = dynamics_of(robot, scenario).draw_world(Draws(seed, numbers, repeats, WORLD))
+    world = dynamics_of(robot).draw_world(scenario, Draws(seed, numbers, repeats, WORLD))
     return Episode(start, goal, world)
 
 

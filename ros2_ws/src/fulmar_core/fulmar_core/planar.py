@@ -82,6 +82,11 @@ class PlanarState(State):
         """Where it is, as a target, shape (..., 3)."""
         return array_namespace(self.x).stack((self.x, self.y, self.yaw), axis=-1)
 
+    def stopped(self) -> Self:
+        """The same pose at rest."""
+        zero = array_namespace(self.x).zeros_like(self.x)
+        return type(self)(self.x, self.y, self.yaw, zero, zero, zero)
+
     def distance_to(self, target: Array) -> Array:
         """Distance from the place of a target, shape (...,) [m]."""
         dx, dy = target[..., 0] - self.x, target[..., 1] - self.y
@@ -117,5 +122,4 @@ def wrapped(angle: Array) -> Array:
 
 def at_rest(x: Array, y: Array, yaw: Array) -> PlanarState:
     """A body that stands still at a pose, shapes (...,) [m, m, rad]."""
-    zero = array_namespace(x).zeros_like(x)
-    return PlanarState(x, y, yaw, zero, zero, zero)
+    return PlanarState(x, y, yaw, x, x, x).stopped()

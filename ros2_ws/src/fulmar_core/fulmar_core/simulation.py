@@ -12,12 +12,12 @@ from array_api_compat import is_numpy_namespace
 from fulmar_core.arrays import array_namespace
 from fulmar_core.batch_dynamics import Dynamics, dynamics_of
 from fulmar_core.counter_rng import Keys, keys_at, uniform_from, words, world_keys, write_keys
-from fulmar_core.disturbances.scenario import Scenario
+from fulmar_core.disturbances.scenario import Scenario, longest_delay
 from fulmar_core.disturbances.world import World
 from fulmar_core.episode import draw_episodes
 from fulmar_core.episode_prefetch import Beginning, UpcomingEpisodes
 from fulmar_core.goal import Goal
-from fulmar_core.motion import actuation_of, may_open_late
+from fulmar_core.motion import actuation_of, may_be_off_centre, may_open_late
 from fulmar_core.mutable_state import MutableState
 from fulmar_core.observation import Observer, slewed
 from fulmar_core.robot import Robot
@@ -90,9 +90,18 @@ class BatchSimulation(MutableState, Generic[S]):
         self._repeats = self._whole(np.zeros(worlds))
         self._steps = self._whole(np.zeros(worlds))
         self._noise_keys = self._actuator_keys(self._numbers, self._repeats)
-        self._dynamics: Dynamics[Any, S] = dynamics_of(robot, scenario)
+        self._dynamics: Dynamics[Any, S] = dynamics_of(robot)
+        self._latest_s = longest_delay(robot, scenario)
+        self._off_centre = may_be_off_centre(robot, scenario)
         self._noisy = scenario.actuation.noise > 0.0
-        self._odometer = self._dynamics.odometer(seed=seed, period=self.control_dt)
+        self._odometer = self._dynamics.odometer(
+            robot.sensors.odometry,
+            seed=seed,
+            period=self.control_dt,
+            max_delay_s=scenario.sensing.delay_s,
+            noisy=scenario.sensor_noise,
+            blurred=scenario.sensing.blurred,
+        )
         safe = np.tile(robot.actuators.safe_command[:, None], (1, worlds))
         self._safe = self._real(safe)
         self._actuation = actuation_of(robot, self._safe, opens_late=may_open_late(robot, scenario))
@@ -183,8 +192,14 @@ class BatchSimulation(MutableState, Generic[S]):
         self._actuation.begin(self.command.T, self.world, noise)
         time_s = xp.astype(self._steps, self._dtype) * self.control_dt
         before = self.truth
-        self.truth = self._dynamics.step(
-            before, self._actuation, self.world, time_s=time_s, substeps=self.substeps
+        self.truth = self._dynamics.move(
+            before,
+            self._actuation,
+            self.world,
+            self._dynamics.outside(before, self.world, time_s, self.control_dt),
+            substeps=self.substeps,
+            latest_s=self._latest_s,
+            off_centre=self._off_centre,
         )
         self._steps = self._steps + 1
         if self.task.things:

@@ -98,6 +98,11 @@ class SpatialState(State):
         """Where it is, as a target, shape (..., 7)."""
         return array_namespace(self.x).stack((*self.position, *self.quat), axis=-1)
 
+    def stopped(self) -> Self:
+        """The same pose at rest."""
+        zero = array_namespace(self.x).zeros_like(self.x)
+        return type(self)(*self.position, *self.quat, *((zero,) * 6))
+
     def distance_to(self, target: Array) -> Array:
         """Distance from the place of a target, shape (...,) [m]."""
         return length(minus(position_of(target), self.position))
@@ -110,8 +115,7 @@ class SpatialState(State):
 
 def at_rest_in_space(position: Vector, quat: Quaternion) -> SpatialState:
     """A body that stands still at a pose."""
-    zero = array_namespace(position[0]).zeros_like(position[0])
-    return SpatialState(*position, *quat, *((zero,) * 6))
+    return SpatialState(*position, *quat, *position, *position).stopped()
 
 
 def position_of(target: Array) -> Vector:

@@ -87,6 +87,10 @@ class State(ABC):
         """Where it is, as a target of its tasks."""
 
     @abstractmethod
+    def stopped(self) -> Self:
+        """The same pose at rest."""
+
+    @abstractmethod
     def distance_to(self, target: Array) -> Array:
         """Distance from a target that is a place, shape (...,) [m]."""
 

@@ -1,0 +1,51 @@
+"""Robots that float free in space in MuJoCo."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from fulmar_core.disturbances.spatial_world import SpatialWorld
+from fulmar_core.robot import Robot
+from fulmar_core.spatial import SpatialState
+from sim_nodes.mujoco_model.floater import Floater
+
+
+class FreeFlyer(Floater):
+    """One body on a free joint, without gravity, under forces at fixed places and a push of the surroundings."""
+
+    steady = False  # a constant torque turns with the body
+
+    def __init__(self, robot: Robot) -> None:
+        super().__init__(robot)
+        self._torque = np.zeros(3)  # on the body, in its own frame [N·m]
+
+    def take_world(self, model: mujoco.MjModel, world: SpatialWorld) -> None:
+        """Take mass, inertia, centre of mass and constant torque."""
+        xx, yy, zz, xy, xz, yz = np.asarray(world.inertia, dtype=float)
+        moments, axes = np.linalg.eigh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
+        axes[:, 2] = np.cross(axes[:, 0], axes[:, 1])  # a rotation, not a mirror image
+        mujoco.mju_mat2Quat(model.body_iquat[self._body], axes.ravel())
+        model.body_inertia[self._body], model.body_mass[self._body] = moments, world.mass
+        model.body_ipos[self._body] = world.com
+        self._torque = np.array(world.torque, dtype=float)
+
+    def place(self, model: mujoco.MjModel, data: mujoco.MjData, start: SpatialState) -> None:
+        """Put the body where it starts."""
+        x, y, z, w = start.quat
+        data.qpos[:7] = *start.position, w, x, y, z
+        data.qvel[:6] = *start.velocity, *start.rate
+
+    def drive(
+        self,
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+        applied: np.ndarray,
+        gain: np.ndarray,
+        outside: tuple[float, ...],
+    ) -> None:
+        """Set thrusts and the push of the surroundings; see `RobotModel.drive`."""
+        data.ctrl[:] = self._actuators.thrusts(applied) * gain
+        torque = np.empty(3)
+        mujoco.mju_rotVecQuat(torque, self._torque, data.qpos[3:7])
+        data.xfrc_applied[self._body] = *outside, *torque
