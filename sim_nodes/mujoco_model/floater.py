@@ -127,11 +127,16 @@ class Floater:
 
 def _add_push(spec: mujoco.MjSpec, body: mujoco.MjsBody, push: Push) -> None:
     body.add_site(name=push.name, pos=list(push.position), size=[0.02, 0.02, 0.02], rgba=[0.9, 0.4, 0.2, 1])
+    add_actuator(spec, push.name, push.name, [*push.direction, 0.0, 0.0, 0.0])
+
+
+def add_actuator(spec: mujoco.MjSpec, name: str, site: str, gear: list[float]) -> None:
+    """Add an actuator that applies its control times a wrench at a site, in the site's frame [N, N·m]."""
     spec.add_actuator(
-        name=push.name,
+        name=name,
         trntype=mujoco.mjtTrn.mjTRN_SITE,
-        target=push.name,
-        gear=[*push.direction, 0.0, 0.0, 0.0],
+        target=site,
+        gear=gear,
         gaintype=mujoco.mjtGain.mjGAIN_FIXED,
         biastype=mujoco.mjtBias.mjBIAS_NONE,
         dyntype=mujoco.mjtDyn.mjDYN_NONE,

@@ -8,17 +8,28 @@ import numpy as np
 from fulmar_core.disturbances.spatial_world import SpatialWorld
 from fulmar_core.robot import Robot
 from fulmar_core.spatial import SpatialState
-from sim_nodes.mujoco_model.floater import Floater
+from sim_nodes.mujoco_model.floater import Floater, add_actuator
+
+TORQUE_SITE = "torque"  # where the torque of the surroundings acts
 
 
 class FreeFlyer(Floater):
-    """One body on a free joint, without gravity, under forces at fixed places and a push of the surroundings."""
+    """One body on a free joint, without gravity, under forces at fixed places and a push of the surroundings.
 
-    steady = False  # a constant torque turns with the body
+    Three more actuators apply the constant torque of an episode, which turns with the body.
+    """
 
     def __init__(self, robot: Robot) -> None:
         super().__init__(robot)
         self._torque = np.zeros(3)  # on the body, in its own frame [N·m]
+
+    def add(self, spec: mujoco.MjSpec) -> mujoco.MjsBody:
+        """Add the body; see `RobotModel.add`."""
+        body = super().add(spec)
+        for axis, gear in zip("xyz", np.eye(3), strict=True):
+            add_actuator(spec, f"torque_{axis}", TORQUE_SITE, [0.0, 0.0, 0.0, *gear])
+        body.add_site(name=TORQUE_SITE, pos=[0.0, 0.0, 0.0])
+        return body
 
     def take_world(self, model: mujoco.MjModel, world: SpatialWorld) -> None:
         """Take mass, inertia, centre of mass and constant torque."""
@@ -45,7 +56,5 @@ class FreeFlyer(Floater):
         outside: tuple[float, ...],
     ) -> None:
         """Set thrusts and the push of the surroundings; see `RobotModel.drive`."""
-        data.ctrl[:] = self._actuators.thrusts(applied) * gain
-        torque = np.empty(3)
-        mujoco.mju_rotVecQuat(torque, self._torque, data.qpos[3:7])
-        data.xfrc_applied[self._body] = *outside, *torque
+        data.ctrl[:] = *(self._actuators.thrusts(applied) * gain), *self._torque
+        data.xfrc_applied[self._body, :3] = outside
