@@ -15,8 +15,9 @@ from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.system import Guards
 from fulmar_bringup.system_rows import system_rows
 from fulmar_core.errors import ConfigError
+from fulmar_core.estimation.history import TO_BEGIN_ANEW
 from fulmar_core.estimation.kinds import KINDS, EstimatorKind, load_estimator, make_estimator
-from fulmar_core.estimation.planar_motion import TO_BEGIN_ANEW, PlanarMotionEstimator
+from fulmar_core.estimation.planar_motion import PlanarMotionEstimator
 from fulmar_core.estimation.settings import EstimatorSettings
 from fulmar_core.robot import load_robot
 from fulmar_core.rotation import from_yaw

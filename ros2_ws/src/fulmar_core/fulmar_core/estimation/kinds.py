@@ -10,7 +10,7 @@ from typing import Any
 from fulmar_core.config import line_of, load_config
 from fulmar_core.errors import ConfigError, did_you_mean
 from fulmar_core.estimation.estimator import Estimator
-from fulmar_core.estimation.settings import EstimatorSettings, PlanarMotionSettings
+from fulmar_core.estimation.settings import EstimatorSettings, PlanarMotionSettings, SpatialMotionSettings
 from fulmar_core.paths import config_path
 from fulmar_core.robot import Robot
 from fulmar_core.topics import IMU, MOCAP, ODOMETRY, SENSOR_WIRES, Wire
@@ -41,10 +41,24 @@ def _planar_motion(settings: PlanarMotionSettings, robot: Robot) -> Estimator:
     return PlanarMotionEstimator(settings, robot.limits)
 
 
+def _spatial_motion(settings: SpatialMotionSettings, robot: Robot) -> Estimator:
+    from fulmar_core.estimation.spatial_motion import SpatialMotionEstimator
+
+    return SpatialMotionEstimator(settings, robot.limits)
+
+
 KINDS: dict[str, EstimatorKind] = {
     "planar_motion": EstimatorKind(
         PlanarMotionSettings,
         _planar_motion,
+        takes={"mocap": MOCAP, "imu": IMU},
+        publishes=(ODOMETRY,),
+        takes_if_there={"star_tracker": SENSOR_WIRES["star_tracker"]},
+        needs=("filterpy",),
+    ),
+    "spatial_motion": EstimatorKind(
+        SpatialMotionSettings,
+        _spatial_motion,
         takes={"mocap": MOCAP, "imu": IMU},
         publishes=(ODOMETRY,),
         takes_if_there={"star_tracker": SENSOR_WIRES["star_tracker"]},

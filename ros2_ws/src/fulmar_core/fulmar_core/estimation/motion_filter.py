@@ -13,6 +13,8 @@ from typing import Any
 import numpy as np
 from filterpy.kalman import ExtendedKalmanFilter
 
+from fulmar_core.estimation import history as events
+from fulmar_core.estimation.history import Filter
 from fulmar_core.estimation.settings import PlanarMotionSettings
 
 STATES = 9
@@ -22,13 +24,16 @@ SPREAD_AT_START = (1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.05, 0.05, 0.02)  # m, rad, m/
 _POSE_ROWS, _GYRO_ROW = np.eye(STATES)[POSE], np.eye(STATES)[[RATE]] + np.eye(STATES)[[BIAS_RATE]]
 
 Snapshot = tuple[np.ndarray, np.ndarray]
+Inertial = tuple[np.ndarray, float]
 
 
-class MotionFilter(ExtendedKalmanFilter):  # type: ignore[misc]
+class MotionFilter(ExtendedKalmanFilter, Filter):  # type: ignore[misc]
     """Position, heading, velocity and turn rate, with the biases of the inertial unit.
 
     `x` holds (x, y) [m], yaw [rad], (v_x, v_y) in the world [m/s], turn rate [rad/s], then the biases of the
-    accelerometer along the body's axes [m/s²] and of the gyroscope [rad/s].
+    accelerometer along the body's axes [m/s²] and of the gyroscope [rad/s]. Events: a pose (x, y, yaw), shape (3,); an
+    inertial reading as specific force along the body's level x and y, shape (2,) [m/s²], and turn rate [rad/s]; of an
+    attitude its yaw with its standard deviation [rad].
     """
 
     def __init__(self, settings: PlanarMotionSettings, pose: np.ndarray) -> None:
@@ -43,20 +48,13 @@ class MotionFilter(ExtendedKalmanFilter):  # type: ignore[misc]
         self._pose_noise = np.diag(spread[POSE] ** 2)
         self._gyro_noise = np.array([[settings.gyroscope_std**2]])
 
-    def move_on(self, seconds: float, force: np.ndarray | None) -> None:
-        """Predict.
-
-        Args:
-            seconds: How far, >= 0 [s].
-            force: Specific force along the body's level x and y in that time, shape (2,); None if nobody measured
-                it [m/s²].
-        """
+    def move_on(self, seconds: float, inertial: Inertial | None) -> None:
+        """Predict by the specific force of a reading; see `Filter.move_on`."""
         if seconds <= 0.0:
             return
+        force = None if inertial is None else inertial[0]
         s, t = self._settings, seconds
-        push = 0.0 if force is not None else s.manoeuvre
-        noise = s.acceleration_noise if force is not None else push
-        self._prepare(t, force, noise)
+        self._prepare(t, force, s.manoeuvre if force is None else s.acceleration_noise)
         self.predict(u=(t, force))
 
     def predict_x(self, u: Any = 0) -> None:
@@ -68,41 +66,42 @@ class MotionFilter(ExtendedKalmanFilter):  # type: ignore[misc]
         self.x[[VX, VY]] += t * a
         self.x[YAW] += t * self.x[RATE]
 
-    def see_turn_rate(self, turn_rate: float) -> None:
-        """Correct by a reading of the gyroscope [rad/s]."""
-        self.update(
-            np.array([turn_rate]),
-            lambda _x: _GYRO_ROW,
-            lambda x: np.array([x[RATE] + x[BIAS_RATE]]),
-            R=self._gyro_noise,
-        )
+    def correct(self, kind: int, value: Any) -> None:
+        """Correct by an event; see `Filter.correct`."""
+        if kind == events.POSE:
+            self.update(
+                value, lambda _x: _POSE_ROWS, lambda x: x[POSE], R=self._pose_noise, residual=self._pose_error
+            )
+        elif kind == events.IMU:
+            self.update(
+                np.array([value[1]]),
+                lambda _x: _GYRO_ROW,
+                lambda x: np.array([x[RATE] + x[BIAS_RATE]]),
+                R=self._gyro_noise,
+            )
+        else:
+            yaw, std = value
+            error = math.remainder(yaw - float(self.x[YAW]), 2.0 * math.pi)
+            self.update(
+                np.array([float(self.x[YAW]) + error]),
+                lambda _x: _POSE_ROWS[2:],
+                lambda x: np.array([x[YAW]]),
+                R=np.array([[std**2]]),
+            )
 
-    def heading_distance2(self, yaw: float, std: float) -> float:
-        """Squared Mahalanobis distance of a heading with its deviation [rad] from what is expected [-]."""
+    def distance2(self, kind: int, value: Any) -> float:
+        """Of a pose or of a heading; see `Filter.distance2`."""
+        if kind == events.POSE:
+            y = self._pose_error(value, self.x[POSE])
+            spread = self.P[np.ix_(POSE, POSE)] + self._pose_noise
+            return float(y @ np.linalg.solve(spread, y))
+        yaw, std = value
         error = math.remainder(yaw - float(self.x[YAW]), 2.0 * math.pi)
         return float(error**2 / (self.P[YAW, YAW] + std**2))
 
-    def see_heading(self, yaw: float, std: float) -> None:
-        """Correct by a heading with its standard deviation [rad]."""
-        error = math.remainder(yaw - float(self.x[YAW]), 2.0 * math.pi)
-        self.update(
-            np.array([float(self.x[YAW]) + error]),
-            lambda _x: _POSE_ROWS[2:],
-            lambda x: np.array([x[YAW]]),
-            R=np.array([[std**2]]),
-        )
-
-    def distance2(self, pose: np.ndarray) -> float:
-        """Squared Mahalanobis distance of a pose (x, y, yaw) from what is expected [-]."""
-        y = self._pose_error(pose, self.x[POSE])
-        spread = self.P[np.ix_(POSE, POSE)] + self._pose_noise
-        return float(y @ np.linalg.solve(spread, y))
-
-    def see_pose(self, pose: np.ndarray) -> None:
-        """Correct by a pose (x [m], y [m], yaw [rad])."""
-        self.update(
-            pose, lambda _x: _POSE_ROWS, lambda x: x[POSE], R=self._pose_noise, residual=self._pose_error
-        )
+    def speed_std(self) -> float:
+        """See `Filter.speed_std`."""
+        return math.sqrt(max(self.P[VX, VX], self.P[VY, VY]))
 
     def snapshot(self) -> Snapshot:
         """State and covariance, to go back to."""

@@ -52,3 +52,35 @@ class PlanarMotionSettings(EstimatorSettings):
                 raise ValueError(f"'{name}' = {getattr(self, name):g} must be greater than 0.")
         if min(self.accelerometer_drift, self.gyroscope_drift) < 0.0:
             raise ValueError("accelerometer_drift and gyroscope_drift must not be negative.")
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpatialMotionSettings(EstimatorSettings):
+    """Settings of `SpatialMotionEstimator`; densities as of `PlanarMotionSettings`."""
+
+    kind: str = "spatial_motion"
+    position_std: float  # of a pose, each axis [m]
+    attitude_std: float  # of a pose, about each axis [rad]
+    star_tracker_std: float = (
+        0.0005  # about each axis, of an attitude whose reading states no covariance [rad]
+    )
+    gyroscope_std: float  # of a reading [rad/s]
+    gyroscope_noise: float  # density of the same [rad/s/√Hz]
+    acceleration_noise: float  # of the inertial unit, with what its mounting adds [m/s²/√Hz]
+    manoeuvre: float  # acceleration that nobody measures, where there is no inertial unit [m/s²/√Hz]
+    spin: float  # how the attitude spreads where nobody measures the turn rate [rad/s/√Hz]
+    accelerometer_drift: float  # of its bias [m/s²/√s]
+    gyroscope_drift: float  # of its bias [rad/s/√s]
+    gate: float  # squared Mahalanobis distance of a pose beyond which it is an outlier; 6 degrees of freedom [-]
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        positive = (
+            "position_std", "attitude_std", "star_tracker_std", "gyroscope_std", "gyroscope_noise",
+            "acceleration_noise", "manoeuvre", "spin", "gate",
+        )  # fmt: skip
+        for name in positive:
+            if not getattr(self, name) > 0.0:
+                raise ValueError(f"'{name}' = {getattr(self, name):g} must be greater than 0.")
+        if min(self.accelerometer_drift, self.gyroscope_drift) < 0.0:
+            raise ValueError("accelerometer_drift and gyroscope_drift must not be negative.")

@@ -1,0 +1,318 @@
+"""Readings in any order of arrival to one filter: what came late is taken in at its own time.
+
+A pose is as old as its capture, and inertial readings have come since: the filter goes back to the time of capture,
+takes the pose in, and repeats what came after it.
+"""
+
+from __future__ import annotations
+
+import bisect
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from fulmar_core.estimation.estimator import Estimate
+from fulmar_core.robot import Limits
+from fulmar_core.safety.input_gate import BACK_NS, FORWARD_NS
+from fulmar_core.sensors.reading import Reading
+
+KEPT_NS = 1_000_000_000  # how far back an estimate can be corrected
+READING_LASTS_NS = 60_000_000  # how long after it an inertial reading still stands for what happens
+TO_BEGIN_ANEW = 10  # outliers in a row that agree with one another: then it is the estimate that is wrong
+IMU, POSE, ATTITUDE = range(
+    3
+)  # kinds of events; of one time the inertial reading first, which moves the robot there
+WHAT = {IMU: "inertial reading", POSE: "pose", ATTITUDE: "attitude"}  # for people
+NO_POSE = "no pose yet. Is the motion capture running, and does it see the robot?"
+
+
+@dataclass(slots=True)
+class Event:
+    """Something that was measured, and what was believed after it."""
+
+    stamp_ns: int
+    kind: int
+    value: Any  # what the filter takes of this kind
+    after: Any = None  # snapshot of the filter
+
+    @property
+    def key(self) -> tuple[int, int]:
+        """Order: by time, then by kind."""
+        return self.stamp_ns, self.kind
+
+
+class Filter(ABC):
+    """A filter that can go back; values of events are of its own types."""
+
+    @abstractmethod
+    def move_on(self, seconds: float, inertial: Any) -> None:
+        """Predict so far, by an inertial reading; None: nobody measured [s]."""
+
+    @abstractmethod
+    def correct(self, kind: int, value: Any) -> None:
+        """Correct by an event."""
+
+    @abstractmethod
+    def distance2(self, kind: int, value: Any) -> float:
+        """Squared Mahalanobis distance of an event from what is expected [-]."""
+
+    @abstractmethod
+    def snapshot(self) -> Any:
+        """Everything that it believes, to go back to."""
+
+    @abstractmethod
+    def restore(self, snapshot: Any) -> None:
+        """Go back."""
+
+    @abstractmethod
+    def speed_std(self) -> float:
+        """Largest standard deviation of the velocity's components [m/s]."""
+
+
+class HistoryEstimator(ABC):
+    """An `Estimator` that keeps a second of readings; each kind says what its filter takes of them.
+
+    Attributes:
+        what: Names of the readings that it takes.
+    """
+
+    KNOWN_SPEED_STD: ClassVar[float] = (
+        0.15  # velocity must be known so well before an estimate is published [m/s]
+    )
+
+    def __init__(
+        self, limits: Limits, *, gate: float, bridge_s: float, latency_s: float, slack: float
+    ) -> None:
+        """Begin without an estimate.
+
+        Args:
+            limits: What the robot can possibly do.
+            gate: Squared Mahalanobis distance beyond which a reading is an outlier [-].
+            bridge_s: Longest time without a believed pose [s].
+            latency_s: From capture of a pose to its stamp [s].
+            slack: Distance between two poses that their noise explains [m].
+        """
+        self._limits, self._gate, self._bridge_s, self._slack = limits, gate, bridge_s, slack
+        self._latency_ns = round(1e9 * latency_s)
+        self._kinds: Mapping[str, tuple[int, Callable[[Reading], Any]]] = {
+            "mocap": (POSE, self._pose),
+            "imu": (IMU, self._inertial),
+            "star_tracker": (ATTITUDE, self._attitude),
+        }
+        self.reset()
+
+    @abstractmethod
+    def _pose(self, reading: Reading) -> Any:
+        """What the filter takes of a valid pose."""
+
+    @abstractmethod
+    def _inertial(self, reading: Reading) -> Any:
+        """What the filter takes of a valid inertial reading."""
+
+    @abstractmethod
+    def _attitude(self, reading: Reading) -> Any:
+        """What the filter takes of a valid attitude."""
+
+    @abstractmethod
+    def _new_filter(self, pose: Any) -> Filter:
+        """A filter that begins at a pose, knowing little else."""
+
+    @abstractmethod
+    def _place(self, pose: Any) -> np.ndarray:
+        """Where a pose is [m]."""
+
+    @abstractmethod
+    def _value(self) -> tuple[Any, np.ndarray]:
+        """Value and covariance of what the filter believes now."""
+
+    @abstractmethod
+    def _turn_rate(self, reading: Reading) -> float:
+        """Turn rate of an inertial reading that the robot's limits bound [rad/s]."""
+
+    def _believed(self, reading: Reading) -> None:  # noqa: B027 - most keep nothing beside the filter
+        """Note a pose that is believed."""
+
+    def reset(self) -> None:
+        """See `Estimator`."""
+        self.outliers, self.epoch = 0, 0
+        self._forget()
+
+    def take(self, name: str, reading: Reading) -> str | None:
+        """See `Estimator`; the latency of the settings is taken off the stamps of poses here."""
+        if name not in self._kinds:
+            return f"reading '{name}' is not known here, only {', '.join(self._kinds)}"
+        if reading.stamp_ns is None:
+            return f"reading of '{name}' has no stamp"
+        kind, value_of = self._kinds[name]
+        stamp_ns = reading.stamp_ns - (self._latency_ns if kind == POSE else 0)
+        problem = self._problem_of(kind, reading) or self._time_problem(stamp_ns, WHAT[kind])
+        if problem:
+            return problem
+        self._newest_ns[WHAT[kind]] = stamp_ns
+        return self._see(Event(stamp_ns, kind, None), value_of, reading) or None
+
+    def _see(self, event: Event, value_of: Callable[[Reading], Any], reading: Reading) -> str:
+        if self._filter is None:
+            if event.kind == POSE:
+                event.value = value_of(reading)
+                self._begin(event)
+                self._trust(event, reading)
+            return ""  # nothing else is of use before the first pose
+        event.value = value_of(reading)
+        if event.kind == IMU:
+            self._insert(event)
+            return ""
+        if not self._believe(event):
+            return f"{WHAT[event.kind]} lies beyond the gate: {self.outliers} outliers so far"
+        if event.kind == POSE:
+            self._trust(event, reading)
+        return ""
+
+    def _trust(self, event: Event, reading: Reading) -> None:
+        self._believed_ns = event.stamp_ns
+        self._believed(reading)
+
+    def _problem_of(self, kind: int, reading: Reading) -> str:
+        value = reading.value
+        if kind == IMU:
+            if not (np.isfinite(value.specific_force).all() and np.isfinite(value.angular_velocity).all()):
+                return "inertial reading holds a value that is not finite"
+            rate = self._turn_rate(reading)
+            return (
+                f"turn rate {rate:.1f} rad/s is beyond the possible"
+                if abs(rate) > 2.0 * self._limits.yaw_rate
+                else ""
+            )
+        if not np.isfinite(value).all():
+            return f"{WHAT[kind]} holds a value that is not finite"
+        norm = float(np.linalg.norm(value[-4:]))
+        return (
+            ""
+            if abs(norm - 1.0) <= 0.01
+            else f"quaternion of the {WHAT[kind]} has norm {norm:.3f}, must be 1"
+        )
+
+    def estimate(self, stamp_ns: int | None = None) -> Estimate | None:
+        """See `Estimator`."""
+        newest_ns = self._history[-1].stamp_ns if self._history else 0
+        stamp_ns = newest_ns if stamp_ns is None else max(stamp_ns, newest_ns)
+        self.problem = self._staleness(stamp_ns)
+        if self.problem or self._filter is None:
+            return None
+        now = self._filter.snapshot()
+        if stamp_ns > newest_ns:
+            self._move_on(len(self._history), stamp_ns)
+        value, covariance = self._value()
+        self._filter.restore(now)
+        return Estimate(value, covariance, stamp_ns)
+
+    def _staleness(self, stamp_ns: int) -> str:
+        if self._filter is None:
+            return NO_POSE
+        gap_s = (stamp_ns - self._believed_ns) / 1e9
+        if gap_s > self._bridge_s:
+            return f"no believable pose for {gap_s:.2f} s (limit {self._bridge_s:g} s)"
+        if self._filter.speed_std() > self.KNOWN_SPEED_STD:
+            return "the velocity is not known well enough yet"
+        return ""
+
+    def _forget(self) -> None:
+        self._filter: Filter | None = None
+        self._history: list[Event] = []
+        self._newest_ns: dict[str, int] = {}  # stamp of the newest reading, by what it is
+        self._believed_ns = 0
+        self._strangers: list[Event] = []
+        self.problem = NO_POSE
+
+    def _begin(self, event: Event) -> None:
+        self._filter = self._new_filter(event.value)
+        event.after = self._filter.snapshot()
+        self._history, self._strangers = [event], []
+
+    def _time_problem(self, stamp_ns: int, what: str) -> str:
+        """Reject old stamps; a jump of time is reported once and begins anew."""
+        last_ns = self._newest_ns.get(what)
+        if last_ns is None:
+            return ""
+        ahead = stamp_ns - last_ns
+        if not -BACK_NS <= ahead <= FORWARD_NS:
+            self._forget()
+            self.epoch += 1
+            return f"time of the {what} jumped by {ahead / 1e9:+.1f} s: a new epoch begins"
+        return "" if ahead > 0 else f"stamp of the {what} did not advance"
+
+    def _believe(self, event: Event) -> bool:
+        """Insert a pose or an attitude if it is no outlier."""
+        assert self._filter is not None
+        at = bisect.bisect_right(self._history, event.key, key=lambda past: past.key)
+        if at == 0:
+            return True  # captured before everything that is remembered: too late to matter, but no lie
+        self._rewind(at)
+        self._move_on(at, event.stamp_ns)
+        if self._filter.distance2(event.kind, event.value) <= self._gate:
+            if event.kind == POSE:
+                self._strangers = []
+            self._insert(event)
+            return True
+        self.outliers += 1
+        self._replay(at)
+        return event.kind == POSE and self._meet_stranger(event)
+
+    def _meet_stranger(self, event: Event) -> bool:
+        """Begin anew where outliers agree with one another for long enough."""
+        if self._strangers:
+            last = self._strangers[-1]
+            seconds = (event.stamp_ns - last.stamp_ns) / 1e9
+            apart = math.dist(self._place(event.value), self._place(last.value))
+            if apart > self._limits.speed * seconds + self._slack:
+                self._strangers = []
+        self._strangers.append(event)
+        if len(self._strangers) < TO_BEGIN_ANEW:
+            return False
+        self._begin(event)
+        self.epoch += 1
+        return True
+
+    def _insert(self, event: Event) -> None:
+        at = bisect.bisect_right(self._history, event.key, key=lambda past: past.key)
+        if at == 0:
+            return
+        self._history.insert(at, event)
+        self._replay(at)
+        oldest = self._history[-1].stamp_ns - KEPT_NS
+        while self._history[0].stamp_ns < oldest and len(self._history) > 1:
+            del self._history[0]
+
+    def _rewind(self, at: int) -> None:
+        """Believe what was believed before event number `at`."""
+        assert self._filter is not None
+        self._filter.restore(self._history[at - 1].after)
+
+    def _replay(self, at: int) -> None:
+        """Do event number `at` and everything after it, once more."""
+        assert self._filter is not None
+        self._rewind(at)
+        for number in range(at, len(self._history)):
+            event = self._history[number]
+            self._move_on(number, event.stamp_ns)
+            self._filter.correct(event.kind, event.value)
+            event.after = self._filter.snapshot()
+
+    def _move_on(self, at: int, stamp_ns: int) -> None:
+        """Predict from the event before number `at` to a time, by the reading that stands for that time."""
+        assert self._filter is not None
+        seconds = (stamp_ns - self._history[at - 1].stamp_ns) / 1e9
+        self._filter.move_on(seconds, self._inertial_for(at, stamp_ns))
+
+    def _inertial_for(self, at: int, stamp_ns: int) -> Any:
+        """The first reading at or after the end of the span, else the last before it, if it is near enough."""
+        later = (event for event in self._history[at : at + 3] if event.kind == IMU)
+        earlier = (event for event in self._history[max(0, at - 20) : at][::-1] if event.kind == IMU)
+        for event in (*later, *earlier):
+            if abs(event.stamp_ns - stamp_ns) <= READING_LASTS_NS:
+                return event.value
+        return None
