@@ -8,18 +8,17 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain
-from operator import attrgetter
 from typing import Any
 
 import torch
 from torch.fx.experimental.proxy_tensor import make_fx
 
-from fulmar_core.disturbances.world import FIELDS, World
+from fulmar_core.disturbances.world import Drawn
 from fulmar_core.errors import ConfigError
 from fulmar_core.goal import Goal
 from fulmar_core.learning_step import observed_step
-from fulmar_core.planar import PlanarState
 from fulmar_core.simulation import BatchSimulation
+from fulmar_core.state import State
 
 # Parts beside the mutable state: the command, and the cost of the actuators' effort.
 ASKED, EFFORT = "asked", "effort"
@@ -151,9 +150,6 @@ def _laid_as(tensor: torch.Tensor, like: torch.Tensor) -> torch.Tensor:
 Moving = dict[str, Any]  # as of `MutableState.mutable_state`, with dictionaries in it
 Parts = dict[str, Any]  # the same without; what was in a dictionary has a name of two words
 
-_RECORDS = {PlanarState: PlanarState.COLUMNS, World: FIELDS}
-_LEAVES_OF = {Goal: Goal.arrays, **{kind: attrgetter(*names) for kind, names in _RECORDS.items()}}
-
 
 def parts_of(moving: Moving) -> Parts:
     """A mutable state with its dictionaries flattened."""
@@ -180,9 +176,12 @@ def moving_of(parts: Parts) -> Moving:
 
 def leaves(part: Any) -> tuple[Any, ...]:
     """Arrays and numbers of a part; nothing has none."""
-    if type(part) in _LEAVES_OF:
-        found: tuple[Any, ...] = _LEAVES_OF[type(part)](part)
-        return found
+    if isinstance(part, State):
+        return part.columns()
+    if isinstance(part, Drawn):
+        return part.parts()
+    if isinstance(part, Goal):
+        return part.arrays()
     if isinstance(part, (tuple, list)):
         return tuple(chain.from_iterable(leaves(inner) for inner in part))
     return () if part is None else (part,)
@@ -192,8 +191,8 @@ def rebuilt(part: Any, new: Iterator[Any]) -> Any:
     """A part of the same kind with other leaves, as many as `leaves` finds, in its order."""
     if isinstance(part, Goal):
         return part.mapped(lambda _: next(new))
-    if type(part) in _RECORDS:
-        return type(part)(*(next(new) for _ in _RECORDS[type(part)]))
+    if isinstance(part, State | Drawn):
+        return part.mapped(lambda _: next(new))
     if isinstance(part, (tuple, list)):
         return type(part)(rebuilt(inner, new) for inner in part)
     return None if part is None else next(new)
