@@ -1,6 +1,6 @@
 """Holdability: whether a pose can be held, by a linear programme over the share of time that each valve is open.
 
-Over many control steps, valves that open and close give any mean wrench that shares of time can make: shares d_i >= 0,
+In the plane and in space. Over many control steps, valves that open and close give any mean wrench that shares of time can make: shares d_i >= 0,
 with a common pressure line Σ d_i <= 1, since n open valves give 1/n each. A pose can be held where the mean wrench
 cancels the push from outside with something left in every direction: without that, an error once made stays.
 """
@@ -13,12 +13,15 @@ import itertools
 import numpy as np
 
 from fulmar_core.actuators.pushing import PLANAR, Pushing
+from fulmar_core.attitude import turn_back
+from fulmar_core.disturbances.spatial_world import SpatialWorld
 from fulmar_core.errors import ConfigError
 from fulmar_core.planar import to_body
 from fulmar_core.robot import Robot
 
 LEAST_MARGIN = 1e-6  # of the robot's own force and torque: rounding of the solver lies below [-]
 HEADINGS = 72  # that are tried where any will do
+ATTITUDES = 60  # same in space
 
 
 def hold_margin(robot: Robot, working: np.ndarray, force: np.ndarray, torque: float, heading: float) -> float:
@@ -38,9 +41,6 @@ def hold_margin(robot: Robot, working: np.ndarray, force: np.ndarray, torque: fl
     Raises:
         ConfigError: The robot has no thrusters.
     """
-    # At import this would cost every node most of a second.
-    from scipy.optimize import linprog
-
     valves = _valves(robot)
     scale = np.array([robot.performance.force, robot.performance.force, robot.performance.torque])
     wrench = (
@@ -50,22 +50,105 @@ def hold_margin(robot: Robot, working: np.ndarray, force: np.ndarray, torque: fl
         / scale
     ).T
     push = np.array([*to_body(np.asarray(heading), force[0], force[1]), torque]) / scale
-    count, ways = wrench.shape[1], np.vstack((np.eye(3), -np.eye(3)))
-    # One set of shares for each of the six ways, and one margin for all: W d_k - margin·way_k = -push.
-    equal = np.zeros((18, 6 * count + 1))
+    return _margin(wrench, push, valves.shared_pressure)
+
+
+def hold_margin_in_space(
+    robot: Robot, working: np.ndarray, force: np.ndarray, torque: np.ndarray, com: np.ndarray
+) -> float:
+    """How much is left in every direction when a push on a body in space is cancelled.
+
+    Args:
+        robot: A robot in space whose actuators push one way.
+        working: Share of its thrust that each one gives, 0 for a dead one, shape (n,) [-].
+        force: Push from outside on the centre of mass, in the body's frame, shape (3,) [N].
+        torque: Same frame, shape (3,) [N·m].
+        com: Centre of mass in the body's frame, shape (3,) [m].
+
+    Returns:
+        As of `hold_margin`, along the body's three axes and about them.
+
+    Raises:
+        ConfigError: The robot's actuators do not push one way.
+    """
+    valves, can = _valves(robot), robot.performance
+    scale = np.array([can.force] * 3 + [can.torque] * 3)
+    wrench = valves.wrench_per_newton.T.copy()
+    wrench[3:] -= np.cross(com, wrench[:3].T).T  # about the centre of mass
+    wrench = wrench * (valves.full_thrust * np.asarray(working)) / scale[:, None]
+    return _margin(wrench, np.concatenate((force, torque)) / scale, valves.shared_pressure)
+
+
+def can_hold_in_space(robot: Robot, world: SpatialWorld, quats: np.ndarray | None = None) -> np.ndarray:
+    """In which worlds a body in space can hold a pose at all, whatever controls it.
+
+    Constant force and torque, dead and weak actuators and the centre of mass count; kicks, noise and delays pass.
+
+    Args:
+        robot: A robot in space whose actuators push one way.
+        world: Of `draw_episodes`, say, with arrays of shape (worlds,).
+        quats: Attitude (x, y, z, w) of the pose in each world, shape (worlds, 4); None: any will do.
+
+    Returns:
+        Shape (worlds,) of bool.
+
+    Raises:
+        ConfigError: The robot's actuators do not push one way.
+    """
+    working = np.asarray(world.gain * world.alive, dtype=float).T
+    force, torque, com = (np.asarray(part, dtype=float).T for part in (world.force, world.torque, world.com))
+    able = np.zeros(len(working), dtype=bool)
+    for i in range(len(able)):
+        if quats is None:
+            # Only the direction of the force in the body changes with the attitude; as it is first.
+            size = float(np.linalg.norm(force[i]))
+            tried = [force[i], *(size * _sphere())] if size > 0.0 else [force[i]]
+        else:
+            x, y, z = turn_back(tuple(quats[i]), tuple(force[i]))
+            tried = [np.array([x, y, z])]
+        able[i] = any(
+            hold_margin_in_space(robot, working[i], each, torque[i], com[i]) > LEAST_MARGIN for each in tried
+        )
+    return able
+
+
+def _sphere() -> np.ndarray:
+    """Directions all around, on a Fibonacci lattice, shape (`ATTITUDES`, 3)."""
+    k = np.arange(ATTITUDES) + 0.5
+    up, around = 1.0 - 2.0 * k / ATTITUDES, np.pi * (1.0 + np.sqrt(5.0)) * k
+    across = np.sqrt(1.0 - up**2)
+    return np.stack((across * np.cos(around), across * np.sin(around), up), axis=-1)
+
+
+def _margin(wrench: np.ndarray, push: np.ndarray, shared_pressure: bool) -> float:
+    """Largest part of every axis, either way, that can be made on top of what cancels a push.
+
+    Args:
+        wrench: Of each actuator at full command, shape (axes, n) [-].
+        push: From outside, in the same shares, shape (axes,) [-].
+        shared_pressure: Whether shares of time add up to 1 at most.
+    """
+    # At import this would cost every node most of a second.
+    from scipy.optimize import linprog
+
+    axes, count = wrench.shape
+    ways = np.vstack((np.eye(axes), -np.eye(axes)))
+    # One set of shares for each of the ways, and one margin for all: W d_k - margin·way_k = -push.
+    equal = np.zeros((axes * len(ways), len(ways) * count + 1))
     for k, way in enumerate(ways):
-        equal[3 * k : 3 * k + 3, k * count : (k + 1) * count] = wrench
-        equal[3 * k : 3 * k + 3, -1] = -way
-    at_most = np.hstack((np.kron(np.eye(6), np.ones((1, count))), np.zeros((6, 1))))
-    goal = np.zeros(6 * count + 1)
+        rows = slice(axes * k, axes * (k + 1))
+        equal[rows, k * count : (k + 1) * count] = wrench
+        equal[rows, -1] = -way
+    at_most = np.hstack((np.kron(np.eye(len(ways)), np.ones((1, count))), np.zeros((len(ways), 1))))
+    goal = np.zeros(len(ways) * count + 1)
     goal[-1] = -1.0
     found = linprog(
         goal,
-        A_ub=at_most if valves.shared_pressure else None,
-        b_ub=np.ones(6) if valves.shared_pressure else None,
+        A_ub=at_most if shared_pressure else None,
+        b_ub=np.ones(len(ways)) if shared_pressure else None,
         A_eq=equal,
-        b_eq=np.tile(-push, 6),
-        bounds=[(0.0, 1.0)] * (6 * count) + [(None, None)],
+        b_eq=np.tile(-push, len(ways)),
+        bounds=[(0.0, 1.0)] * (len(ways) * count) + [(None, None)],
     )
     return float(found.x[-1]) if found.x is not None else -np.inf
 

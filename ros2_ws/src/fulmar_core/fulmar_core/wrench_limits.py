@@ -136,7 +136,9 @@ class WrenchSet:
         rows = self.columns / self.scale[:, None]
         equal = (rows[others] if pure else rows[:0], np.zeros((len(others) if pure else 0, 1)))
         corners = []
-        for angle in np.arange(DIRECTIONS) * 2.0 * np.pi / DIRECTIONS + 1e-3:  # past the axes: one corner each
+        for angle in (
+            np.arange(DIRECTIONS) * 2.0 * np.pi / DIRECTIONS + 1e-3
+        ):  # past the axes: one corner each
             aim = np.array([np.cos(angle), np.sin(angle)]) @ rows[chosen]
             found = self._best(np.append(-aim, 0.0), equal)
             assert found is not None  # no command at all is among them
@@ -193,7 +195,9 @@ def wrench_set_of(robot: Robot) -> WrenchSet:
             columns = np.array([[actuators.pull], [0.0], [0.0]])
         return WrenchSet(tuple(AXES[i] for i in PLANAR), columns, -np.ones(columns.shape[1]), shared=False)
     if not isinstance(actuators, Pushing):
-        raise ConfigError(f"'{robot.name}' has {actuators.kind}, whose forces are not those of single actuators.")
+        raise ConfigError(
+            f"'{robot.name}' has {actuators.kind}, whose forces are not those of single actuators."
+        )
     chosen = list(range(6)) if robot.state_type is SpatialState else PLANAR
     columns = (actuators.full_thrust[:, None] * actuators.wrench_per_newton)[:, chosen].T
     least = np.asarray(actuators.thrusts(np.diag(actuators.lowest))).diagonal() / actuators.full_thrust

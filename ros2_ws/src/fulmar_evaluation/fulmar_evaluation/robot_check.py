@@ -32,7 +32,9 @@ PLAIN = {
 QUARTER_TURN = 0.5 * pi
 # Of the largest entry of a row of a linear model by central differences: what is less is rounding [-].
 LEAST_EFFECT = 1e-5
-LARGEST_GAP = 2.0  # between `performance` and what the actuators give, beyond which one of them is a mistake [times]
+LARGEST_GAP = (
+    2.0  # between `performance` and what the actuators give, beyond which one of them is a mistake [times]
+)
 
 
 @dataclass(frozen=True)

@@ -81,7 +81,9 @@ def _lines(found: RobotCheck, result: dict[str, Any]) -> list[tuple[str, str]]:
     ]
     if wrench["shared_line"]:
         alone = wrench["without_shared_line"]
-        lines.append(("  each by itself", f"{_xyz(alone['force_n'], 'N')}; {_xyz(alone['torque_nm'], 'N·m')}"))
+        lines.append(
+            ("  each by itself", f"{_xyz(alone['force_n'], 'N')}; {_xyz(alone['torque_nm'], 'N·m')}")
+        )
     if "force_n_about_com" in wrench:
         lines.append(("  no torque about CoM", _xyz(wrench["force_n_about_com"], "N")))
     return [

@@ -12,7 +12,15 @@ from matplotlib.patches import Patch
 from fulmar_core.robot import Robot
 from fulmar_core.wrench_limits import AXES, WrenchSet
 from fulmar_evaluation.report.drawing import columns
-from fulmar_evaluation.report.style import CONTROLLER_COLOURS, DASHED, FAINT, INK, OTHER_COLOURS, PAPER, house_style
+from fulmar_evaluation.report.style import (
+    CONTROLLER_COLOURS,
+    DASHED,
+    FAINT,
+    INK,
+    OTHER_COLOURS,
+    PAPER,
+    house_style,
+)
 
 FILL = CONTROLLER_COLOURS["policy"]
 UNSHARED = OTHER_COLOURS[0]
@@ -39,7 +47,9 @@ def write_wrench_plot(robot: Robot, wrenches: WrenchSet, file: Path) -> Path:
         figure.patch.set_facecolor(PAPER)
         for axes, (first, second) in zip(panels.ravel(), pairs, strict=True):
             _panel(axes, wrenches, first, second)
-        figure.suptitle(f"{robot.name}: {len(robot.actuators.names)} {robot.actuators.kind.replace('_', ' ')}")
+        figure.suptitle(
+            f"{robot.name}: {len(robot.actuators.names)} {robot.actuators.kind.replace('_', ' ')}"
+        )
         handles = [
             Patch(facecolor=FILL, alpha=0.35, edgecolor=FILL, label="the other axes zero"),
             Line2D([], [], color=INK, linewidth=1.0, linestyle=DASHED, label="the others of any value"),
@@ -68,7 +78,9 @@ def _panel(axes: Axes, wrenches: WrenchSet, first: int, second: int) -> None:
     axes.fill(*pure.T, facecolor=FILL, alpha=0.35, edgecolor="none")
     drawn.append((pure, {"color": FILL, "linewidth": 2.2}))
     free = wrenches.outline(first, second, pure=False) * factors
-    drawn.append((free, {"color": INK, "linewidth": 1.0, "linestyle": DASHED}))  # on top: both are often the same
+    drawn.append(
+        (free, {"color": INK, "linewidth": 1.0, "linestyle": DASHED})
+    )  # on top: both are often the same
     for corners, style in drawn:
         axes.plot(*np.vstack((corners, corners[:1])).T, **style)
     axes.axhline(0.0, color=FAINT, linewidth=0.6)
