@@ -1,6 +1,6 @@
 """Holdability: whether a pose can be held, by a linear programme over the share of time that each valve is open.
 
-In the plane and in space. Over many control steps, valves that open and close give any mean wrench that shares of time can make: shares d_i >= 0,
+Over many control steps, valves that open and close give any mean wrench that shares of time can make: shares d_i >= 0,
 with a common pressure line Σ d_i <= 1, since n open valves give 1/n each. A pose can be held where the mean wrench
 cancels the push from outside with something left in every direction: without that, an error once made stays.
 """
@@ -13,15 +13,12 @@ import itertools
 import numpy as np
 
 from fulmar_core.actuators.pushing import PLANAR, Pushing
-from fulmar_core.attitude import turn_back
-from fulmar_core.disturbances.spatial_world import SpatialWorld
 from fulmar_core.errors import ConfigError
 from fulmar_core.planar import to_body
 from fulmar_core.robot import Robot
 
 LEAST_MARGIN = 1e-6  # of the robot's own force and torque: rounding of the solver lies below [-]
 HEADINGS = 72  # that are tried where any will do
-ATTITUDES = 60  # same in space
 
 
 def hold_margin(robot: Robot, working: np.ndarray, force: np.ndarray, torque: float, heading: float) -> float:
@@ -41,7 +38,7 @@ def hold_margin(robot: Robot, working: np.ndarray, force: np.ndarray, torque: fl
     Raises:
         ConfigError: The robot has no thrusters.
     """
-    valves = _valves(robot)
+    valves = one_way_actuators(robot)
     scale = np.array([robot.performance.force, robot.performance.force, robot.performance.torque])
     wrench = (
         valves.full_thrust[:, None]
@@ -50,77 +47,10 @@ def hold_margin(robot: Robot, working: np.ndarray, force: np.ndarray, torque: fl
         / scale
     ).T
     push = np.array([*to_body(np.asarray(heading), force[0], force[1]), torque]) / scale
-    return _margin(wrench, push, valves.shared_pressure)
+    return least_margin(wrench, push, valves.shared_pressure)
 
 
-def hold_margin_in_space(
-    robot: Robot, working: np.ndarray, force: np.ndarray, torque: np.ndarray, com: np.ndarray
-) -> float:
-    """How much is left in every direction when a push on a body in space is cancelled.
-
-    Args:
-        robot: A robot in space whose actuators push one way.
-        working: Share of its thrust that each one gives, 0 for a dead one, shape (n,) [-].
-        force: Push from outside on the centre of mass, in the body's frame, shape (3,) [N].
-        torque: Same frame, shape (3,) [N·m].
-        com: Centre of mass in the body's frame, shape (3,) [m].
-
-    Returns:
-        As of `hold_margin`, along the body's three axes and about them.
-
-    Raises:
-        ConfigError: The robot's actuators do not push one way.
-    """
-    valves, can = _valves(robot), robot.performance
-    scale = np.array([can.force] * 3 + [can.torque] * 3)
-    wrench = valves.wrench_per_newton.T.copy()
-    wrench[3:] -= np.cross(com, wrench[:3].T).T  # about the centre of mass
-    wrench = wrench * (valves.full_thrust * np.asarray(working)) / scale[:, None]
-    return _margin(wrench, np.concatenate((force, torque)) / scale, valves.shared_pressure)
-
-
-def can_hold_in_space(robot: Robot, world: SpatialWorld, quats: np.ndarray | None = None) -> np.ndarray:
-    """In which worlds a body in space can hold a pose at all, whatever controls it.
-
-    Constant force and torque, dead and weak actuators and the centre of mass count; kicks, noise and delays pass.
-
-    Args:
-        robot: A robot in space whose actuators push one way.
-        world: Of `draw_episodes`, say, with arrays of shape (worlds,).
-        quats: Attitude (x, y, z, w) of the pose in each world, shape (worlds, 4); None: any will do.
-
-    Returns:
-        Shape (worlds,) of bool.
-
-    Raises:
-        ConfigError: The robot's actuators do not push one way.
-    """
-    working = np.asarray(world.gain * world.alive, dtype=float).T
-    force, torque, com = (np.asarray(part, dtype=float).T for part in (world.force, world.torque, world.com))
-    able = np.zeros(len(working), dtype=bool)
-    for i in range(len(able)):
-        if quats is None:
-            # Only the direction of the force in the body changes with the attitude; as it is first.
-            size = float(np.linalg.norm(force[i]))
-            tried = [force[i], *(size * _sphere())] if size > 0.0 else [force[i]]
-        else:
-            x, y, z = turn_back(tuple(quats[i]), tuple(force[i]))
-            tried = [np.array([x, y, z])]
-        able[i] = any(
-            hold_margin_in_space(robot, working[i], each, torque[i], com[i]) > LEAST_MARGIN for each in tried
-        )
-    return able
-
-
-def _sphere() -> np.ndarray:
-    """Directions all around, on a Fibonacci lattice, shape (`ATTITUDES`, 3)."""
-    k = np.arange(ATTITUDES) + 0.5
-    up, around = 1.0 - 2.0 * k / ATTITUDES, np.pi * (1.0 + np.sqrt(5.0)) * k
-    across = np.sqrt(1.0 - up**2)
-    return np.stack((across * np.cos(around), across * np.sin(around), up), axis=-1)
-
-
-def _margin(wrench: np.ndarray, push: np.ndarray, shared_pressure: bool) -> float:
+def least_margin(wrench: np.ndarray, push: np.ndarray, shared_pressure: bool) -> float:
     """Largest part of every axis, either way, that can be made on top of what cancels a push.
 
     Args:
@@ -172,7 +102,7 @@ def can_hold(
     Raises:
         ConfigError: The robot has no thrusters.
     """
-    working = np.ones(len(_valves(robot).names))
+    working = np.ones(len(one_way_actuators(robot).names))
     working[list(lost)] = 0.0
     push = np.asarray(force, dtype=float)
     # Without a force from outside every heading is alike.
@@ -193,7 +123,12 @@ def uncontrollable_losses(robot: Robot, count: int) -> tuple[tuple[int, ...], ..
     return tuple(lost for lost in every if not can_hold(robot, lost))
 
 
-def _valves(robot: Robot) -> Pushing:
+def one_way_actuators(robot: Robot) -> Pushing:
+    """The robot's thrusters or fans.
+
+    Raises:
+        ConfigError: It has none.
+    """
     if not (isinstance(robot.actuators, Pushing) and robot.actuators.one_way):
         raise ConfigError(f"'{robot.name}' has no thrusters, so that there are no shares of time to choose.")
     return robot.actuators
