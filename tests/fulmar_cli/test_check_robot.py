@@ -187,7 +187,7 @@ def test_people_get_the_same_in_lines(fulmar):
         (None, "cannot be read"),
         ("body: [", "not valid YAML"),
         ("nmae: spacecraft_16", "unknown key 'nmae'. Did you mean 'name'?"),
-        ("name: [1]", "must be text"),
+        ("name: [1]", "must be a single value"),
     ],
 )
 def test_a_file_that_cannot_be_read_is_bad_usage(fulmar, tmp_path, text, words):
