@@ -68,22 +68,25 @@ class RobotCheck:
 
     def as_json(self) -> dict[str, Any]:
         """Keys as of `fulmar check robot --json`; what is not known is null."""
-        robot, wrenches = self.robot, self.wrenches
-        known = robot is not None and wrenches is not None
+        known: dict[str, Any] = dict.fromkeys(
+            ("actuators", "wrench", "zero_wrench_holdable", "controllable", "least_time")
+        )
+        if self.robot is not None and self.wrenches is not None:
+            known = {
+                "actuators": {
+                    "count": len(self.robot.actuators.names),
+                    "rank": self.rank,
+                    "missing_axes": list(self.missing_axes),
+                    "axes": list(self.wrenches.axes),
+                },
+                "wrench": wrench_json(self.robot, self.wrenches),
+                "zero_wrench_holdable": self.wrenches.holds_zero_with_all_on,
+                "controllable": self.controllable,
+                "least_time": least_time(self.robot, self.wrenches),
+            }
         return {
             "robot": self.name,
-            "actuators": {
-                "count": len(robot.actuators.names),
-                "rank": self.rank,
-                "missing_axes": list(self.missing_axes),
-                "axes": list(wrenches.axes),
-            }
-            if known
-            else None,
-            "wrench": wrench_json(robot, wrenches) if known else None,
-            "zero_wrench_holdable": wrenches.holds_zero_with_all_on if known else None,
-            "controllable": self.controllable if known else None,
-            "least_time": least_time(robot, wrenches) if known else None,
+            **known,
             "trim": [],
             "passed": self.passed,
             "problems": list(self.problems),

@@ -24,14 +24,15 @@ from fulmar_evaluation.report.style import (
 
 FILL = CONTROLLER_COLOURS["policy"]
 UNSHARED = OTHER_COLOURS[0]
+NOTHING = 1e-9  # rounding, in either unit
 SMALL = 0.1  # torques that stay below are written in mN·m [N·m]
 
 
 def write_wrench_plot(robot: Robot, wrenches: WrenchSet, file: Path) -> Path:
     """Draw the polytopes of force and torque.
 
-    In each panel two axes change. Filled is what can be made while all others stay zero, dashed what can be made with any
-    others, and dotted what could be made purely without the common pressure line.
+    In each panel two axes change. Filled is what can be made while all others stay zero, dashed what can be made with
+    any others, and dotted what could be made purely without the common pressure line.
 
     Args:
         robot: Whose actuators they are.
@@ -47,9 +48,8 @@ def write_wrench_plot(robot: Robot, wrenches: WrenchSet, file: Path) -> Path:
         figure.patch.set_facecolor(PAPER)
         for axes, (first, second) in zip(panels.ravel(), pairs, strict=True):
             _panel(axes, wrenches, first, second)
-        figure.suptitle(
-            f"{robot.name}: {len(robot.actuators.names)} {robot.actuators.kind.replace('_', ' ')}"
-        )
+        kind = robot.actuators.kind.replace("_", " ")
+        figure.suptitle(f"{robot.name} ({kind}): forces and torques about its origin")
         handles = [
             Patch(facecolor=FILL, alpha=0.35, edgecolor=FILL, label="the other axes zero"),
             Line2D([], [], color=INK, linewidth=1.0, linestyle=DASHED, label="the others of any value"),
@@ -86,8 +86,13 @@ def _panel(axes: Axes, wrenches: WrenchSet, first: int, second: int) -> None:
     axes.axhline(0.0, color=FAINT, linewidth=0.6)
     axes.axvline(0.0, color=FAINT, linewidth=0.6)
     axes.plot(0.0, 0.0, marker="+", color=INK, markersize=7)
-    if units[0][1] == units[1][1]:
+    reach = np.abs(np.vstack([corners for corners, _ in drawn])).max(axis=0)
+    if units[0][1] == units[1][1] and reach.max() > NOTHING:
         axes.set_aspect("equal", adjustable="datalim")
+    else:  # an axis without any force or torque would show its rounding
+        for most, limit in zip(reach, (axes.set_xlim, axes.set_ylim), strict=True):
+            if most < NOTHING:
+                limit(-1.0, 1.0)
     axes.set_xlabel(_label(wrenches, first, units[0][1]))
     axes.set_ylabel(_label(wrenches, second, units[1][1]), labelpad=1.0)
     axes.grid(True)
@@ -99,7 +104,7 @@ def _unit(wrenches: WrenchSet, axis: int) -> tuple[float, str]:
     sizes = [
         np.abs(wrenches.columns[i]).sum() for i, name in enumerate(wrenches.axes) if name.startswith(kind)
     ]
-    small = max(sizes) < SMALL
+    small = NOTHING < max(sizes) < SMALL
     if kind == "torque":
         return (1e3, "mN·m") if small else (1.0, "N·m")
     return (1e3, "mN") if small else (1.0, "N")
