@@ -140,12 +140,16 @@ def test_an_implausible_value_is_one_problem_with_its_line(fulmar, tmp_path, key
     assert words in problem
 
 
-def test_performance_beyond_what_actuators_give_is_a_problem(fulmar, tmp_path):
-    code, found = checked(fulmar, altered(tmp_path, performance__force=10.0))
-    assert code == 1
-    (problem,) = found["problems"]
-    assert "'performance.force' = 10 N" in problem
-    assert "1 N at most" in problem
+@pytest.mark.parametrize(("force", "code", "where"), [(10.0, 0, "warnings"), (50.0, 1, "problems")])
+def test_performance_beyond_what_actuators_give_is_a_warning_and_far_beyond_a_problem(
+    fulmar, tmp_path, force, code, where
+):
+    found_code, found = checked(fulmar, altered(tmp_path, performance__force=force))
+    assert found_code == code
+    (line,) = found["problems"] + found["warnings"]
+    assert found[where] == [line]
+    assert f"'performance.force' = {force:g} N" in line
+    assert "1 N at most" in line
 
 
 def test_an_unusual_value_is_a_warning_and_passes(fulmar, tmp_path):

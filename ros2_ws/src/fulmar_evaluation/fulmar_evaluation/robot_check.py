@@ -32,9 +32,8 @@ PLAIN = {
 QUARTER_TURN = 0.5 * pi
 # Of the largest entry of a row of a linear model by central differences: what is less is rounding [-].
 LEAST_EFFECT = 1e-5
-LARGEST_GAP = (
-    2.0  # between `performance` and what the actuators give, beyond which one of them is a mistake [times]
-)
+# Between `performance` and what the actuators give: beyond the first a warning, beyond the second a mistake of unit.
+USUAL_GAP, LARGEST_GAP = 2.0, 20.0
 
 
 @dataclass(frozen=True)
@@ -109,9 +108,15 @@ def check_robot(name: str) -> RobotCheck:
             robot = load_robot_file(path) if path.suffix in (".yaml", ".yml") else load_robot(name)
         except ImplausibleError as error:
             return RobotCheck(path.stem, problems=(str(error),), warnings=tuple(warnings))
-    wrenches = wrench_set_of(robot)
-    effects = _effects(robot, wrenches)
-    controllable = _controllable(robot, wrenches)
+        wrenches = wrench_set_of(robot)
+        effects = _effects(robot, wrenches)
+        controllable = _controllable(robot, wrenches)
+        problems = list(_problems(robot, wrenches, effects, controllable))
+        for gap, line in _gaps(robot, wrenches):
+            if gap <= LARGEST_GAP:
+                plausibility.warning("%s", line)
+            elif not problems:  # what is wrong with the layout comes first
+                problems.append(line)
     return RobotCheck(
         robot.name,
         robot,
@@ -119,7 +124,7 @@ def check_robot(name: str) -> RobotCheck:
         rank=effects.rank,
         missing_axes=effects.missing_axes,
         controllable=controllable,
-        problems=tuple(_problems(robot, wrenches, effects, controllable)),
+        problems=tuple(problems),
         warnings=tuple(warnings),
     )
 
@@ -262,11 +267,10 @@ def _problems(robot: Robot, wrenches: WrenchSet, effects: WrenchSet, controllabl
         )
     elif not controllable:
         yield "commands do not bring it to every pose: (A, B) of its linear model is not controllable."
-    yield from _gaps(robot, wrenches)
 
 
-def _gaps(robot: Robot, wrenches: WrenchSet) -> Iterator[str]:
-    """Numbers of `performance` that the actuators contradict."""
+def _gaps(robot: Robot, wrenches: WrenchSet) -> Iterator[tuple[float, str]]:
+    """How many times numbers of `performance` differ from what the actuators give, with a line."""
     angles = np.arange(32) * 2.0 * np.pi / 32
     forces = [i for i, axis in enumerate(wrenches.axes) if axis in ("force_x", "force_y")]
     directions = np.zeros((len(angles), len(wrenches.axes)))
@@ -282,10 +286,14 @@ def _gaps(robot: Robot, wrenches: WrenchSet) -> Iterator[str]:
         most = max(wrenches.most_along(sign * way, free=others) for sign in (1.0, -1.0)) * wrenches.scale[yaw]
         given.append(("torque", "N·m", robot.performance.torque, float(most)))
     for name, unit, wanted, found in given:
-        if not found / LARGEST_GAP <= wanted <= found * LARGEST_GAP:
+        if found < 1e-9:  # none at all: that is a matter of rank
+            continue
+        gap = max(wanted / found, found / wanted)
+        if gap > USUAL_GAP:
             yield (
+                gap,
                 f"'performance.{name}' = {wanted:g} {unit}, and its actuators give {found:.4g} {unit} at most in the "
-                "plane of x and y. Correct whichever is wrong; units are N and N·m."
+                "plane of x and y. Correct whichever is wrong; units are N and N·m.",
             )
 
 
