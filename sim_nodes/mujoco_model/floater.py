@@ -64,7 +64,8 @@ class Floater:
             body.add_freejoint(name="free")
         body.explicitinertial = True
         body.ipos, body.iquat = [OFF_CENTRE, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]
-        body.mass, body.inertia = robot.body.mass, list(robot.body.inertia)
+        # The world of an episode brings the rest of the tensor, and where the centre of mass is.
+        body.mass, body.inertia = robot.body.mass, list(robot.body.inertia[:3])
         low = -0.5 * robot.body.height
         if robot.hydrodynamics is not None:
             low = -robot.hydrodynamics.hydrostatics.draught

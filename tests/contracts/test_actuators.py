@@ -24,6 +24,7 @@ ROBOTS = robots_of_every_family()
 EACH = pytest.mark.parametrize("robot", ROBOTS.values(), ids=ROBOTS)
 PUSHED = {name: robot for name, robot in ROBOTS.items() if isinstance(robot.actuators, Pushing)}
 WHEELED = {name: robot for name, robot in ROBOTS.items() if isinstance(robot.actuators, Rolling)}
+PUSHED_IN_PLANE = {name: robot for name, robot in PUSHED.items() if robot.state_type is PlanarState}
 EACH_PUSHED = pytest.mark.parametrize("robot", PUSHED.values(), ids=PUSHED)
 EACH_WHEELED = pytest.mark.parametrize("robot", WHEELED.values(), ids=WHEELED)
 SECOND_NS = 10**9
@@ -77,7 +78,8 @@ MIRRORED = ("fan_disc", "jetbot", "kingfisher", "leatherback", "turtlebot2")
 
 
 def test_robots_that_are_built_alike_on_both_sides_have_a_mirror_image():
-    assert {name for name, robot in ROBOTS.items() if robot.actuators.mirrored() is not None} == set(MIRRORED)
+    planar = {name: robot for name, robot in ROBOTS.items() if robot.state_type is PlanarState}
+    assert {name for name, robot in planar.items() if robot.actuators.mirrored() is not None} == set(MIRRORED)
 
 
 @pytest.mark.parametrize("robot", [ROBOTS[name] for name in MIRRORED], ids=MIRRORED)
@@ -239,7 +241,7 @@ def test_the_linear_model_predicts_a_step_about_a_trim(robot):
         np.testing.assert_allclose(predicted, found, rtol=0, atol=20.0 * small**2)
 
 
-@EACH_PUSHED
+@pytest.mark.parametrize("robot", PUSHED_IN_PLANE.values(), ids=PUSHED_IN_PLANE)
 def test_the_linear_model_of_a_wrench_is_that_of_the_commands_behind_it(robot):
     """Both go through the same dynamics, one with what the actuators make of commands."""
     state, command = trim_of(robot)

@@ -15,6 +15,7 @@ from fulmar_core.dynamics.contact import outline_of
 from fulmar_core.episode import draw_episode
 from fulmar_core.safety.watchdog import default_timeout
 from fulmar_core.simulation import BatchSimulation
+from fulmar_core.spatial import SpatialState
 from fulmar_core.tasks import load_task
 from sim_nodes.mock_backend import MockBackend
 from tests.new_robots import robots_of_every_family
@@ -25,7 +26,12 @@ FLOATING = {name: robot for name, robot in ROBOTS.items() if name not in WHEELED
 EACH = pytest.mark.parametrize("robot", ROBOTS.values(), ids=ROBOTS)
 EACH_THAT_ROLLS = pytest.mark.parametrize("robot", WHEELED.values(), ids=WHEELED)
 EACH_THAT_FLOATS = pytest.mark.parametrize("robot", FLOATING.values(), ids=FLOATING)
-POSE, IDEAL = load_task("go_to_pose"), load_scenario("ideal")
+IDEAL = load_scenario("ideal")
+
+
+def pose_of(robot):
+    """The task of going to a pose, in the robot's own space."""
+    return load_task("go_to_pose_3d" if robot.state_type is SpatialState else "go_to_pose")
 
 
 def wrench(robot, command):
@@ -36,9 +42,9 @@ def wrench(robot, command):
 
 def corners(robot):
     """Commands with every actuator at an end of its range, or safe: all there are, up to 500."""
-    ends = np.array(np.meshgrid(*([[-1.0, 0.0, 1.0]] * len(robot.actuators.names)))).reshape(
-        len(robot.actuators.names), -1
-    )
+    each = [0.0, 1.0] if robot.actuators.one_way else [-1.0, 0.0, 1.0]
+    count = len(robot.actuators.names)
+    ends = np.array(np.meshgrid(*([each] * count))).reshape(count, -1)
     some = (
         ends.T if ends.shape[1] <= 500 else ends.T[np.random.default_rng(1).permutation(ends.shape[1])[:500]]
     )
@@ -62,7 +68,7 @@ def test_its_radius_goes_around_its_footprint(robot):
 def test_its_safe_command_is_within_its_limits_and_moves_nothing(robot):
     safe = robot.actuators.safe_command
     np.testing.assert_array_equal(robot.actuators.limited(safe), safe)
-    simulation = BatchSimulation(robot, POSE, IDEAL, worlds=1, seed=1)
+    simulation = BatchSimulation(robot, pose_of(robot), IDEAL, worlds=1, seed=1)
     x = simulation.truth.x.copy()
     for _ in range(5):
         simulation.step(safe[None])
@@ -146,11 +152,12 @@ def test_what_tasks_ask_for_lies_within_what_gates_believe(robot):
 @EACH
 def test_full_commands_for_a_second_stay_within_its_believable_limits(robot):
     commands = corners(robot)
-    simulation = BatchSimulation(robot, POSE, IDEAL, worlds=len(commands), seed=1)
+    simulation = BatchSimulation(robot, pose_of(robot), IDEAL, worlds=len(commands), seed=1)
     for _ in range(round(1.0 / simulation.control_dt)):
         simulation.step(commands)
-    assert simulation.truth.speed.max() < robot.limits.speed
-    assert np.abs(simulation.truth.yaw_rate).max() < robot.limits.yaw_rate
+    logged = simulation.truth.logged()
+    assert logged["speed"].max() < robot.limits.speed
+    assert np.abs(logged["yaw_rate"]).max() < robot.limits.yaw_rate
 
 
 @EACH
@@ -161,7 +168,7 @@ def test_commands_come_twice_before_the_watchdog_trips_or_at_least_once(robot):
 @EACH
 def test_it_moves_in_the_mock(robot):
     backend = MockBackend(robot)
-    backend.reset(draw_episode(robot, POSE, IDEAL, seed=1, number=0), seed=1)
+    backend.reset(draw_episode(robot, pose_of(robot), IDEAL, seed=1, number=0), seed=1)
     full = robot.actuators.limited(robot.actuators.scale * np.eye(len(robot.actuators.names))[0])
     sample = backend.step(full, 20)
     assert np.linalg.norm(sample.truth.velocity_in_world) > 0.0

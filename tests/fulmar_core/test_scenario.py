@@ -26,9 +26,11 @@ from fulmar_core.disturbances.world import FIELDS
 from fulmar_core.errors import ConfigError, UnknownNameError
 from fulmar_core.holdability import uncontrollable_losses
 from fulmar_core.paths import config_names
+from fulmar_core.planar import PlanarState
 from fulmar_core.robot import load_robot
 
 ROBOTS = {name: load_robot(name) for name in config_names("robots")}
+PLANAR = {name: robot for name, robot in ROBOTS.items() if robot.state_type is PlanarState}
 PLATFORM, BOAT = ROBOTS["floating_platform"], ROBOTS["kingfisher"]
 COUNT = 2000
 UNCONTROLLABLE = {"stranding": True}  # word: key of scenario files
@@ -156,7 +158,7 @@ def test_the_ideal_world_is_the_nominal_body_in_stillness(robot):
         assert not getattr(world, name).any(), name
 
 
-@pytest.mark.parametrize("robot", ROBOTS.values(), ids=ROBOTS)
+@pytest.mark.parametrize("robot", PLANAR.values(), ids=PLANAR)
 def test_an_uncertain_body_covers_its_whole_span_and_never_leaves_it(robot):
     world, spans = worlds(ALL, robot), robot.uncertainty
     fills(world.mass, *spans.mass)

@@ -16,6 +16,7 @@ from fulmar_bringup.console import console, output, showing_warnings
 from fulmar_cli.commands.bag import bag
 from fulmar_cli.commands.benchmark import benchmark
 from fulmar_cli.commands.bundle import bundle
+from fulmar_cli.commands.check import check
 from fulmar_cli.commands.commission import commission
 from fulmar_cli.commands.demo import demo
 from fulmar_cli.commands.doctor import doctor
@@ -91,6 +92,7 @@ app.command(epilog=MEANINGS)(evaluate)
 app.add_typer(benchmark, name="benchmark")
 app.add_typer(bundle, name="bundle")
 app.add_typer(bag, name="bag")
+app.add_typer(check, name="check")
 app.command()(report)
 app.command()(identify)
 app.command()(demo)

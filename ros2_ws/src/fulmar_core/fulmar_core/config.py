@@ -20,7 +20,7 @@ from typing import Any, TypeVar
 
 from yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
-from fulmar_core.errors import ConfigError, did_you_mean
+from fulmar_core.errors import ConfigError, ImplausibleError, did_you_mean
 from fulmar_core.own_class import EXAMPLE, SEPARATOR
 from fulmar_core.yaml_text import YamlError, compose, plain
 
@@ -187,7 +187,8 @@ class _Builder:
         try:
             return cls(**values)
         except ValueError as error:
-            self.fail(node, f"{where}: {error}")
+            line = node.start_mark.line + 1
+            raise ImplausibleError(f"{self.path}:{line}: {where}: {error}") from None
 
     def _tuple(self, kinds: tuple[Any, ...], node: Node, where: str) -> tuple[Any, ...]:
         if not isinstance(node, SequenceNode):

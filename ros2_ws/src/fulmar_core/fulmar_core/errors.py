@@ -16,6 +16,10 @@ class ConfigError(FulmarError):
     """A configuration file or an argument is wrong."""
 
 
+class ImplausibleError(ConfigError):
+    """A configuration file can be read, and has values that nothing real has."""
+
+
 class UnknownNameError(ConfigError):
     """A name that is not in a closed set, reported with the nearest known one."""
 

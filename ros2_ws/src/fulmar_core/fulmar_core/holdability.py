@@ -38,10 +38,7 @@ def hold_margin(robot: Robot, working: np.ndarray, force: np.ndarray, torque: fl
     Raises:
         ConfigError: The robot has no thrusters.
     """
-    # At import this would cost every node most of a second.
-    from scipy.optimize import linprog
-
-    valves = _valves(robot)
+    valves = one_way_actuators(robot)
     scale = np.array([robot.performance.force, robot.performance.force, robot.performance.torque])
     wrench = (
         valves.full_thrust[:, None]
@@ -50,22 +47,38 @@ def hold_margin(robot: Robot, working: np.ndarray, force: np.ndarray, torque: fl
         / scale
     ).T
     push = np.array([*to_body(np.asarray(heading), force[0], force[1]), torque]) / scale
-    count, ways = wrench.shape[1], np.vstack((np.eye(3), -np.eye(3)))
-    # One set of shares for each of the six ways, and one margin for all: W d_k - margin·way_k = -push.
-    equal = np.zeros((18, 6 * count + 1))
+    return least_margin(wrench, push, valves.shared_pressure)
+
+
+def least_margin(wrench: np.ndarray, push: np.ndarray, shared_pressure: bool) -> float:
+    """Largest part of every axis, either way, that can be made on top of what cancels a push.
+
+    Args:
+        wrench: Of each actuator at full command, shape (axes, n) [-].
+        push: From outside, in the same shares, shape (axes,) [-].
+        shared_pressure: Whether shares of time add up to 1 at most.
+    """
+    # At import this would cost every node most of a second.
+    from scipy.optimize import linprog
+
+    axes, count = wrench.shape
+    ways = np.vstack((np.eye(axes), -np.eye(axes)))
+    # One set of shares for each of the ways, and one margin for all: W d_k - margin·way_k = -push.
+    equal = np.zeros((axes * len(ways), len(ways) * count + 1))
     for k, way in enumerate(ways):
-        equal[3 * k : 3 * k + 3, k * count : (k + 1) * count] = wrench
-        equal[3 * k : 3 * k + 3, -1] = -way
-    at_most = np.hstack((np.kron(np.eye(6), np.ones((1, count))), np.zeros((6, 1))))
-    goal = np.zeros(6 * count + 1)
+        rows = slice(axes * k, axes * (k + 1))
+        equal[rows, k * count : (k + 1) * count] = wrench
+        equal[rows, -1] = -way
+    at_most = np.hstack((np.kron(np.eye(len(ways)), np.ones((1, count))), np.zeros((len(ways), 1))))
+    goal = np.zeros(len(ways) * count + 1)
     goal[-1] = -1.0
     found = linprog(
         goal,
-        A_ub=at_most if valves.shared_pressure else None,
-        b_ub=np.ones(6) if valves.shared_pressure else None,
+        A_ub=at_most if shared_pressure else None,
+        b_ub=np.ones(len(ways)) if shared_pressure else None,
         A_eq=equal,
-        b_eq=np.tile(-push, 6),
-        bounds=[(0.0, 1.0)] * (6 * count) + [(None, None)],
+        b_eq=np.tile(-push, len(ways)),
+        bounds=[(0.0, 1.0)] * (len(ways) * count) + [(None, None)],
     )
     return float(found.x[-1]) if found.x is not None else -np.inf
 
@@ -89,7 +102,7 @@ def can_hold(
     Raises:
         ConfigError: The robot has no thrusters.
     """
-    working = np.ones(len(_valves(robot).names))
+    working = np.ones(len(one_way_actuators(robot).names))
     working[list(lost)] = 0.0
     push = np.asarray(force, dtype=float)
     # Without a force from outside every heading is alike.
@@ -110,7 +123,12 @@ def uncontrollable_losses(robot: Robot, count: int) -> tuple[tuple[int, ...], ..
     return tuple(lost for lost in every if not can_hold(robot, lost))
 
 
-def _valves(robot: Robot) -> Pushing:
+def one_way_actuators(robot: Robot) -> Pushing:
+    """The robot's thrusters or fans.
+
+    Raises:
+        ConfigError: It has none.
+    """
     if not (isinstance(robot.actuators, Pushing) and robot.actuators.one_way):
         raise ConfigError(f"'{robot.name}' has no thrusters, so that there are no shares of time to choose.")
     return robot.actuators

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from fulmar_core.config import line_of
-from fulmar_core.errors import ConfigError
+from fulmar_core.errors import ImplausibleError
 from fulmar_core.plausible_ranges import UNITS, Plausible, Range
 
 LEAST_SHARE = 0.02  # of the largest usual value: where anything from 0 on is usual, less is no likely unit
@@ -23,7 +23,7 @@ def check_plausible(config: Any, table: Sequence[Plausible], path: Path) -> None
     """Reject values that no robot, task or scenario has; log a warning for those that few have.
 
     Raises:
-        ConfigError: A value lies outside of what is possible; the message starts with `file:line`.
+        ImplausibleError: A value lies outside of what is possible; the message starts with `file:line`.
     """
     for row in table:
         for keys, found in _values(config, row.key.split(".")):
@@ -37,7 +37,7 @@ def check_plausible(config: Any, table: Sequence[Plausible], path: Path) -> None
             where = f"{path}:{line_of(path, keys)}: '{'.'.join(keys)}' = {_number(found, value)} {row.unit}"
             allowed = f"{_text(usual)} {row.unit} ({row.why})"
             if not _lies_in(value, inside):
-                raise ConfigError(
+                raise ImplausibleError(
                     f"{where} is not plausible. Usual is {allowed}, accepted is {_text(inside)} {row.unit}."
                     f"{_other_unit(value, row.unit, usual)}"
                 )

@@ -16,7 +16,7 @@ from fulmar_core.actuators.rolling import Rolling
 from fulmar_core.calibration import VARIABLE, calibrated, calibration_in_use, load_calibration
 from fulmar_core.config import Kinds, load_config
 from fulmar_core.dynamics.hydrodynamics import Hydrodynamics
-from fulmar_core.errors import ConfigError
+from fulmar_core.errors import ConfigError, ImplausibleError
 from fulmar_core.paths import config_path
 from fulmar_core.planar import PlanarState
 from fulmar_core.plausibility import check_plausible
@@ -261,13 +261,11 @@ def load_robot(name: str) -> Robot:
         ConfigError: Unknown name, or a mistake in the file.
     """
     path = config_path("robots", name)
-    robot = load_config(Robot, path)
+    robot = load_robot_file(path)
     if robot.name != name:
         raise ConfigError(
             f"{path}: 'name' is '{robot.name}', the file's own name is '{name}'. Make them equal."
         )
-    check_plausible(robot, (*ROBOT, *robot.actuators.plausible, *RANGES), path)
-    _check_spans(robot, path)
     calibration = calibration_in_use()
     if calibration is None or calibration.robot != name:
         return robot
@@ -275,6 +273,19 @@ def load_robot(name: str) -> Robot:
         return calibrated(robot, calibration)
     except ValueError as error:
         raise ConfigError(f"the calibration of '{name}': {error}") from None
+
+
+def load_robot_file(path: Path) -> Robot:
+    """Read a robot from any file, without a calibration.
+
+    Raises:
+        ConfigError: The file cannot be read.
+        ImplausibleError: It can, and has values that no robot has.
+    """
+    robot = load_config(Robot, path)
+    check_plausible(robot, (*ROBOT, *robot.actuators.plausible, *RANGES), path)
+    _check_spans(robot, path)
+    return robot
 
 
 def use_calibration(path: Path | None, robot: str) -> None:
@@ -303,12 +314,12 @@ def _check_spans(robot: Robot, path: Path) -> None:
         ("yaw_inertia", yaw, spans.yaw_inertia),
     ):
         if not low <= nominal <= high:
-            raise ConfigError(
+            raise ImplausibleError(
                 f"{path}: 'uncertainty' has {name}: [{low:g}, {high:g}], which does not hold the body's own "
                 f"{nominal:g}."
             )
     if spans.yaw_inertia[1] > roll + pitch:
-        raise ConfigError(
+        raise ImplausibleError(
             f"{path}: 'uncertainty' has yaw_inertia up to {spans.yaw_inertia[1]:g}; no body has a moment beyond "
             f"the sum of the two others, {roll + pitch:g}."
         )

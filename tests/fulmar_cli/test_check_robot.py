@@ -1,0 +1,221 @@
+"""`fulmar check robot`: each family passes, and mistakes get one line each."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+import yaml
+
+from fulmar_core.paths import config_names, config_path
+from tests import new_robots
+from tests.fulmar_cli.command_line import complaint
+
+NEW = Path(new_robots.__file__).parent
+KEYS = {
+    "robot", "actuators", "wrench", "zero_wrench_holdable", "controllable", "least_time", "trim", "passed",
+    "problems", "warnings",
+}  # fmt: skip
+
+
+def checked(fulmar, name):
+    """Exit code, and the JSON object."""
+    code, out, _ = fulmar("check", "robot", str(name), "--json")
+    return code, json.loads(out)
+
+
+def altered(tmp_path, name="spacecraft_16", **changes):
+    """A copy of a shipped robot with other values; keys are dotted with two underscores."""
+    robot = yaml.safe_load(config_path("robots", name).read_text(encoding="utf-8"))
+    for key, value in changes.items():
+        *parts, last = key.split("__")
+        inner = robot
+        for part in parts:
+            inner = inner[part]
+        inner[last] = value
+    path = tmp_path / f"{name}.yaml"
+    path.write_text(yaml.safe_dump(robot, allow_unicode=True), encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize("name", config_names("robots"))
+def test_every_shipped_robot_passes(fulmar, name):
+    code, found = checked(fulmar, name)
+    assert (code, found["passed"], found["problems"], found["warnings"]) == (0, True, [], [])
+    assert set(found) == KEYS
+    assert found["robot"] == name
+    assert found["controllable"]
+    assert found["zero_wrench_holdable"]
+    assert found["trim"] == []
+
+
+@pytest.mark.parametrize("name", ["courier", "fan_disc", "lopsided_probe", "raft", "rally", "skiff"])
+def test_a_file_is_checked_without_being_installed(fulmar, name):
+    code, found = checked(fulmar, NEW / f"{name}.yaml")
+    assert (code, found["robot"], found["problems"]) == (0, name, [])
+
+
+def test_int_ball2_has_the_published_limits_and_times(fulmar):
+    """`facts`: 1 m in 8.4 s (x) or 11.4 s (y), a quarter turn about x in 5.4 s."""
+    _, found = checked(fulmar, "int_ball2")
+    assert found["actuators"] | {"axes": 6} == {"count": 8, "rank": 6, "missing_axes": [], "axes": 6}
+    assert found["wrench"]["force_n"] == pytest.approx([0.1810, 0.0996, 0.1222], rel=1e-3)
+    assert found["wrench"]["torque_nm"] == pytest.approx([3.03e-3, 4.55e-3, 8.19e-3], rel=1e-3)
+    assert found["wrench"]["force_n_about_com"][0] < found["wrench"]["force_n"][0]
+    assert found["least_time"]["metre_s"][:2] == pytest.approx([8.4, 11.4], abs=0.05)
+    assert found["least_time"]["quarter_turn_s"][0] == pytest.approx(5.4, abs=0.05)
+
+
+def test_the_spacecraft_s_limits_are_those_of_its_shared_line_with_the_others_beside(fulmar):
+    _, found = checked(fulmar, "spacecraft_16")
+    wrench = found["wrench"]
+    assert wrench["shared_line"]
+    assert wrench["force_n"] == pytest.approx([0.7071, 0.7071, 1.0], rel=1e-3)
+    assert wrench["without_shared_line"]["force_n"] == pytest.approx([2.828, 2.828, 4.0], rel=1e-3)
+    assert wrench["without_shared_line"]["torque_nm"] == pytest.approx([0.877, 0.877, 1.24], rel=1e-3)
+
+
+def test_planar_robots_are_evaluated_in_the_plane(fulmar):
+    _, found = checked(fulmar, "floating_platform")
+    assert found["actuators"]["axes"] == ["force_x", "force_y", "torque_z"]
+    assert found["actuators"]["rank"] == 3
+    assert found["wrench"]["force_n"][2] is None
+    assert found["least_time"]["quarter_turn_s"][:2] == [None, None]
+
+
+def test_a_car_turns_by_driving_and_a_boat_is_weaker_astern(fulmar):
+    _, car = checked(fulmar, "leatherback")
+    assert car["actuators"]["missing_axes"] == ["force_y"]
+    assert car["wrench"]["torque_nm"][2] == 0.0
+    assert car["least_time"]["quarter_turn_s"][2] > 0.0
+    _, boat = checked(fulmar, "kingfisher")
+    low, high = boat["wrench"]["force_range_n"][0]
+    assert boat["wrench"]["force_n"][0] == pytest.approx(-low)
+    assert high > -low
+
+
+def test_wheels_are_no_faster_than_they_turn(fulmar):
+    """Turtlebot2: 24 N on its mass would pass 1 m in less, but for its top speed."""
+    robot = yaml.safe_load(config_path("robots", "turtlebot2").read_text(encoding="utf-8"))
+    _, found = checked(fulmar, "turtlebot2")
+    assert found["least_time"]["metre_s"][0] > 1.0 / robot["actuators"]["max_speed"]
+    assert found["least_time"]["metre_s"][1] is None
+
+
+def test_the_placeholder_of_roboran_has_one_problem(fulmar):
+    code, found = checked(fulmar, NEW / "placeholder_ball.yaml")
+    assert code == 1
+    assert found["actuators"]["rank"] == 5
+    assert found["actuators"]["missing_axes"] == ["torque_y"]
+    assert not found["passed"]
+    assert not found["controllable"]
+    (problem,) = found["problems"]
+    assert "rank 5 of 6" in problem
+    assert "torque about y (pitch)" in problem
+
+
+def test_an_inertia_that_no_body_has_is_one_problem(fulmar, tmp_path):
+    path = altered(tmp_path, body__inertia=[0.05, 0.05, 0.2045])
+    code, found = checked(fulmar, path)
+    assert (code, found["passed"], found["wrench"]) == (1, False, None)
+    (problem,) = found["problems"]
+    assert str(path) in problem
+    assert "no body has a moment beyond the sum of the two others" in problem
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "words"),
+    [
+        ("body__radius", 310.0, "Is it in mm?"),
+        ("actuators__thrust", 1000.0, "Is it in mN?"),
+        ("uncertainty__mass", [1.0, 2.0], "does not hold the body's own"),
+    ],
+)
+def test_an_implausible_value_is_one_problem_with_its_line(fulmar, tmp_path, key, value, words):
+    code, found = checked(fulmar, altered(tmp_path, **{key: value}))
+    assert code == 1
+    assert set(found) == KEYS
+    (problem,) = found["problems"]
+    assert words in problem
+
+
+@pytest.mark.parametrize(("force", "code", "where"), [(10.0, 0, "warnings"), (50.0, 1, "problems")])
+def test_performance_beyond_what_actuators_give_is_a_warning_and_far_beyond_a_problem(
+    fulmar, tmp_path, force, code, where
+):
+    found_code, found = checked(fulmar, altered(tmp_path, performance__force=force))
+    assert found_code == code
+    (line,) = found["problems"] + found["warnings"]
+    assert found[where] == [line]
+    assert f"'performance.force' = {force:g} N" in line
+    assert "1 N at most" in line
+
+
+def test_an_unusual_value_is_a_warning_and_passes(fulmar, tmp_path):
+    code, found = checked(fulmar, altered(tmp_path, timing__physics_dt=0.1))
+    assert (code, found["problems"]) == (0, [])
+    (warning,) = found["warnings"]
+    assert "'timing.physics_dt' = 0.1 s is unusual" in warning
+
+
+def test_nozzles_that_push_one_way_only_are_a_problem(fulmar, tmp_path):
+    path = altered(tmp_path, "floating_platform")
+    robot = yaml.safe_load(path.read_text(encoding="utf-8"))
+    for nozzle in robot["actuators"]["nozzles"]:
+        nozzle["direction"][0] = abs(nozzle["direction"][0])
+    path.write_text(yaml.safe_dump(robot), encoding="utf-8")
+    code, found = checked(fulmar, path)
+    assert code == 1
+    assert found["actuators"]["rank"] == 3
+    assert not found["zero_wrench_holdable"]
+    (problem,) = found["problems"]
+    assert "negative force along x" in problem
+
+
+def test_people_get_the_same_in_lines(fulmar):
+    code, out, err = fulmar("check", "robot", "spacecraft_16")
+    assert (code, err) == (0, "")
+    assert "16, rank 6 of 6" in out
+    assert "2.828" in out
+    assert out.endswith("passed\n")
+    code, out, _ = fulmar("check", "robot", str(NEW / "placeholder_ball.yaml"))
+    assert code == 1
+    assert out.count("problem:") == 1
+    assert out.endswith("not passed\n")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (None, "cannot be read"),
+        ("body: [", "not valid YAML"),
+        ("nmae: spacecraft_16", "unknown key 'nmae'. Did you mean 'name'?"),
+        ("name: [1]", "must be a single value"),
+    ],
+)
+def test_a_file_that_cannot_be_read_is_bad_usage(fulmar, tmp_path, text, words):
+    path = tmp_path / "mine.yaml"
+    if text is not None:
+        path.write_text(text, encoding="utf-8")
+    assert words in complaint(fulmar("check", "robot", str(path)))
+
+
+def test_an_unknown_name_gets_the_nearest_one(fulmar):
+    assert "Did you mean 'int_ball2'?" in complaint(fulmar("check", "robot", "int_ball"))
+
+
+@pytest.mark.parametrize("name", ["int_ball2", "floating_platform", "turtlebot2"])
+def test_the_figure_is_small_and_not_empty(fulmar, tmp_path, name):
+    pytest.importorskip("matplotlib")
+    from matplotlib.image import imread
+
+    file = tmp_path / "wrench.png"
+    code, _, err = fulmar("check", "robot", name, "--plot", str(file))
+    assert code == 0
+    assert str(file) in err
+    assert file.stat().st_size < 500_000
+    image = imread(file)
+    assert image.shape[1] > 800
+    blue = (image[..., 2] - image[..., 0] > 0.1).mean()  # what is filled
+    assert 0.005 < blue < 0.6
