@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Self
 
+import numpy as np
+
 from fulmar_core.arrays import array_namespace
-from fulmar_core.attitude import Quaternion, Vector, euler_of, length, minus, turn_back
+from fulmar_core.attitude import Quaternion, Vector, euler_of, from_euler, length, minus, turn_back
 from fulmar_core.rotation import Array
 from fulmar_core.state import RigidBodyState, State
 
@@ -40,6 +44,10 @@ class SpatialState(State):
     def columns(self) -> tuple[Array, ...]:
         """Every array, in the order of `COLUMNS`."""
         return (*self.position, *self.quat, *self.velocity, *self.rate)
+
+    WORLD: ClassVar[str] = "space"
+    NUMBERS: ClassVar[tuple[str, ...]] = ("x", "y", "z", "roll", "pitch", "yaw")
+    AXES: ClassVar[int] = 3
 
     @property
     def position(self) -> Vector:
@@ -92,6 +100,25 @@ class SpatialState(State):
     def rigid_targets(cls, targets: Array, *, twists: bool) -> Array:
         """Targets as they are."""
         return targets
+
+    @classmethod
+    def target_at(cls, numbers: Sequence[float]) -> np.ndarray:
+        """Place and attitude, shape (7,); without angles the body's axes are those of the world."""
+        place, angles = numbers[:3], np.deg2rad(numbers[3:] or (0.0, 0.0, 0.0))
+        return np.array([*place, *from_euler(*angles)])
+
+    @classmethod
+    def written(cls, target: Array) -> tuple[float, ...]:
+        """x, y, z [m], roll, pitch, yaw [deg]."""
+        place = tuple(float(part) for part in target[:3])
+        angles = euler_of(tuple(np.asarray(target[i], dtype=float) for i in range(3, 7)))
+        return *place, *(math.degrees(float(angle)) for angle in angles)
+
+    @classmethod
+    def resting(cls, target: Array) -> Self:
+        """A body that stands still at a pose, shape (..., 7)."""
+        x = target[..., 0]
+        return cls(*(target[..., i] for i in range(7)), *((x,) * 6)).stopped()
 
     @property
     def pose(self) -> Array:

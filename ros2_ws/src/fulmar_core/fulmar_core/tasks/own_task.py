@@ -126,7 +126,8 @@ class OwnTask(Task[PlanarState]):
         return source_of(type(self.own))
 
     def check(self, robot: Robot) -> None:
-        """Call every member once on drawn episodes, many at once and one alone."""
+        """Call every member once on drawn episodes, many at once and one alone; see `Task.check`."""
+        super().check(robot)
         draws = Draws(0, np.arange(TRIED), np.zeros(TRIED, dtype=int), START)
         starts, goals = self.draw(draws, robot, training=False)
         for state, drawn in ((starts, goals), (starts[0], goals[0])):
