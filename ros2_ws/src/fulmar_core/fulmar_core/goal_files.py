@@ -31,7 +31,9 @@ def _form_of(rows: Sequence[Sequence[float]], name: str, plane: int, space: int)
         raise ValueError(f"'{name}' must have at least one entry.")
     lengths = {len(row) for row in rows}
     if lengths not in ({plane}, {space}):
-        raise ValueError(f"every entry of '{name}' must have {plane} numbers, or {space} in space, all the same.")
+        raise ValueError(
+            f"every entry of '{name}' must have {plane} numbers, or {space} in space, all the same."
+        )
     return PlanarState if lengths == {plane} else SpatialState
 
 

@@ -98,7 +98,6 @@ class Waypoints:
         if time_s - self._inside_since >= self._hold_s:
             self._reached, self._inside_since = self._reached + 1, None
 
-
     def _is_inside(self, state: State, target: np.ndarray) -> bool:
         """Whether a state lies within the tolerance of a target."""
         if isinstance(state, SpatialState):

@@ -25,6 +25,7 @@ from fulmar_core.robot import load_robot
 from fulmar_core.safety.geofence import OUT_OF_BOUNDS
 from fulmar_core.safety.input_gate import InputGate, Measurement
 from fulmar_core.spatial import SpatialState
+from fulmar_core.state import State
 from fulmar_core.tasks import load_task
 from fulmar_core.topics import GOAL_WIRES, ODOMETRY, STATUS
 from fulmar_ros.goal_messages import TYPES, GoalMessage, goal_message
@@ -95,9 +96,7 @@ class GoalNode(Node):
         self._sequence = goal_sequence(goals, robot, as_path=self._settings.as_path)
         self._request_exit = request_exit
         # Controllers check for stuck sensors.
-        self._gate = InputGate(
-            robot.limits, frozen_after=0, turns_freely=robot.state_type is SpatialState
-        )
+        self._gate = InputGate(robot.limits, frozen_after=0, turns_freely=robot.state_type is SpatialState)
         self._lock = threading.Lock()
         self._sent: Goal | None = None
         self._newest: Measurement | None = None
@@ -264,7 +263,8 @@ class GoalNode(Node):
         topic = self._publisher.topic_name
         if self._subscribed(topic):
             return ""
-        tasks = [name for name in config_names("tasks") if _topic_of(name) == self._sequence.topic]
+        wanted = self._sequence.topic, self._sequence.form
+        tasks = [name for name in config_names("tasks") if _taken_by(name) == wanted]
         taken = [name for name in GOAL_WIRES if self._subscribed(self.resolve_topic_name(name))]
         instead = f"; the one that runs takes {' and '.join(taken)}" if taken else ""
         return f"no controller subscribes {topic}; one does with one of the tasks {', '.join(tasks)}{instead}"
@@ -282,8 +282,10 @@ class GoalNode(Node):
         self._publisher.wait_for_all_acked(FLUSH)
 
 
-def _topic_of(task: str) -> str:
-    return load_task(task).goal_topic
+def _taken_by(task: str) -> tuple[str, type[State]]:
+    """Topic and form of a task's goals."""
+    found = load_task(task)
+    return found.goal_topic, found.state_type
 
 
 def main() -> None:

@@ -77,9 +77,7 @@ def unreachable(what: str, places: Iterable[Sequence[float]], area: Sequence[flo
             return f"{what} {_words(place, 'g')} lies outside the area of {_sides(area)}."
         away = math.hypot(*place)
         if not away <= FARTHEST_M:  # also where it is not a number
-            return (
-                f"{what} {_words(place, 'g')} lies {away:,.0f} m from the origin, farther than {FARTHEST_M:,.0f} m."
-            )
+            return f"{what} {_words(place, 'g')} lies {away:,.0f} m from the origin, farther than {FARTHEST_M:,.0f} m."
     return ""
 
 
