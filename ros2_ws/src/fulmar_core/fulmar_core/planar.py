@@ -90,7 +90,7 @@ class PlanarState(State):
 
     @classmethod
     def written(cls, target: Array) -> tuple[float, ...]:
-        """x [m], y [m], heading [deg], from -180 to 180."""
+        """Place [m] and heading [deg], which is from -180 to 180."""
         return float(target[0]), float(target[1]), math.degrees(float(wrapped(np.asarray(target[2]))))
 
     @classmethod

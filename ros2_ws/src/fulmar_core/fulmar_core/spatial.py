@@ -109,7 +109,7 @@ class SpatialState(State):
 
     @classmethod
     def written(cls, target: Array) -> tuple[float, ...]:
-        """x, y, z [m], roll, pitch, yaw [deg]."""
+        """Place [m], and roll, pitch, yaw [deg]."""
         place = tuple(float(part) for part in target[:3])
         angles = euler_of(tuple(np.asarray(target[i], dtype=float) for i in range(3, 7)))
         return *place, *(math.degrees(float(angle)) for angle in angles)

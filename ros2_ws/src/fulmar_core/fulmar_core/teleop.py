@@ -12,6 +12,7 @@ from fulmar_core.actuators.pushing import Pushing
 from fulmar_core.controllers.allocation import allocation_of
 from fulmar_core.errors import ConfigError
 from fulmar_core.robot import Robot
+from fulmar_core.spatial import SpatialState
 
 VALVE_COST = 0.02  # of an open valve, where a full wish has a cost of 1: small wishes open nothing
 KEY_HOLDS_NS = 600_000_000  # a key that is held repeats within this time, also after its first, longer wait
@@ -40,8 +41,9 @@ def hand_mapping(robot: Robot) -> Callable[[Wish], np.ndarray]:
     """From wishes to commands of a robot, shape (n,), within its limits; no wish is the safe command.
 
     Raises:
-        ConfigError: A person cannot drive its family of actuators.
+        ConfigError: A person cannot drive its family of actuators, or it moves in space.
     """
+    check_by_hand(robot)
     actuators = robot.actuators
     try:
         if actuators.by_hand(*NOTHING.parts) is not None:
@@ -49,6 +51,19 @@ def hand_mapping(robot: Robot) -> Callable[[Wish], np.ndarray]:
         return _allocated(robot)
     except ValueError as error:
         raise ConfigError(f"'{robot.name}' cannot be teleoperated: {error}") from error
+
+
+def check_by_hand(robot: Robot) -> None:
+    """Refuse a robot with more directions than a person has keys for.
+
+    Raises:
+        ConfigError: It moves in space.
+    """
+    if robot.state_type is SpatialState:
+        raise ConfigError(
+            f"'{robot.name}' cannot be teleoperated: keys and sticks drive in the plane, and it moves in space. Send it "
+            "goals: fulmar goals, or the topics goal_pose and goal_velocity."
+        )
 
 
 def _allocated(robot: Robot) -> Callable[[Wish], np.ndarray]:

@@ -25,7 +25,7 @@ START_HELP = "Where to begin, in space x,y,z[,roll,pitch,yaw]; drawn from the se
 GOALS_HELP = "Goals one after another, or a path to follow: a name from `fulmar list goals`, or a .yaml file."
 ESTIMATOR_HELP = "Estimate odometry from poses and inertial readings: a name from configs/estimators."
 END_HELP = "An e-stop ends and fails the run; by default the robot waits for a reset and a new goal."
-AREA_HELP = "x_min, x_max, y_min, y_max that the robot must not leave, in space also z_min, z_max [m]: --area=-2,2,-1,1."
+AREA_HELP = "x_min, x_max, y_min, y_max, in space also z_min, z_max, not to be left [m]: --area=-2,2,-1,1."
 RECORDING_HELP = (
     "whole: every message. ring: the last 30 s stay in memory and are written only when a fault occurs (an error of "
     "plant or controller, the watchdog, the e-stop), with 5 s after it; without a fault there is no bag and no result "

@@ -41,7 +41,8 @@ def check_area_of(robot: Robot, area: Sequence[float]) -> None:
     if tuple(area) != NO_AREA and len(area) != 2 * form.AXES:
         sides = ",".join(f"{axis}_min,{axis}_max" for axis in "xyz"[: form.AXES])
         raise ConfigError(
-            f"area = {list(area)}: '{robot.name}' moves in {form.WORLD}, where an area has {2 * form.AXES} sides: {sides}."
+            f"area = {list(area)}: '{robot.name}' moves in {form.WORLD}, where an area has {2 * form.AXES} "
+            f"sides: {sides}."
         )
 
 
