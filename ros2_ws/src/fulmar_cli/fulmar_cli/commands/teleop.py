@@ -37,10 +37,9 @@ def teleop(
     from fulmar_bringup.node_table import teleop_spec
     from fulmar_bringup.processes import command_line
     from fulmar_core.robot import load_robot
-    from fulmar_core.teleop import check_by_hand
     from fulmar_core.topics import GIVE_BACK
 
-    check_by_hand(load_robot(robot))
+    load_robot(robot)  # rejects a wrong name
     name = robot if name is None else checked_name(name)
     space = namespace_of(name)
     if give_back:

@@ -186,6 +186,8 @@ class OwnTask(Task[PlanarState]):
             "heading": limits.heading_deg,
             "velocity": limits.velocity or found.yaw_rate is not None,
             "yaw_rate": limits.yaw_rate_deg or found.velocity is not None,
+            "attitude": limits.attitude_deg,
+            "rate": limits.rate_deg,
         }
         for name, value in values.items():
             if value is None and asked[name]:
