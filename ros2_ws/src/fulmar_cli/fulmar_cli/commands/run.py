@@ -18,8 +18,7 @@ RUN_TASK_HELP = (
     "and the task that takes the goals of --goals."
 )
 GOAL_HELP = (
-    "Where to go, with or without a heading, in space x,y,z[,roll,pitch,yaw]; drawn from the seed by default, as many "
-    "targets are."
+    "Where to go, in space x,y,z[,roll,pitch,yaw]; drawn from the seed by default, as many targets are."
 )
 START_HELP = "Where to begin, in space x,y,z[,roll,pitch,yaw]; drawn from the seed by default."
 GOALS_HELP = "Goals one after another, or a path to follow: a name from `fulmar list goals`, or a .yaml file."
@@ -133,15 +132,13 @@ def run(
     if note:
         log_line(note)
     guards = {
-        "estimator": estimator, "estop": estop or None, "fallback": fallback,
-        "trusted_keys": str(trusted_keys) if trusted_keys else None,
-        "area": read_area(area), "max_run_time_s": max_run_time,
+        "estimator": estimator, "estop": estop or None, "fallback": fallback, "max_run_time_s": max_run_time,
+        "trusted_keys": str(trusted_keys) if trusted_keys else None, "area": read_area(area),
     }  # fmt: skip
     request = plan_run(
         robot=robot, name=name, task=task, controller=controller, backend=backend, policy=policy,
-        goal=place, goals=goals,
-        start=read_pose(start, "--start"), duration_s=duration, lockstep=lockstep, rate=rate,
-        control_hz=control_hz, scenario=scenario, seed=seed, hardware=hardware, emulate=emulate, arm=arm,
+        goal=place, goals=goals, start=read_pose(start, "--start"), duration_s=duration, lockstep=lockstep,
+        rate=rate, control_hz=control_hz, scenario=scenario, seed=seed, hardware=hardware, emulate=emulate, arm=arm,
         record=record or dated_folder("runs", name or robot, controller), command=cli.invoked_command(),
         guards={key: value for key, value in guards.items() if value is not None}, recording=recording,
         copies=copies, controller_network=controller_network, mocap_hz=mocap_hz, remap=remap or (),
