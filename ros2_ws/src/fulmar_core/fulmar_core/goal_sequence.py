@@ -27,8 +27,11 @@ class GoalSequence(Protocol):
     """Goals that follow each other; `step` is called with each state until it is done."""
 
     topic: str  # where the goals belong, one of `topics.GOAL_WIRES`
-    form: type[State]  # of the states that it takes, and of its targets
     standstill: Goal  # of a robot that does not know where it is; the velocity 0 where goals are velocities
+
+    @property
+    def form(self) -> type[State]:
+        """Of the states that it takes, and of its targets."""
 
     @property
     def done(self) -> bool:
@@ -65,13 +68,18 @@ class Waypoints:
             hold_s: How long a robot must stay there [s].
             at_once: Whether the goal has all targets; it then is done after one round.
         """
-        self.topic, self.form = topic, file.form
+        self.topic, self._form = topic, file.form
         targets = file.targets()
         self._goals = [_goal(*targets)] if at_once else [_goal(target) for target in targets]
         self.standstill = self._goals[0]
         self._targets, self._tolerance, self._hold_s = targets, tolerance, hold_s
         self._reached = 0
         self._inside_since: float | None = None
+
+    @property
+    def form(self) -> type[State]:
+        """State type of the file's goals."""
+        return self._form
 
     @property
     def done(self) -> bool:
@@ -102,6 +110,7 @@ class Waypoints:
         """Whether a state lies within the tolerance of a target."""
         if isinstance(state, SpatialState):
             return bool(self._tolerance.holds(place_errors(state, target, attitude=True)))
+        assert isinstance(state, PlanarState)
         errors = pose_errors(state, target, heading=True)
         inside = float(errors.position) <= self._tolerance.position
         if self._tolerance.heading_deg:
@@ -116,11 +125,16 @@ class Schedule:
 
     def __init__(self, file: Velocities) -> None:
         """Begin with the first."""
-        self.form = file.form
+        self._form = file.form
         targets = file.targets()
         self._goals, self._ends = [_goal(velocity) for velocity in targets], file.ends()
         self.standstill = _goal(np.zeros_like(targets[0]))
         self._over = 0
+
+    @property
+    def form(self) -> type[State]:
+        """State type of the file's goals."""
+        return self._form
 
     @property
     def done(self) -> bool:
@@ -142,7 +156,7 @@ class Schedule:
 class Following:
     """Velocities that lead along a path, and standstill at its end."""
 
-    topic, form = "goal_velocity", PlanarState
+    topic = "goal_velocity"
     standstill = goal_at((0.0, 0.0, 0.0))
 
     def __init__(self, file: FollowedPath, *, sideways: bool) -> None:
@@ -150,6 +164,11 @@ class Following:
         self._file, self._sideways = file, sideways
         self._planner: LookAhead = file.planner()
         self._on_path: Progress | None = None
+
+    @property
+    def form(self) -> type[State]:
+        """Paths lie in the plane."""
+        return PlanarState
 
     @property
     def done(self) -> bool:
@@ -164,8 +183,9 @@ class Following:
         laps = 0 if self._on_path is None else self._on_path.laps
         return f"{laps} rounds" if self._planner.loops == 0 else f"{laps} of {self._planner.loops} rounds"
 
-    def step(self, state: PlanarState, time_s: float) -> Goal:
+    def step(self, state: State, time_s: float) -> Goal:
         """The velocity towards the aim; see `GoalSequence.step`."""
+        assert isinstance(state, PlanarState)
         lead_s = self._file.lead_s
         position = np.array([float(state.x + lead_s * state.vx), float(state.y + lead_s * state.vy)])
         if self._on_path is None:

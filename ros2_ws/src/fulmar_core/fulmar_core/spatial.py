@@ -111,14 +111,14 @@ class SpatialState(State):
     def written(cls, target: Array) -> tuple[float, ...]:
         """Place [m], and roll, pitch, yaw [deg]."""
         place = tuple(float(part) for part in target[:3])
-        angles = euler_of(tuple(np.asarray(target[i], dtype=float) for i in range(3, 7)))
+        angles = euler_of(quat_of(np.asarray(target, dtype=float)))
         return *place, *(math.degrees(float(angle)) for angle in angles)
 
     @classmethod
     def resting(cls, target: Array) -> Self:
         """A body that stands still at a pose, shape (..., 7)."""
-        x = target[..., 0]
-        return cls(*(target[..., i] for i in range(7)), *((x,) * 6)).stopped()
+        place = position_of(target)
+        return cls(*place, *quat_of(target), *place, *place).stopped()
 
     @property
     def pose(self) -> Array:

@@ -77,7 +77,7 @@ def _in_plane(robot: Robot) -> np.ndarray:
             "keys and sticks drive in the plane of its x and y axes, and its actuators push out of it. Send it goals: "
             "fulmar goals."
         )
-    return inside.astype(float)
+    return np.asarray(inside, dtype=float)
 
 
 class Keyboard:

@@ -17,9 +17,7 @@ RUN_TASK_HELP = (
     f"{cli.TASK_HELP} By default the goal decides: go_to_position for x,y, go_to_pose for x,y,deg and without a goal, "
     "and the task that takes the goals of --goals."
 )
-GOAL_HELP = (
-    "Where to go, in space x,y,z[,roll,pitch,yaw]; drawn from the seed by default, as many targets are."
-)
+GOAL_HELP = "Where to go, in space x,y,z[,roll,pitch,yaw]; drawn from the seed by default."
 START_HELP = "Where to begin, in space x,y,z[,roll,pitch,yaw]; drawn from the seed by default."
 GOALS_HELP = "Goals one after another, or a path to follow: a name from `fulmar list goals`, or a .yaml file."
 ESTIMATOR_HELP = "Estimate odometry from poses and inertial readings: a name from configs/estimators."
