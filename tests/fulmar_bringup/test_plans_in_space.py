@@ -74,6 +74,10 @@ def test_a_box_reaches_the_controller(plan):
         ({"goal": (0.0, 0.0, 30.0), "start": (0.0, 0.0, 0.0)}, "start and goal are 30.0 m apart"),
         ({"goal": (0.0, 0.0, 2000.0)}, "z = 2000 m lies 2,000 m from the origin"),
         ({"goal": (0.0, math.inf, 0.0)}, "must be finite"),
+        (
+            {"guards": {"estimator": "mocap_imu"}},
+            "estimator 'mocap_imu' is of motion in the plane, and robot",
+        ),
         ({"task": "go_to_pose"}, "task 'go_to_pose' is about motion in the plane"),
         ({"robot": "floating_platform"}, "task 'go_to_pose_3d' is about motion in space"),
         (

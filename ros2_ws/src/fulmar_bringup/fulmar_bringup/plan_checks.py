@@ -20,7 +20,7 @@ from fulmar_bringup.system import (
 from fulmar_core.bundle_signature import verify_bundle
 from fulmar_core.controllers.classical import has_law
 from fulmar_core.errors import BundleError, ConfigError, UnknownNameError
-from fulmar_core.estimation.kinds import load_estimator
+from fulmar_core.estimation.kinds import check_estimator
 from fulmar_core.goal import Goal, PoseTuple
 from fulmar_core.own_class import is_own
 from fulmar_core.paths import config_names
@@ -219,7 +219,7 @@ def checked_guards(usual: Guards, asked: Mapping[str, Any], robot: Robot, task: 
     if guards.fallback:
         controller_entry(guards.fallback).check(robot, task)
     if guards.estimator:
-        load_estimator(guards.estimator)
+        check_estimator(guards.estimator, robot)
     return guards
 
 
