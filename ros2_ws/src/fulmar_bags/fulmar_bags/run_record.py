@@ -40,7 +40,7 @@ class Motion:
     position: np.ndarray  # (n, 3) in the world [m]
     quat_xyzw: np.ndarray  # (n, 4) [-]
     velocity_in_world: np.ndarray  # (n, 3) [m/s]
-    turn_rate: np.ndarray  # (n, 3) about the body's axes [rad/s]
+    angular_velocity_in_body: np.ndarray  # (n, 3) [rad/s]
 
     def __len__(self) -> int:
         """Number of samples."""
@@ -54,7 +54,9 @@ class Motion:
     @property
     def states(self) -> RigidBodyState:
         """The same as a batch of states."""
-        return RigidBodyState(self.position, self.quat_xyzw, self.velocity_in_world, self.turn_rate)
+        return RigidBodyState(
+            self.position, self.quat_xyzw, self.velocity_in_world, self.angular_velocity_in_body
+        )
 
 
 @dataclass(frozen=True)
@@ -243,7 +245,7 @@ def _motion(found: Odometries) -> Motion:
         position=found.pose[:, :3],
         quat_xyzw=quat,
         velocity_in_world=rotate(quat, found.twist[:, :3]),
-        turn_rate=found.twist[:, 3:],
+        angular_velocity_in_body=found.twist[:, 3:],
     )
 
 

@@ -200,7 +200,7 @@ def last_beliefs(record: RunRecord) -> str:
 FIGURE_TEXTS = {
     "final_position_error_m": "{:.3f} m off",
     "final_heading_error_deg": "{:.1f}° off",
-    "final_attitude_error_deg": "{:.1f}° off",
+    "final_attitude_error_deg": "attitude {:.1f}° off",
     "goals_reached": "{:.0f} targets reached",
     "velocity_error_m_s": "velocity {:.3f} m/s off",
     "yaw_rate_error_deg_s": "turn rate {:.1f}°/s off",
