@@ -52,6 +52,14 @@ def test_valves_push_where_the_hand_points(name):
     assert torque[2] > 0.1
 
 
+@given(st.tuples(*[st.floats(-1.0, 1.0)] * 3))
+def test_a_hand_in_space_opens_no_valve_that_pushes_out_of_its_plane(parts):
+    """With one pressure line for all, such a valve would only be opened to take thrust from the others."""
+    craft = load_robot("spacecraft_16")
+    force, torque = craft.actuators.wrench_in_body(hand_mapping(craft)(Wish(*parts)))
+    assert [force[2], *torque[:2]] == pytest.approx([0.0, 0.0, 0.0], abs=1e-9)
+
+
 def test_a_boat_turns_left_with_its_right_propeller():
     left, right = hand_mapping(load_robot("kingfisher"))(Wish(turn=0.6))
     assert right > 0.0 > left

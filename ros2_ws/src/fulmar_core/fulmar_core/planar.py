@@ -85,8 +85,9 @@ class PlanarState(State):
     @classmethod
     def target_at(cls, numbers: Sequence[float]) -> np.ndarray:
         """x, y and heading, shape (3,); without a heading it is 0."""
-        x, y, *heading = numbers
-        return np.array([x, y, math.radians(heading[0]) if heading else 0.0])
+        x, y, *angles = numbers
+        (heading,) = angles or (0.0,)
+        return np.array([x, y, math.radians(heading)])
 
     @classmethod
     def written(cls, target: Array) -> tuple[float, ...]:

@@ -104,8 +104,9 @@ class SpatialState(State):
     @classmethod
     def target_at(cls, numbers: Sequence[float]) -> np.ndarray:
         """Place and attitude, shape (7,); without angles the body's axes are those of the world."""
-        place, angles = numbers[:3], np.deg2rad(numbers[3:] or (0.0, 0.0, 0.0))
-        return np.array([*place, *from_euler(*angles)])
+        x, y, z, *angles = numbers
+        roll, pitch, yaw = np.deg2rad(angles or (0.0, 0.0, 0.0))
+        return np.array([x, y, z, *from_euler(roll, pitch, yaw)])
 
     @classmethod
     def written(cls, target: Array) -> tuple[float, ...]:

@@ -90,7 +90,11 @@ class State(ABC):
     @classmethod
     @abstractmethod
     def target_at(cls, numbers: Sequence[float]) -> np.ndarray:
-        """The target that people write as `NUMBERS`, or as a place alone, which has no angles [m, deg]."""
+        """The target that people write as `NUMBERS`, or as a place alone, which has no angles [m, deg].
+
+        Raises:
+            ValueError: There are more or fewer numbers.
+        """
 
     @classmethod
     @abstractmethod
