@@ -39,6 +39,13 @@ def test_a_pose_is_written_as_it_was_read(form: type[State], numbers):
     assert not resting.to_rigid().angular_velocity_in_body.any()
 
 
+@pytest.mark.parametrize("numbers", [(1.0,), (1.0, 2.0, 3.0, 4.0), (1.0,) * 7])
+def test_another_count_of_numbers_is_no_pose(numbers):
+    for form in (PlanarState, SpatialState):
+        with pytest.raises(ValueError, match="unpack"):
+            form.target_at(numbers)
+
+
 def test_yaw_turns_about_z_after_roll_about_x():
     """REP-103: a craft that rolled by 90 deg and yawed by 90 deg looks along y, and its left side points up."""
     turned = SpatialState.target_at((0.0, 0.0, 0.0, 90.0, 0.0, 90.0))
