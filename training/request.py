@@ -119,7 +119,9 @@ def _new(request: TrainingRequest) -> dict[str, Any]:
     out = request.out or Path("runs/train") / f"{time.strftime('%Y%m%d_%H%M%S')}_{robot}_{task}_{last}"
     if out.is_dir() and any(out.iterdir()):
         raise ConfigError(f"{out} is not empty; nothing recorded is overwritten. Give --out another folder.")
-    settings = load_training_settings(load_robot(robot), load_task(task), request.settings)
+    the_robot, the_task = load_robot(robot), load_task(task)
+    the_task.check(the_robot)
+    settings = load_training_settings(the_robot, the_task, request.settings)
     return {"robot": robot, "task": task, "seed": request.seed, "settings": settings, "out": out}
 
 

@@ -110,7 +110,21 @@ def test_every_kind_of_path_can_be_written_down(read, kind):
     [
         ("kind: position\ntitle: t\n", 1, "Did you mean 'positions'?"),
         ("kind: positions\ntitle: t\npositions: []\n", 1, "'positions' must have at least one entry."),
-        ("kind: poses\ntitle: t\nposes: [[1, 2]]\n", 3, "entry 1 has 2 entries, 3 are needed."),
+        (
+            "kind: poses\ntitle: t\nposes: [[1, 2]]\n",
+            1,
+            "every entry of 'poses' must have 3 numbers, or 6 in space, all the same.",
+        ),
+        (
+            "kind: positions\ntitle: t\npositions: [[1, 2], [1, 2, 3]]\n",
+            1,
+            "every entry of 'positions' must have 2 numbers, or 3 in space, all the same.",
+        ),
+        (
+            "kind: velocities\ntitle: t\nvelocities:\n- {velocity: [0, 0], hold_s: 1}\n",
+            1,
+            "every entry of 'velocities' must have 3 numbers, or 6 in space, all the same.",
+        ),
         ("kind: poses\ntitle: t\nposes: []\n", 1, "'poses' must have at least one entry."),
         ("kind: velocities\ntitle: t\nvelocities: []\n", 1, "'velocities' must have at least one entry."),
         (

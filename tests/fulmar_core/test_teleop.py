@@ -26,6 +26,8 @@ from fulmar_core.teleop import (
 ROBOTS = pytest.mark.parametrize(
     "robot", [load_robot(name) for name in config_names("robots")], ids=lambda r: r.name
 )
+CRAFT = load_robot("spacecraft_16")
+BY_HAND = hand_mapping(CRAFT)
 AXES, HELD, LET_GO = [0.0, 1.0, 0.0, 0.0], [0, 0, 0, 0, 1, 0], [0, 0, 0, 0, 0, 0]
 
 
@@ -50,6 +52,13 @@ def test_valves_push_where_the_hand_points(name):
         assert sign * force[axis] > 0.3
     _, torque = thrusters.wrench_in_body(hand_mapping(load_robot(name))(Wish(turn=1.0)))
     assert torque[2] > 0.1
+
+
+@given(st.tuples(*[st.floats(-1.0, 1.0)] * 3))
+def test_a_hand_in_space_opens_no_valve_that_pushes_out_of_its_plane(parts):
+    """With one pressure line for all, such a valve would only be opened to take thrust from the others."""
+    force, torque = CRAFT.actuators.wrench_in_body(BY_HAND(Wish(*parts)))
+    assert [force[2], *torque[:2]] == pytest.approx([0.0, 0.0, 0.0], abs=1e-9)
 
 
 def test_a_boat_turns_left_with_its_right_propeller():

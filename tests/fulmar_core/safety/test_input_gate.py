@@ -166,3 +166,12 @@ def test_an_unbelievable_measurement_begins_no_epoch():
     gate.problem(measurement(1))
     assert "map" in (gate.problem(measurement(3600 * SECOND, frame="map")) or "")
     assert gate.epoch == 0
+
+
+@pytest.mark.parametrize("rate", [(7.0, 0.0, 0.0), (0.0, -6.1, 0.0), (4.0, 4.0, 4.0)])
+def test_what_turns_freely_must_not_tumble_faster_about_any_axis(rate):
+    tumbling = measurement(state=state(angular_velocity_in_body=np.array(rate)))
+    reason = InputGate(LIMITS, turns_freely=True).problem(tumbling)
+    assert reason == f"odom turn rate {np.linalg.norm(rate):.2f} rad/s is beyond the possible 6 rad/s"
+    slower = measurement(state=state(angular_velocity_in_body=np.array(rate) * 6.0 / 7.0))
+    assert InputGate(LIMITS, turns_freely=True).problem(slower) is None

@@ -16,10 +16,10 @@ from fulmar_bags.wire_reader import ABSENT, Received, WireReader
 from fulmar_core.controller_settings import ControllerSettings
 from fulmar_core.errors import BagError, ConfigError
 from fulmar_core.goal import PoseTuple
-from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.robot_name import Frames
 from fulmar_core.safety.geofence import NO_AREA
+from fulmar_core.state import State
 from fulmar_core.tasks import Task, load_recorded_task, load_task
 from fulmar_core.topics import (
     ACTION,
@@ -98,7 +98,7 @@ def control_steps_of(
         bag: The bag.
         robot: Whose it is; by default the bag says it.
         task: What was to be done; by default the bag says it.
-        goal: x [m], y [m], heading [deg], where the bag holds no goal.
+        goal: As `State.NUMBERS` [m, deg], where the bag holds no goal.
         control_hz: Command rate, where the bag does not say it [Hz].
         odometry: Topic, where there are several.
 
@@ -150,7 +150,9 @@ def control_steps_of(
         acted=shown != ABSENT if len(observations) else np.ones(len(steps), dtype=bool),
         odometry=seen,
         sample=_first_of(seen.stamp_ns, stamp_ns),
-        goals=tuple(reader.goals(the_task)) if goal is None else (_given(goal, int(log_ns[0])),),
+        goals=tuple(reader.goals(the_task))
+        if goal is None
+        else (_given(goal, the_task.state_type, int(log_ns[0])),),
         obstacles=reader.obstacles(),
         things=reader.things(the_task),
         presses=estop_messages(reader),
@@ -169,7 +171,7 @@ def _settings(
     guards, recording = info.get("guards") or {}, info.get("recording")
     hz, rate = control_hz or bag.number("control_hz", 0.0), bag.number("rate", 1.0)
     try:
-        x_min, x_max, y_min, y_max = (float(side) for side in guards.get("area") or NO_AREA)
+        area = tuple(float(side) for side in guards.get("area") or NO_AREA)
         max_run_time_s = float(guards.get("max_run_time_s") or 0.0)
         in_parts = isinstance(recording, Mapping) and recording.get("mode") in ("ring", "goals")
         if max_run_time_s and in_parts:
@@ -185,7 +187,7 @@ def _settings(
             fallback=str(guards.get("fallback") or ""),
             estop=bool(guards.get("estop")),
             max_run_time_s=max_run_time_s,
-            area=(x_min, x_max, y_min, y_max),
+            area=area,
         )
     except (AttributeError, TypeError, ValueError) as error:
         raise BagError(
@@ -318,10 +320,17 @@ def _first_of(stamps: np.ndarray, wanted: np.ndarray) -> np.ndarray:
     return np.array([first.get(stamp, ABSENT) for stamp in wanted.tolist()])
 
 
-def _given(pose: PoseTuple, log_ns: int) -> Received:
-    """A goal in the place of those in the bag."""
-    target = np.array((pose[0], pose[1], float(np.deg2rad(pose[2]))))
-    return Received(log_ns, 0, PlanarState.rigid_targets(target, twists=False)[None])
+def _given(pose: PoseTuple, form: type[State], log_ns: int) -> Received:
+    """A goal in the place of those in the bag, as `form` writes poses.
+
+    Raises:
+        ConfigError: It has not as many numbers.
+    """
+    if len(pose) != len(form.NUMBERS):
+        raise ConfigError(
+            f"--goal has {len(pose)} numbers; a pose in {form.WORLD} is {','.join(form.NUMBERS)} in m and degrees."
+        )
+    return Received(log_ns, 0, form.rigid_targets(form.target_at(pose), twists=False)[None])
 
 
 def answers_within(steps_ns: np.ndarray, commands_ns: np.ndarray) -> np.ndarray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,12 +15,42 @@ from fulmar_core.goal import PoseTuple
 from fulmar_core.goal_files import FollowedPath, GoalFile, Poses, Positions, Velocities, load_goals
 from fulmar_core.goal_sequence import goal_sequence
 from fulmar_core.paths import config_path
+from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot, load_robot
+from fulmar_core.spatial import SpatialState
+from fulmar_core.state import State
 from fulmar_core.tasks import Task, load_task
 from policy_server.controllers import CONTROLLERS, shipped_policy
 
 POSE, POSITION = "go_to_pose", "go_to_position"
-OPTIONS = {POSE: "--goal x,y,deg", POSITION: "--goal x,y"}
+SUFFIX = {PlanarState: "", SpatialState: "_3d"}  # of the names of tasks, by what their robots move in
+
+
+def goal_options(form: type[State]) -> dict[str, str]:
+    """What to say for a pose and for a position, by the names of the tasks."""
+    pose, place = ",".join(form.NUMBERS), ",".join(form.NUMBERS[: form.AXES])
+    return {POSE + SUFFIX[form]: f"--goal {pose}", POSITION + SUFFIX[form]: f"--goal {place}"}
+
+
+def whole_pose(numbers: Sequence[float], robot: Robot, option: str) -> PoseTuple:
+    """A pose as people write it, with angles of 0 where there are none.
+
+    Args:
+        numbers: A place [m], or a pose [m, deg].
+        robot: Whose pose it is.
+        option: What gave it.
+
+    Raises:
+        ConfigError: So many numbers are neither, for such a robot.
+    """
+    form = robot.state_type
+    if len(numbers) not in (form.AXES, len(form.NUMBERS)):
+        given = ",".join(f"{number:g}" for number in numbers)
+        raise ConfigError(
+            f"{option} = '{given}' has {len(numbers)} numbers; '{robot.name}' moves in {form.WORLD}: "
+            f"{','.join(form.NUMBERS[: form.AXES])} [m] or {','.join(form.NUMBERS)} [m, deg]."
+        )
+    return (*numbers, *[0.0] * (len(form.NUMBERS) - len(numbers)))
 
 
 def task_of_run(
@@ -39,13 +70,15 @@ def task_of_run(
         robot: Name of the robot.
         controller: Name of the controller.
         backend: Name of the backend.
-        goal: x [m], y [m] and, for a pose, heading [deg].
+        goal: A place [m] or a pose [m, deg], as `State.NUMBERS`.
         goals: Name or path of a goal file; without a task it decides.
         policy: Bundle that was given.
 
     Raises:
-        ConfigError: As of `default_task` and `check_heading`.
+        ConfigError: As of `default_task`, `whole_pose` and `check_heading`.
     """
+    if goal is not None:
+        whole_pose(goal, load_robot(robot), "--goal")
     if task is not None:
         return task, "" if goal is None else check_heading(task, goal)
     if goals:
@@ -61,23 +94,25 @@ def default_task(
     goal: tuple[float, ...] | None = None,
     policy: Path | None = None,
 ) -> str:
-    """Name of the task that a goal asks for: two numbers are a position, three a pose; without a goal it is a pose.
+    """Name of the task that a goal asks for: a place is a position, with angles it is a pose, as without a goal.
 
-    The goal is x [m], y [m] and, for a pose, heading [deg]; a bundle that was given is checked later.
+    The goal is as `State.NUMBERS` of the robot; a bundle that was given is checked later.
 
     Raises:
         ConfigError: The controller does not do that task with this robot, but another one; with what to say instead.
     """
     if backend == "hardware":
         default_hardware(robot)
-    asked = POSITION if goal is not None and len(goal) == 2 else POSE
+    form = load_robot(robot).state_type
+    pose, position = (name + SUFFIX[form] for name in (POSE, POSITION))
+    asked = position if goal is not None and len(goal) == form.AXES else pose
     reason = why_not(robot, asked, controller, policy)
     if not reason:
         return asked
-    other = POSE if asked == POSITION else POSITION
+    other = pose if asked == position else position
     instead = []
     if not why_not(robot, other, controller, policy):
-        instead.append(f"--task {other} or {OPTIONS[other]}")
+        instead.append(f"--task {other} or {goal_options(form)[other]}")
     if controller != "classical" and not why_not(robot, asked, "classical", None):
         instead.append("--controller classical")
     if not instead:
@@ -101,20 +136,28 @@ def why_not(robot: str, task: str, controller: str, policy: Path | None) -> str:
 
 
 def check_heading(task: str, goal: tuple[float, ...]) -> str:
-    """Warning about a heading that a named task does not use; empty if there is none.
+    """Warning about a heading or attitude that a named task does not use; empty if there is none.
 
     Raises:
-        ConfigError: The task needs a heading, and the goal has none.
+        ConfigError: The task needs one, and the goal has none.
     """
-    wants = load_task(task).goal_topic
-    if len(goal) == 2 and wants == "goal_pose":
-        raise ConfigError(f"task '{task}' needs a heading: --goal x,y,deg. Or use --task {POSITION}.")
-    if len(goal) == 3 and wants == "goal_point":
-        return f"task '{task}' has no heading: the {goal[2]:g} deg of --goal have no effect"
+    found = load_task(task)
+    wants, form = found.goal_topic, found.state_type
+    what = "heading" if form is PlanarState else "attitude"
+    angles = goal[form.AXES :]
+    if not angles and wants == "goal_pose":
+        usual = POSITION + SUFFIX[form]
+        raise ConfigError(
+            f"task '{task}' needs a{'n' if what == 'attitude' else ''} {what}: --goal {','.join(form.NUMBERS)}. "
+            f"Or use --task {usual}."
+        )
+    if angles and wants == "goal_point":
+        given = ", ".join(f"{angle:g}" for angle in angles)
+        return f"task '{task}' has no {what}: the {given} deg of --goal have no effect"
     return ""
 
 
-DEFAULT_TASKS = {Positions: "go_to_position", Poses: "go_to_pose"}  # all others are about velocities
+DEFAULT_TASKS = {Positions: POSITION, Poses: POSE}  # all others are about velocities
 SHOWN = 400  # points of a path that a record carries along
 SPARE_S = 5.0  # after everything is done, to see that it stays so
 
@@ -125,7 +168,8 @@ def task_of_goals(goals: str) -> str:
     Raises:
         ConfigError: Unknown name, or a mistake in the file.
     """
-    return DEFAULT_TASKS.get(type(load_goals(goals)), "track_velocities")
+    file = load_goals(goals)
+    return DEFAULT_TASKS.get(type(file), "track_velocities") + SUFFIX[file.form]
 
 
 def goal_path(goals: str) -> Path:
@@ -147,7 +191,8 @@ def checked_goals(goals: str, robot: Robot, task: Task) -> GoalFile:
     file = load_goals(goals)
     as_path = is_path_of_places(task) and isinstance(file, Positions | Poses)
     fits = goal_sequence(file, robot, as_path=as_path).topic == task.goal_topic
-    fits &= not (isinstance(file, Positions) and task.tolerance.heading_deg > 0.0)
+    turns = task.tolerance.heading_deg + task.tolerance.attitude_deg
+    fits &= task.state_type is file.form and not (isinstance(file, Positions) and turns > 0.0)
     if not fits or task.sees_obstacles or task.things:  # whose surroundings the seed draws
         raise ConfigError(
             f"the goals '{goals}' are no goals of task '{task.name}'. "
@@ -167,8 +212,9 @@ def check_pace(file: GoalFile, goals: str, robot: Robot) -> None:
         ahead, sideways = file.speed, 0.0
     elif isinstance(file, Velocities):
         targets = file.targets()
-        _check_turning(targets, goals, robot)
-        ahead = float(np.linalg.norm(targets[:, :2], axis=1).max())
+        axes = file.form.AXES
+        _check_turning(targets[:, axes:], targets[:, 0], goals, robot)
+        ahead = float(np.linalg.norm(targets[:, :axes], axis=1).max())
         sideways = float(np.abs(targets[:, 1]).max())
     else:
         return
@@ -183,10 +229,10 @@ def check_pace(file: GoalFile, goals: str, robot: Robot) -> None:
         )
 
 
-def _check_turning(targets: np.ndarray, goals: str, robot: Robot) -> None:
-    """The same of turn rates; targets of shape (n, 3)."""
+def _check_turning(turns: np.ndarray, ahead: np.ndarray, goals: str, robot: Robot) -> None:
+    """The same of turn rates, shape (n, 1 or 3) [rad/s], at speeds ahead, shape (n,) [m/s]."""
     most = robot.actuators.largest_yaw_rate or robot.limits.yaw_rate
-    asked = float(np.abs(targets[:, 2]).max())
+    asked = float(np.linalg.norm(turns, axis=1).max())
     if asked > most:
         raise ConfigError(
             f"the goals '{goals}' ask for {math.degrees(asked):g} deg/s; '{robot.name}' turns with at most "
@@ -194,9 +240,10 @@ def _check_turning(targets: np.ndarray, goals: str, robot: Robot) -> None:
         )
     curvature = robot.actuators.largest_curvature
     if curvature is not None:
-        tightest = np.abs(targets[:, 2]) - curvature * np.abs(targets[:, 0])
+        tightest = np.abs(turns[:, 0]) - curvature * np.abs(ahead)
         if tightest.max() > 1e-9:
-            speed, _, rate = targets[int(np.argmax(tightest))].tolist()
+            worst = int(np.argmax(tightest))
+            speed, rate = float(ahead[worst]), float(turns[worst, 0])
             raise ConfigError(
                 f"the goals '{goals}' ask for {math.degrees(rate):g} deg/s at {speed:g} m/s; '{robot.name}' turns in "
                 f"no circle of less than {1.0 / curvature:.2f} m."
@@ -204,12 +251,12 @@ def _check_turning(targets: np.ndarray, goals: str, robot: Robot) -> None:
 
 
 def first_targets(file: GoalFile) -> np.ndarray:
-    """Targets that the file begins with, shape (k, 3) as in `fulmar_core.goal.Goal`."""
+    """Targets that the file begins with, as in `fulmar_core.goal.Goal`."""
     return np.zeros((1, 3)) if isinstance(file, FollowedPath) else file.targets()
 
 
 def places_of(file: GoalFile) -> np.ndarray:
-    """Where a file leads, shape (n, 2 or 3), x and y first [m]; no place for velocities."""
+    """Where a file leads, as `geofence.unreachable` takes it; no place for velocities."""
     if isinstance(file, FollowedPath):
         return np.asarray(file.planner().points)
     return np.zeros((0, 3)) if isinstance(file, Velocities) else file.targets()
@@ -220,7 +267,7 @@ def start_of(file: GoalFile) -> PoseTuple | None:
     if isinstance(file, FollowedPath):
         (x, y), (next_x, next_y) = file.planner().points[:2].tolist()
         return x, y, math.degrees(math.atan2(next_y - y, next_x - x))
-    return (0.0, 0.0, 0.0) if isinstance(file, Velocities) else None
+    return (0.0,) * len(file.form.NUMBERS) if isinstance(file, Velocities) else None
 
 
 def duration_of(file: GoalFile, robot: Robot, start: PoseTuple) -> float:
@@ -231,7 +278,8 @@ def duration_of(file: GoalFile, robot: Robot, start: PoseTuple) -> float:
         planner = replace(file, loops=max(1, file.loops)).planner()
         length = planner.spacing * len(planner.points) * (planner.loops if planner.closed else 1)
         return 1.25 * length / file.speed + SPARE_S
-    places = np.concatenate((np.array([start[:2]]), file.targets()[:, :2]))
+    axes = file.form.AXES
+    places = np.concatenate((np.array([start[:axes]]), file.targets()[:, :axes]))
     ways = np.linalg.norm(np.diff(places, axis=0), axis=1)
     return float(np.sum(20.0 + 3.0 * ways / robot.performance.speed)) + SPARE_S
 

@@ -20,13 +20,13 @@ from fulmar_bringup.system import (
 from fulmar_core.bundle_signature import verify_bundle
 from fulmar_core.controllers.classical import has_law
 from fulmar_core.errors import BundleError, ConfigError, UnknownNameError
-from fulmar_core.estimation.kinds import load_estimator
+from fulmar_core.estimation.kinds import check_estimator
 from fulmar_core.goal import Goal, PoseTuple
 from fulmar_core.own_class import is_own
 from fulmar_core.paths import config_names
 from fulmar_core.policy_bundle import check_fit, check_folder, read_bundle, read_passport
 from fulmar_core.robot import Robot
-from fulmar_core.safety.geofence import NO_AREA
+from fulmar_core.safety.geofence import NO_AREA, check_area_of
 from fulmar_core.safety.watchdog import default_timeout
 from fulmar_core.tasks import Task
 from fulmar_core.topics import COMMAND, MOCAP, SENSOR_WIRES, TRUTH, VELOCITY_COMMAND
@@ -209,16 +209,17 @@ def checked_guards(usual: Guards, asked: Mapping[str, Any], robot: Robot, task: 
     """The usual guards with what was asked for, if they can do what they are for.
 
     Raises:
-        ConfigError: A fallback that has nothing for the pair, or no such estimator.
+        ConfigError: A fallback that has nothing for the pair, no such estimator, or an area of the other space.
     """
     fallback = asked.get("fallback")
     if fallback is not None and fallback not in FALLBACKS:
         raise UnknownNameError("fallback", fallback, FALLBACKS)
     guards = replace(usual, **asked)
+    check_area_of(robot, guards.area)
     if guards.fallback:
         controller_entry(guards.fallback).check(robot, task)
     if guards.estimator:
-        load_estimator(guards.estimator)
+        check_estimator(guards.estimator, robot)
     return guards
 
 
@@ -226,7 +227,8 @@ def check_distance(robot: Robot, task: Task, mission: Goal, start: PoseTuple) ->
     """Raise ConfigError for a start beyond the geofence around the first target, or targets as far from each other."""
     if task.goal_topic == "goal_velocity":
         return
-    places = [np.asarray(start[:2]), *mission.targets[:, :2]]
+    axes = task.state_type.AXES
+    places = [np.asarray(start[:axes]), *mission.targets[:, :axes]]
     for number, (here, there) in enumerate(itertools.pairwise(places)):
         distance = math.dist(here, there)
         if distance > robot.limits.geofence:

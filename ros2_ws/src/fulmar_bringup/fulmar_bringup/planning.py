@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, cast
 
-import numpy as np
-
-from fulmar_bringup.goal_plan import checked_goals, duration_of, first_targets, goal_path, places_of, start_of
+from fulmar_bringup.goal_plan import (
+    checked_goals,
+    duration_of,
+    first_targets,
+    goal_path,
+    places_of,
+    start_of,
+    whole_pose,
+)
 from fulmar_bringup.plan_checks import (
     adapter_path,
     check_arming,
@@ -41,7 +46,6 @@ from fulmar_core.episode import draw_episode
 from fulmar_core.errors import ConfigError, UnknownNameError
 from fulmar_core.goal import Goal, PoseTuple
 from fulmar_core.goal_files import GoalFile
-from fulmar_core.planar import PlanarState, wrapped
 from fulmar_core.recording import MODES, Mode, Recording
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.robot_name import checked_name
@@ -105,7 +109,8 @@ def plan_run(
         controller: Name of the controller.
         backend: Name of the backend.
         policy: Bundle; the shipped one by default.
-        goal: x [m], y [m], heading [deg]; drawn from the seed by default, always so for tasks with other goals.
+        goal: As `State.NUMBERS` of the robot, angles are 0 by default [m, deg]; drawn from the seed by default, always
+            so for tasks with other goals.
         start: Same; by default as far from the goal as the seed's episode begins. With obstacles, these and the start
             stay where the seed has put them.
         duration_s: Simulated time; the task's episode by default [s].
@@ -145,6 +150,8 @@ def plan_run(
     check_arming(hardware, arm=arm)
     check_finite(goal=goal, start=start, duration=duration_s, rate=rate)
     the_robot, the_task = load_robot(robot), load_task(task)
+    goal = goal and whole_pose(goal, the_robot, "--goal")
+    start = start and whole_pose(start, the_robot, "--start")
     hz = checked_rate(the_robot, control_hz or default_control_hz(robot, task, controller, backend))
     if not lockstep:
         check_beat(hz, rate)
@@ -159,7 +166,8 @@ def plan_run(
             f"{record} exists already; nothing recorded is overwritten. Give --record another folder."
         )
     if hardware and not emulate:
-        start = start or (0.0, 0.0, 0.0)  # where a robot stands is where its odometry begins
+        # Where a robot stands is where its odometry begins.
+        start = start or whole_pose((0.0,) * the_robot.state_type.AXES, the_robot, "--start")
         if goal is None and goals is None and not goals_later:
             raise ConfigError("a real robot goes nowhere by chance: say where with --goal or --goals.")
     if goals is not None and goal is not None:
@@ -217,7 +225,7 @@ def plan_run(
         adapter_topic=topic or "",
         nodes=nodes,
     )
-    goal = goal or (_pose_of(mission.current) if the_task.goal_topic in PLACES else None)
+    goal = goal or (the_task.state_type.written(mission.current) if the_task.goal_topic in PLACES else None)
     return RunRequest(plan, goal, record, command, mission)
 
 
@@ -255,7 +263,7 @@ def _placed(
         ConfigError: What was given is outside, or no draw is inside.
     """
     if goal is not None:
-        check_places("the goal", [goal], area)
+        check_places("the goal", [goal], area)  # numbers of a pose, of which a place is at the front
     if start is not None and checks_start:
         check_places("the start", [start], area)
     fixed = start_of(file) if file is not None else None
@@ -263,7 +271,7 @@ def _placed(
         check_places("the start of these goals", [fixed], area)
     for number in range(DRAWS):
         episode = draw_episode(robot, task, scenario, seed=seed, number=number)
-        mission, drawn = episode.goal, _pose_of_state(episode.start)
+        mission, drawn = episode.goal, task.state_type.written(episode.start.pose)
         if file is not None:
             mission, drawn = _from_file(file, mission, drawn)
         elif goal is not None:
@@ -284,8 +292,9 @@ def _from_file(file: GoalFile, drawn: Goal, start: PoseTuple) -> tuple[Goal, Pos
     fixed = start_of(file)
     if fixed is not None:
         return mission, fixed
-    x, y = (float(new - old) for new, old in zip(mission.current[:2], drawn.current[:2], strict=True))
-    return mission, (start[0] + x, start[1] + y, start[2])
+    axes = file.form.AXES
+    way = (mission.current[:axes] - drawn.current[:axes]).tolist()
+    return mission, (*(s + w for s, w in zip(start, way, strict=False)), *start[axes:])
 
 
 def _moved(task: Task, mission: Goal, start: PoseTuple, goal: PoseTuple) -> tuple[Goal, PoseTuple]:
@@ -299,12 +308,11 @@ def _moved(task: Task, mission: Goal, start: PoseTuple, goal: PoseTuple) -> tupl
             f"the targets of task '{task.name}' do not fit into one --goal. Leave it out: --seed draws them. "
             "Or publish your own while a system runs."
         )
-    x, y, heading = goal
-    target = np.array([[x, y, math.radians(heading)]])
+    form, old = task.state_type, mission.current.tolist()
     if not (mission.obstacles.size or task.things):
-        old = mission.current
-        start = (x + start[0] - float(old[0]), y + start[1] - float(old[1]), start[2])
-    return replace(mission, targets=target), start
+        place = (g + s - o for g, s, o in zip(goal[: form.AXES], start, old, strict=False))
+        start = (*place, *start[form.AXES :])
+    return replace(mission, targets=form.target_at(goal)[None]), start
 
 
 def chosen_recording(usual: Recording, mode: str | None) -> Recording:
@@ -342,11 +350,3 @@ def _recording_of_run(controller: str, backend: str, mode: str | None) -> Record
     if chosen.mode == "goals":
         raise ConfigError("a run has one bag: --recording goals is for `fulmar up`. Leave it out.")
     return chosen
-
-
-def _pose_of_state(state: PlanarState) -> PoseTuple:
-    return _pose_of(np.array([state.x, state.y, state.yaw]))
-
-
-def _pose_of(target: np.ndarray) -> PoseTuple:
-    return float(target[0]), float(target[1]), math.degrees(float(wrapped(np.asarray(target[2]))))

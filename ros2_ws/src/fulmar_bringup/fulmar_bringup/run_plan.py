@@ -52,7 +52,7 @@ class RunPlan:
     policy: str = ""  # folder of a bundle; empty: the shipped one
     scenario: str = "nominal"
     seed: int = 0
-    start: tuple[float, float, float] = (0.0, 0.0, 0.0)  # x [m], y [m], heading [deg]
+    start: tuple[float, ...] = (0.0, 0.0, 0.0)  # as `State.NUMBERS`, or a place alone [m, deg]
     duration_s: float = 0.0  # 0: until stopped [s]
     lockstep: bool = False
     rate: float = 1.0  # simulated seconds a wall-clock second

@@ -28,6 +28,7 @@ from fulmar_bringup.system_events import Emit, SystemEvents, distance_of, mode_o
 from fulmar_bringup.system_rows import own_nodes
 from fulmar_core.errors import ConfigError, RunFailed
 from fulmar_core.goal import PoseTuple
+from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 from fulmar_core.topics import SIMULATION_START_NS
 from policy_server.controllers import controller_entry
@@ -77,7 +78,7 @@ def plan_system(
         backend=system.backend,
         policy=policy,
         goal=None,
-        start=start or (0.0, 0.0, 0.0),
+        start=start or (0.0,) * load_robot(system.robot).state_type.AXES,
         duration_s=None,
         lockstep=False,
         rate=rate,

@@ -33,7 +33,7 @@ class Guards:
     fallback: str | None = None  # classical controller that takes over from a policy that is refused
     trusted_keys: str | None = None  # file or folder of public keys: only bundles that one of them has signed
     max_run_time_s: float = 0.0  # 0: none [s]
-    area: tuple[float, float, float, float] = NO_AREA  # x_min, x_max, y_min, y_max [m]
+    area: tuple[float, ...] = NO_AREA  # x_min, x_max, y_min, y_max, in space also z_min, z_max [m]
 
     def __post_init__(self) -> None:
         """Refuse what has no meaning."""

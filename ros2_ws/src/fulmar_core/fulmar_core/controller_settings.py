@@ -10,6 +10,7 @@ from fulmar_core.safety.arbiter import Flags
 from fulmar_core.safety.geofence import NO_AREA, check_area
 from fulmar_core.safety.input_gate import FROZEN_AFTER, JUMP_M, InputGate
 from fulmar_core.safety.watchdog import default_timeout
+from fulmar_core.spatial import SpatialState
 
 MOST_COPIES = 3
 POLICY = "policy"  # the controller that runs a bundle, which another one may follow while the node runs
@@ -35,8 +36,8 @@ class ControllerSettings:
     trusted_keys: str = ""  # file or folder of public keys: no bundle runs that none of them has signed
     estop: bool = False  # nothing moves before an e-stop message is received
     max_run_time_s: float = 0.0  # of acting, in the robot's own time; 0: for ever [s]
-    # x_min, x_max, y_min, y_max that the robot must not leave [m].
-    area: tuple[float, float, float, float] = NO_AREA
+    # x_min, x_max, y_min, y_max that the robot must not leave, in space also z_min, z_max [m].
+    area: tuple[float, ...] = NO_AREA
     overruns_to_stop: int = 25  # beats in a row, each late by a whole period, before it is a fault; 0: never
     odometry_may_repeat: bool = False  # to the last bit, while the robot stands: that of encoders does
     air_bearing: bool = False  # wait for `air_bearing/state`, as with a bearing in the robot's YAML
@@ -92,6 +93,11 @@ class ControllerSettings:
     def input_gate(self, robot: Robot) -> InputGate:
         """What lets measurements in; in lock step they may repeat themselves, and episodes begin anywhere."""
         if self.lockstep:
-            return InputGate(robot.limits, frozen_after=0)
+            return InputGate(robot.limits, frozen_after=0, turns_freely=robot.state_type is SpatialState)
         repeats = self.odometry_may_repeat or robot.sensors.odometry.position.std == 0.0
-        return InputGate(robot.limits, frozen_after=0 if repeats else FROZEN_AFTER, jump_m=JUMP_M)
+        return InputGate(
+            robot.limits,
+            frozen_after=0 if repeats else FROZEN_AFTER,
+            jump_m=JUMP_M,
+            turns_freely=robot.state_type is SpatialState,
+        )

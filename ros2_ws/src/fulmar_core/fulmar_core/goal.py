@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -12,7 +12,7 @@ from fulmar_core.arrays import array_namespace
 from fulmar_core.planar import PlanarState
 from fulmar_core.rotation import Array
 
-PoseTuple = tuple[float, float, float]  # x [m], y [m], heading [deg]
+PoseTuple = tuple[float, ...]  # as people write a pose: `State.NUMBERS` [m, deg]
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +78,7 @@ def no_obstacles(worlds: int, count: int = 0) -> np.ndarray:
     return np.zeros((worlds, count, 3))
 
 
-def goal_at(*targets: tuple[float, float, float], obstacles: np.ndarray | None = None) -> Goal:
+def goal_at(*targets: Sequence[float], obstacles: np.ndarray | None = None) -> Goal:
     """A goal without a batch axis.
 
     Args:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, cast
@@ -10,10 +11,30 @@ import numpy as np
 
 from fulmar_core.config import load_config
 from fulmar_core.paths import config_path
+from fulmar_core.planar import PlanarState
 from fulmar_core.references import ReferencePath
 from fulmar_core.references.look_ahead import LookAhead, follow
+from fulmar_core.spatial import SpatialState
+from fulmar_core.state import State
 
 _RADIANS = np.array([1.0, 1.0, np.pi / 180.0])  # of what is written as (length, length, degrees)
+_RADIANS_IN_SPACE = np.array([1.0, 1.0, 1.0, *[np.pi / 180.0] * 3])
+
+
+def _form_of(rows: Sequence[Sequence[float]], name: str, plane: int, space: int) -> type[State]:
+    """State type of what has so many numbers in each row; the name is that of the key in the file.
+
+    Raises:
+        ValueError: There is no row, or one has another length than the first, or a length of neither.
+    """
+    if not rows:
+        raise ValueError(f"'{name}' must have at least one entry.")
+    lengths = {len(row) for row in rows}
+    if lengths not in ({plane}, {space}):
+        raise ValueError(
+            f"every entry of '{name}' must have {plane} numbers, or {space} in space, all the same."
+        )
+    return PlanarState if lengths == {plane} else SpatialState
 
 
 @dataclass(frozen=True)
@@ -22,15 +43,19 @@ class Positions:
 
     kind: Literal["positions"]
     title: str
-    positions: tuple[tuple[float, float], ...]  # x, y in the world [m, m]
+    positions: tuple[tuple[float, ...], ...]  # x, y, in space also z, in the world [m]
 
     def __post_init__(self) -> None:
-        if not self.positions:
-            raise ValueError("'positions' must have at least one entry.")
+        _form_of(self.positions, "positions", 2, 3)
+
+    @property
+    def form(self) -> type[State]:
+        """State type of the robots and tasks that they are for."""
+        return _form_of(self.positions, "positions", 2, 3)
 
     def targets(self) -> np.ndarray:
-        """x, y and a heading of 0 that does not matter, shape (n, 3) [m, m, rad]."""
-        return np.array([(x, y, 0.0) for x, y in self.positions])
+        """As of `fulmar_core.goal.Goal`, with an attitude of 0 that does not matter, shape (n, 3 or 7)."""
+        return np.array([self.form.target_at(place) for place in self.positions])
 
 
 @dataclass(frozen=True)
@@ -39,22 +64,30 @@ class Poses:
 
     kind: Literal["poses"]
     title: str
-    poses: tuple[tuple[float, float, float], ...]  # x, y, heading in the world [m, m, deg]
+    # x, y, heading in the world [m, m, deg]; in space x, y, z [m], roll, pitch, yaw [deg]
+    poses: tuple[tuple[float, ...], ...]
 
     def __post_init__(self) -> None:
-        if not self.poses:
-            raise ValueError("'poses' must have at least one entry.")
+        _form_of(self.poses, "poses", 3, 6)
+
+    @property
+    def form(self) -> type[State]:
+        """State type of the robots and tasks that they are for."""
+        return _form_of(self.poses, "poses", 3, 6)
 
     def targets(self) -> np.ndarray:
-        """x, y and heading, shape (n, 3) [m, m, rad]."""
-        return np.asarray(np.array(self.poses) * _RADIANS)
+        """As of `fulmar_core.goal.Goal`, shape (n, 3 or 7)."""
+        if self.form is PlanarState:
+            return np.asarray(np.array(self.poses) * _RADIANS)
+        return np.array([self.form.target_at(pose) for pose in self.poses])
 
 
 @dataclass(frozen=True)
 class HeldVelocity:
     """One velocity for some time."""
 
-    velocity: tuple[float, float, float]  # ahead, to the left, turning, in the body frame [m/s, m/s, deg/s]
+    # ahead, to the left, turning, in the body frame [m/s, m/s, deg/s]; in space three of each [m/s, deg/s]
+    velocity: tuple[float, ...]
     hold_s: float  # [s]
 
     def __post_init__(self) -> None:
@@ -71,12 +104,17 @@ class Velocities:
     velocities: tuple[HeldVelocity, ...]
 
     def __post_init__(self) -> None:
-        if not self.velocities:
-            raise ValueError("'velocities' must have at least one entry.")
+        _form_of([held.velocity for held in self.velocities], "velocities", 3, 6)
+
+    @property
+    def form(self) -> type[State]:
+        """State type of the robots and tasks that they are for."""
+        return _form_of([held.velocity for held in self.velocities], "velocities", 3, 6)
 
     def targets(self) -> np.ndarray:
-        """Velocities in the body frame, shape (n, 3) [m/s, m/s, rad/s]."""
-        return np.asarray(np.array([held.velocity for held in self.velocities]) * _RADIANS)
+        """Velocities in the body frame, shape (n, 3) [m/s, m/s, rad/s]; in space (n, 6) [m/s, rad/s]."""
+        radians = _RADIANS if self.form is PlanarState else _RADIANS_IN_SPACE
+        return np.asarray(np.array([held.velocity for held in self.velocities]) * radians)
 
     def ends(self) -> np.ndarray:
         """Time at which each is over, shape (n,) [s]."""
@@ -106,6 +144,11 @@ class FollowedPath:
         if self.lead_s < 0.0:
             raise ValueError("'lead_s' must not be negative.")
 
+    @property
+    def form(self) -> type[State]:
+        """Paths lie in the plane."""
+        return PlanarState
+
     def planner(self) -> LookAhead:
         """What aims along the path."""
         return follow(self.path, speed=self.speed, look_ahead=self.look_ahead, loops=self.loops)
@@ -114,13 +157,20 @@ class FollowedPath:
 GoalFile = Positions | Poses | Velocities | FollowedPath
 
 
-def single_goal(place: tuple[float, ...]) -> Positions | Poses:
-    """One place x [m], y [m] and, for a pose, heading [deg], as a goal file would hold it."""
-    x, y, *heading = place
-    if not heading:
-        return Positions("positions", f"position x = {x:g} m, y = {y:g} m", ((x, y),))
-    title = f"pose x = {x:g} m, y = {y:g} m, heading = {heading[0]:g} deg"
-    return Poses("poses", title, ((x, y, heading[0]),))
+def single_goal(place: tuple[float, ...], form: type[State] = PlanarState) -> Positions | Poses:
+    """One place, as a goal file would hold it.
+
+    Args:
+        place: As `form` writes places and poses; without angles it is a position [m, deg].
+        form: State type of the robot.
+    """
+    axes, angles = place[: form.AXES], place[form.AXES :]
+    words = [f"{axis} = {value:g} m" for axis, value in zip(form.NUMBERS, axes, strict=False)]
+    if not angles:
+        return Positions("positions", f"position {', '.join(words)}", (axes,))
+    names = form.NUMBERS[form.AXES :] if form is SpatialState else ("heading",)
+    words += [f"{name} = {angle:g} deg" for name, angle in zip(names, angles, strict=True)]
+    return Poses("poses", f"pose {', '.join(words)}", (place,))
 
 
 def load_goals(name: str) -> GoalFile:

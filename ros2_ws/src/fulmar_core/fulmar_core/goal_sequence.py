@@ -14,17 +14,24 @@ from fulmar_core.goal_files import FollowedPath, GoalFile, Poses, Positions, Vel
 from fulmar_core.planar import PlanarState
 from fulmar_core.references.look_ahead import LookAhead, Progress, body_target, steered_target
 from fulmar_core.robot import Robot
+from fulmar_core.spatial import SpatialState
+from fulmar_core.state import State
 from fulmar_core.tasks import load_task
+from fulmar_core.tasks.space_terms import place_errors
 from fulmar_core.tasks.terms import Tolerance, pose_errors
 
 HOLD_S = 1.0  # within the tolerance for so long, a target is reached rather than passed
-STANDSTILL = goal_at((0.0, 0.0, 0.0))  # as a velocity
 
 
 class GoalSequence(Protocol):
     """Goals that follow each other; `step` is called with each state until it is done."""
 
     topic: str  # where the goals belong, one of `topics.GOAL_WIRES`
+    standstill: Goal  # of a robot that does not know where it is; the velocity 0 where goals are velocities
+
+    @property
+    def form(self) -> type[State]:
+        """Of the states that it takes, and of its targets."""
 
     @property
     def done(self) -> bool:
@@ -34,7 +41,7 @@ class GoalSequence(Protocol):
     def progress(self) -> str:
         """How far it has come, for people."""
 
-    def step(self, state: PlanarState, time_s: float) -> Goal:
+    def step(self, state: State, time_s: float) -> Goal:
         """Take a state.
 
         Args:
@@ -50,22 +57,29 @@ class Waypoints:
     """Positions or poses, each when the one before is reached, or all in one goal."""
 
     def __init__(
-        self, topic: str, targets: np.ndarray, tolerance: Tolerance, *, hold_s: float, at_once: bool
+        self, topic: str, file: Positions | Poses, tolerance: Tolerance, *, hold_s: float, at_once: bool
     ) -> None:
         """Begin with the first.
 
         Args:
             topic: Where the goals belong.
-            targets: x, y, yaw, shape (n, 3) [m, m, rad].
-            tolerance: Within which a target is reached; a heading of 0 does not count.
+            file: The targets.
+            tolerance: Within which a target is reached; a heading or attitude of 0 does not count.
             hold_s: How long a robot must stay there [s].
             at_once: Whether the goal has all targets; it then is done after one round.
         """
-        self.topic = topic
+        self.topic, self._form = topic, file.form
+        targets = file.targets()
         self._goals = [_goal(*targets)] if at_once else [_goal(target) for target in targets]
+        self.standstill = self._goals[0]
         self._targets, self._tolerance, self._hold_s = targets, tolerance, hold_s
         self._reached = 0
         self._inside_since: float | None = None
+
+    @property
+    def form(self) -> type[State]:
+        """State type of the file's goals."""
+        return self._form
 
     @property
     def done(self) -> bool:
@@ -77,18 +91,14 @@ class Waypoints:
         """How many are reached."""
         return f"{self._reached} of {len(self._targets)} targets reached"
 
-    def step(self, state: PlanarState, time_s: float) -> Goal:
+    def step(self, state: State, time_s: float) -> Goal:
         """The first target that is not reached, or all; see `GoalSequence.step`."""
         if not self.done:
             self._check(state, time_s)
         return self._goals[min(self._reached, len(self._goals) - 1)]
 
-    def _check(self, state: PlanarState, time_s: float) -> None:
-        errors = pose_errors(state, self._targets[self._reached], heading=True)
-        inside = float(errors.position) <= self._tolerance.position
-        if self._tolerance.heading_deg:
-            inside &= abs(math.degrees(float(errors.heading))) <= self._tolerance.heading_deg
-        if not inside:
+    def _check(self, state: State, time_s: float) -> None:
+        if not self._is_inside(state, self._targets[self._reached]):
             self._inside_since = None
             return
         if self._inside_since is None:
@@ -96,21 +106,35 @@ class Waypoints:
         if time_s - self._inside_since >= self._hold_s:
             self._reached, self._inside_since = self._reached + 1, None
 
+    def _is_inside(self, state: State, target: np.ndarray) -> bool:
+        """Whether a state lies within the tolerance of a target."""
+        if isinstance(state, SpatialState):
+            return bool(self._tolerance.holds(place_errors(state, target, attitude=True)))
+        assert isinstance(state, PlanarState)
+        errors = pose_errors(state, target, heading=True)
+        inside = float(errors.position) <= self._tolerance.position
+        if self._tolerance.heading_deg:
+            inside &= abs(math.degrees(float(errors.heading))) <= self._tolerance.heading_deg
+        return inside
+
 
 class Schedule:
     """Velocities by the clock, and standstill after the last."""
 
     topic = "goal_velocity"
 
-    def __init__(self, velocities: np.ndarray, ends: np.ndarray) -> None:
-        """Begin with the first.
-
-        Args:
-            velocities: In the body's frame, shape (n, 3) [m/s, m/s, rad/s].
-            ends: When each is over, shape (n,) [s].
-        """
-        self._goals, self._ends = [_goal(velocity) for velocity in velocities], ends
+    def __init__(self, file: Velocities) -> None:
+        """Begin with the first."""
+        self._form = file.form
+        targets = file.targets()
+        self._goals, self._ends = [_goal(velocity) for velocity in targets], file.ends()
+        self.standstill = _goal(np.zeros_like(targets[0]))
         self._over = 0
+
+    @property
+    def form(self) -> type[State]:
+        """State type of the file's goals."""
+        return self._form
 
     @property
     def done(self) -> bool:
@@ -122,23 +146,29 @@ class Schedule:
         """How many are over."""
         return f"{self._over} of {len(self._ends)} velocities over"
 
-    def step(self, state: PlanarState, time_s: float) -> Goal:
+    def step(self, state: State, time_s: float) -> Goal:
         """The velocity of this time; see `GoalSequence.step`."""
         # A microsecond early, for times that were added up.
         self._over = int(np.searchsorted(self._ends, time_s + 1e-6, side="right"))
-        return STANDSTILL if self.done else self._goals[self._over]
+        return self.standstill if self.done else self._goals[self._over]
 
 
 class Following:
     """Velocities that lead along a path, and standstill at its end."""
 
     topic = "goal_velocity"
+    standstill = goal_at((0.0, 0.0, 0.0))
 
     def __init__(self, file: FollowedPath, *, sideways: bool) -> None:
         """Follow a path; `sideways`: the robot moves to any side without turning, others turn towards their aim."""
         self._file, self._sideways = file, sideways
         self._planner: LookAhead = file.planner()
         self._on_path: Progress | None = None
+
+    @property
+    def form(self) -> type[State]:
+        """Paths lie in the plane."""
+        return PlanarState
 
     @property
     def done(self) -> bool:
@@ -153,8 +183,9 @@ class Following:
         laps = 0 if self._on_path is None else self._on_path.laps
         return f"{laps} rounds" if self._planner.loops == 0 else f"{laps} of {self._planner.loops} rounds"
 
-    def step(self, state: PlanarState, time_s: float) -> Goal:
+    def step(self, state: State, time_s: float) -> Goal:
         """The velocity towards the aim; see `GoalSequence.step`."""
+        assert isinstance(state, PlanarState)
         lead_s = self._file.lead_s
         position = np.array([float(state.x + lead_s * state.vx), float(state.y + lead_s * state.vy)])
         if self._on_path is None:
@@ -175,7 +206,7 @@ class Following:
 
 
 def _goal(*targets: np.ndarray) -> Goal:
-    return goal_at(*((float(x), float(y), float(turn)) for x, y, turn in targets))
+    return goal_at(*(tuple(target.tolist()) for target in targets))
 
 
 def goal_sequence(goals: GoalFile, robot: Robot, *, as_path: bool = False) -> GoalSequence:
@@ -187,20 +218,27 @@ def goal_sequence(goals: GoalFile, robot: Robot, *, as_path: bool = False) -> Go
         as_path: Give all positions or poses at once, for tasks that pass through them.
 
     Raises:
-        ConfigError: `as_path` with velocities, or with a path that is followed by velocities.
+        ConfigError: The goals are of the other space; `as_path` with velocities, or with a path that is followed by
+            velocities.
     """
+    if goals.form is not robot.state_type:
+        raise ConfigError(
+            f"'{goals.title}' is in {goals.form.WORLD}, and robot '{robot.name}' moves in {robot.state_type.WORLD}: a "
+            f"pose is {','.join(robot.state_type.NUMBERS)} there."
+        )
     if isinstance(goals, Positions | Poses):
         last = "positions" if isinstance(goals, Positions) else "poses"
+        where = "_3d" if goals.form is SpatialState else ""
         if as_path:
-            tolerance = load_task(f"go_through_{last}").tolerance
-            return Waypoints("goal_path", goals.targets(), tolerance, hold_s=0.0, at_once=True)
-        tolerance = load_task(f"go_to_{last.removesuffix('s')}").tolerance
+            tolerance = load_task(f"go_through_{last}{where}").tolerance
+            return Waypoints("goal_path", goals, tolerance, hold_s=0.0, at_once=True)
+        tolerance = load_task(f"go_to_{last.removesuffix('s')}{where}").tolerance
         topic = "goal_point" if isinstance(goals, Positions) else "goal_pose"
-        return Waypoints(topic, goals.targets(), tolerance, hold_s=HOLD_S, at_once=False)
+        return Waypoints(topic, goals, tolerance, hold_s=HOLD_S, at_once=False)
     if as_path:
         raise ConfigError(
             f"'{goals.title}' is a sequence of velocities; only positions and poses can be a path."
         )
     if isinstance(goals, Velocities):
-        return Schedule(goals.targets(), goals.ends())
+        return Schedule(goals)
     return Following(goals, sideways=robot.actuators.sideways)

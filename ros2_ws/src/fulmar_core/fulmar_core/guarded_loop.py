@@ -17,7 +17,7 @@ from fulmar_core.mission import Mission
 from fulmar_core.robot import Robot
 from fulmar_core.safety.arbiter import Decision, Flags, arbitrate
 from fulmar_core.safety.fallback import ControllerSwitch, Standby
-from fulmar_core.safety.geofence import OUT_OF_BOUNDS, outside, unreachable
+from fulmar_core.safety.geofence import OUT_OF_BOUNDS, check_area_of, outside, unreachable
 from fulmar_core.safety.input_gate import InputGate, Measurement
 from fulmar_core.state import State
 from fulmar_core.tasks import Task
@@ -83,7 +83,11 @@ class GuardedLoop:
             estop: Is asked before every step.
             gate: Of the measurements; that of the settings by default.
             applied: Commands that the actuators applied, as far as known.
+
+        Raises:
+            ConfigError: The area of the settings is none of such a robot.
         """
+        check_area_of(robot, settings.area)
         self._lock = threading.Lock()
         self.switch = switch
         self.loop = ControlLoop(
@@ -298,8 +302,7 @@ class GuardedLoop:
         """How the robot is outside its area right now; empty if it is not, or if its place is unknown."""
         if self.newest is None:
             return ""
-        x, y = self.newest.state.position_in_world[:2].tolist()
-        return outside(x, y, self._settings.area)
+        return outside(self.newest.state.position_in_world.tolist(), self._settings.area)
 
     def _beyond(self, goal: Goal) -> str:
         """How a goal lies outside the area; empty if it does not, or is no place."""

@@ -5,6 +5,8 @@ One array for each quantity, so that thousands of worlds lie side by side in mem
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Self
 
@@ -32,6 +34,9 @@ class PlanarState(State):
     yaw_rate: Array  # [rad/s]
 
     COLUMNS: ClassVar[tuple[str, ...]] = ("x", "y", "yaw", "vx", "vy", "yaw_rate")
+    WORLD: ClassVar[str] = "the plane"
+    NUMBERS: ClassVar[tuple[str, ...]] = ("x", "y", "deg")
+    AXES: ClassVar[int] = 2
 
     def columns(self) -> tuple[Array, ...]:
         """Every array, in the order of `COLUMNS`."""
@@ -76,6 +81,24 @@ class PlanarState(State):
         if twists:
             return xp.stack((x, y, zero, zero, zero, turn), axis=-1)
         return xp.concat((xp.stack((x, y, zero), axis=-1), from_yaw(turn)), axis=-1)
+
+    @classmethod
+    def target_at(cls, numbers: Sequence[float]) -> np.ndarray:
+        """x, y and heading, shape (3,); without a heading it is 0."""
+        x, y, *angles = numbers
+        (heading,) = angles or (0.0,)
+        return np.array([x, y, math.radians(heading)])
+
+    @classmethod
+    def written(cls, target: Array) -> tuple[float, ...]:
+        """Place [m] and heading [deg], which is from -180 to 180."""
+        return float(target[0]), float(target[1]), math.degrees(float(wrapped(np.asarray(target[2]))))
+
+    @classmethod
+    def resting(cls, target: Array) -> Self:
+        """A body that stands still at a pose, shape (..., 3)."""
+        x, y, yaw = (target[..., i] for i in range(3))
+        return cls(x, y, yaw, x, x, x).stopped()
 
     @property
     def pose(self) -> Array:

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Self
 
+import numpy as np
+
 from fulmar_core.arrays import array_namespace
-from fulmar_core.attitude import Quaternion, Vector, euler_of, length, minus, turn_back
+from fulmar_core.attitude import Quaternion, Vector, euler_of, from_euler, length, minus, turn_back
 from fulmar_core.rotation import Array
 from fulmar_core.state import RigidBodyState, State
 
@@ -40,6 +44,10 @@ class SpatialState(State):
     def columns(self) -> tuple[Array, ...]:
         """Every array, in the order of `COLUMNS`."""
         return (*self.position, *self.quat, *self.velocity, *self.rate)
+
+    WORLD: ClassVar[str] = "space"
+    NUMBERS: ClassVar[tuple[str, ...]] = ("x", "y", "z", "roll", "pitch", "yaw")
+    AXES: ClassVar[int] = 3
 
     @property
     def position(self) -> Vector:
@@ -92,6 +100,26 @@ class SpatialState(State):
     def rigid_targets(cls, targets: Array, *, twists: bool) -> Array:
         """Targets as they are."""
         return targets
+
+    @classmethod
+    def target_at(cls, numbers: Sequence[float]) -> np.ndarray:
+        """Place and attitude, shape (7,); without angles the body's axes are those of the world."""
+        x, y, z, *angles = numbers
+        roll, pitch, yaw = np.deg2rad(angles or (0.0, 0.0, 0.0))
+        return np.array([x, y, z, *from_euler(roll, pitch, yaw)])
+
+    @classmethod
+    def written(cls, target: Array) -> tuple[float, ...]:
+        """Place [m], and roll, pitch, yaw [deg]."""
+        place = tuple(float(part) for part in target[:3])
+        angles = euler_of(quat_of(np.asarray(target, dtype=float)))
+        return *place, *(math.degrees(float(angle)) for angle in angles)
+
+    @classmethod
+    def resting(cls, target: Array) -> Self:
+        """A body that stands still at a pose, shape (..., 7)."""
+        place = position_of(target)
+        return cls(*place, *quat_of(target), *place, *place).stopped()
 
     @property
     def pose(self) -> Array:

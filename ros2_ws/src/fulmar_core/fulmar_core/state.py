@@ -53,10 +53,16 @@ class State(ABC):
 
     Attributes:
         COLUMNS: Names of the arrays, in the order of the constructor.
+        WORLD: What bodies of this form move in, in words.
+        NUMBERS: A pose as people write it, in m and degrees; of a place they leave the angles out.
+        AXES: Coordinates of a place.
     """
 
     __slots__ = ()
     COLUMNS: ClassVar[tuple[str, ...]]
+    WORLD: ClassVar[str]
+    NUMBERS: ClassVar[tuple[str, ...]]
+    AXES: ClassVar[int]
 
     @abstractmethod
     def columns(self) -> tuple[Array, ...]:
@@ -80,6 +86,25 @@ class State(ABC):
     @abstractmethod
     def rigid_targets(cls, targets: Array, *, twists: bool) -> Array:
         """Poses, shape (..., 7), or twists, shape (..., 6), of such targets; the inverse of `targets_of`."""
+
+    @classmethod
+    @abstractmethod
+    def target_at(cls, numbers: Sequence[float]) -> np.ndarray:
+        """The target that people write as `NUMBERS`, or as a place alone, which has no angles [m, deg].
+
+        Raises:
+            ValueError: There are more or fewer numbers.
+        """
+
+    @classmethod
+    @abstractmethod
+    def written(cls, target: Array) -> tuple[float, ...]:
+        """The numbers of a target of one robot, as people write them; the inverse of `target_at` [m, deg]."""
+
+    @classmethod
+    @abstractmethod
+    def resting(cls, target: Array) -> Self:
+        """A body that stands still at a target, shapes (...,)."""
 
     @property
     @abstractmethod

@@ -8,11 +8,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fulmar_core.actuators.pushing import Pushing
+from fulmar_core.actuators.pushing import PLANAR, Pushing
 from fulmar_core.controllers.allocation import allocation_of
 from fulmar_core.errors import ConfigError
 from fulmar_core.robot import Robot
+from fulmar_core.spatial import SpatialState
 
+OUT_OF_PLANE = [2, 3, 4]  # z, roll and pitch of a wrench
 VALVE_COST = 0.02  # of an open valve, where a full wish has a cost of 1: small wishes open nothing
 KEY_HOLDS_NS = 600_000_000  # a key that is held repeats within this time, also after its first, longer wait
 JOY_LASTS_NS = 300_000_000  # a gamepad that is silent for longer is gone
@@ -40,7 +42,8 @@ def hand_mapping(robot: Robot) -> Callable[[Wish], np.ndarray]:
     """From wishes to commands of a robot, shape (n,), within its limits; no wish is the safe command.
 
     Raises:
-        ConfigError: A person cannot drive its family of actuators.
+        ConfigError: A person cannot drive its family of actuators, or it moves in space and cannot be driven in its
+            own plane alone.
     """
     actuators = robot.actuators
     try:
@@ -56,7 +59,25 @@ def _allocated(robot: Robot) -> Callable[[Wish], np.ndarray]:
     assert isinstance(robot.actuators, Pushing)  # no other family leaves it to an allocation
     full = np.array([robot.performance.force, robot.performance.force, robot.performance.torque])
     allocation = allocation_of(robot.actuators, weight=np.diag(1.0 / full**2), cost=VALVE_COST)
-    return lambda wish: np.asarray(allocation.best(full * np.array(wish.parts)))
+    alive = _in_plane(robot) if robot.state_type is SpatialState else None
+    return lambda wish: np.asarray(allocation.best(full * np.array(wish.parts), alive))
+
+
+def _in_plane(robot: Robot) -> np.ndarray:
+    """1 for actuators that push a robot within the plane of its x and y axes, 0 for the others, shape (n,).
+
+    Raises:
+        ValueError: They do not push to every side and about z.
+    """
+    assert isinstance(robot.actuators, Pushing)
+    wrenches = robot.actuators.wrench_per_newton
+    inside = np.abs(wrenches[:, OUT_OF_PLANE]).max(axis=1) < 1e-9
+    if np.linalg.matrix_rank(wrenches[np.ix_(inside, PLANAR)]) < len(PLANAR):
+        raise ValueError(
+            "keys and sticks drive in the plane of its x and y axes, and its actuators push out of it. Send it goals: "
+            "fulmar goals."
+        )
+    return np.asarray(inside, dtype=float)
 
 
 class Keyboard:

@@ -22,7 +22,6 @@ from fulmar_core.metrics import (
     successes,
 )
 from fulmar_core.mission import LONGEST_AHEAD_NS, SLACK_NS
-from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.state import State
 from fulmar_core.tasks import Task, load_recorded_task
@@ -171,16 +170,12 @@ def _goals(record: RunRecord, task: Task) -> list[GivenGoal]:
         return given
     asked: Any = record.info.get("goal")
     try:
-        x, y, heading_deg = (float(value) for value in asked)
+        target = task.state_type.target_at([float(value) for value in asked])
     except (TypeError, ValueError):
         raise BagError(
             f"{record.path}: holds no goal on {task.goal_topic}, and its run information has {asked!r} for one."
         ) from None
-    target = PlanarState.rigid_targets(
-        np.array([[x, y, np.deg2rad(heading_deg)]]), twists=task.goal_topic == "goal_velocity"
-    )
-    twists = task.goal_topic == "goal_velocity"
-    return [GivenGoal(-np.inf, -np.inf, PlanarState.rigid_targets(target, twists=twists))]
+    return [GivenGoal(-np.inf, -np.inf, task.state_type.rigid_targets(target[None], twists=False))]
 
 
 def _newest(record: RunRecord, task: Task, given: list[GivenGoal]) -> np.ndarray:

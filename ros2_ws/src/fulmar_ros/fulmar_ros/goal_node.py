@@ -19,12 +19,13 @@ from fulmar_bags.message_reader import measurement_of, stamp_ns
 from fulmar_core.errors import DONE, FAILED
 from fulmar_core.goal import Goal
 from fulmar_core.goal_files import GoalFile, load_goals
-from fulmar_core.goal_sequence import STANDSTILL, goal_sequence
+from fulmar_core.goal_sequence import goal_sequence
 from fulmar_core.paths import config_names
-from fulmar_core.planar import PlanarState
 from fulmar_core.robot import load_robot
 from fulmar_core.safety.geofence import OUT_OF_BOUNDS
 from fulmar_core.safety.input_gate import InputGate, Measurement
+from fulmar_core.spatial import SpatialState
+from fulmar_core.state import State
 from fulmar_core.tasks import load_task
 from fulmar_core.topics import GOAL_WIRES, ODOMETRY, STATUS
 from fulmar_ros.goal_messages import TYPES, GoalMessage, goal_message
@@ -94,7 +95,8 @@ class GoalNode(Node):
         self._title = goals.title
         self._sequence = goal_sequence(goals, robot, as_path=self._settings.as_path)
         self._request_exit = request_exit
-        self._gate = InputGate(robot.limits, frozen_after=0)  # controllers check for stuck sensors
+        # Controllers check for stuck sensors.
+        self._gate = InputGate(robot.limits, frozen_after=0, turns_freely=robot.state_type is SpatialState)
         self._lock = threading.Lock()
         self._sent: Goal | None = None
         self._newest: Measurement | None = None
@@ -135,7 +137,7 @@ class GoalNode(Node):
                 return
             was_done = self._sequence.done
             self._resume(measurement)
-            goal = self._sequence.step(PlanarState.from_rigid(measurement.state), self._time_ns / 1e9)
+            goal = self._sequence.step(self._sequence.form.from_rigid(measurement.state), self._time_ns / 1e9)
             self._publish_progress()
             if self._is_due(goal):
                 self._publish_goal(goal, measurement.stamp_ns)
@@ -164,7 +166,9 @@ class GoalNode(Node):
         return self._sequence.done or self._time_ns - self._sent_at_ns >= self._period_ns
 
     def _publish_goal(self, goal: Goal, stamp_ns: int) -> None:
-        self._message = goal_message(goal, self._sequence.topic, stamp_ns, self._frames)
+        self._message = goal_message(
+            goal, self._sequence.topic, stamp_ns, self._frames, form=self._sequence.form
+        )
         self._publisher.publish(self._message)
         if self._single and self._sent is None:
             self.get_logger().info(f"published {self._title} on {self._publisher.topic_name}")
@@ -251,7 +255,7 @@ class GoalNode(Node):
         """End a velocity goal; other goals need no end."""
         if self._sequence.topic != "goal_velocity" or self._sent is None or self._newest is None:
             return False
-        self._publish_goal(STANDSTILL, self._newest.stamp_ns)
+        self._publish_goal(self._sequence.standstill, self._newest.stamp_ns)
         return True
 
     def _without_subscriber(self) -> str:
@@ -259,7 +263,8 @@ class GoalNode(Node):
         topic = self._publisher.topic_name
         if self._subscribed(topic):
             return ""
-        tasks = [name for name in config_names("tasks") if _topic_of(name) == self._sequence.topic]
+        wanted = self._sequence.topic, self._sequence.form
+        tasks = [name for name in config_names("tasks") if _taken_by(name) == wanted]
         taken = [name for name in GOAL_WIRES if self._subscribed(self.resolve_topic_name(name))]
         instead = f"; the one that runs takes {' and '.join(taken)}" if taken else ""
         return f"no controller subscribes {topic}; one does with one of the tasks {', '.join(tasks)}{instead}"
@@ -277,8 +282,10 @@ class GoalNode(Node):
         self._publisher.wait_for_all_acked(FLUSH)
 
 
-def _topic_of(task: str) -> str:
-    return load_task(task).goal_topic
+def _taken_by(task: str) -> tuple[str, type[State]]:
+    """Topic and form of a task's goals."""
+    found = load_task(task)
+    return found.goal_topic, found.state_type
 
 
 def main() -> None:

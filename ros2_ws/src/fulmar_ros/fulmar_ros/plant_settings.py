@@ -5,11 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import numpy as np
-
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import Episode, draw_episode
-from fulmar_core.planar import at_rest
+from fulmar_core.errors import ConfigError
 from fulmar_core.robot import Robot
 from fulmar_core.safety.watchdog import checked_timeout, default_timeout
 from fulmar_core.tasks import load_task
@@ -27,7 +25,8 @@ class PlantSettings:
     backend: str = "mujoco"
     scenario: str = "nominal"
     seed: int = 0
-    start: tuple[float, ...] = (0.0, 0.0, 0.0)  # x [m], y [m], heading [deg]
+    # x [m], y [m], heading [deg]; in space x, y, z [m], and roll, pitch, yaw [deg] unless they are 0
+    start: tuple[float, ...] = (0.0, 0.0, 0.0)
     control_hz: float = 0.0  # 0: the robot's own [Hz]
     lockstep: bool = False
     rate: float = 1.0  # simulated seconds a wall-clock second, where not in lock step
@@ -44,9 +43,10 @@ class PlantSettings:
 
     def __post_init__(self) -> None:
         """Refuse values without meaning."""
-        if len(self.start) != 3 or not all(math.isfinite(value) for value in self.start):
+        if len(self.start) not in (3, 6) or not all(math.isfinite(value) for value in self.start):
             raise ValueError(
-                f"start = {list(self.start)} must be three finite numbers: x [m], y [m], heading [deg]."
+                f"start = {list(self.start)} must be three finite numbers: x [m], y [m], heading [deg]; "
+                "or six in space: x, y, z [m], roll, pitch, yaw [deg]."
             )
         for name in (
             "control_hz", "rate", "duration_s", "command_timeout_s", "answer_timeout_s", "mocap_hz", "mocap_late_s",
@@ -92,9 +92,16 @@ def first_episode(robot: Robot, settings: PlantSettings) -> Episode:
     """The seed's episode, begun at rest where the parameters say.
 
     Raises:
-        ConfigError: A name is unknown, or a file is wrong.
+        ConfigError: A name is unknown, a file is wrong, the task is of the other space, or six numbers are the start
+            of a robot in the plane.
     """
-    x, y, heading = (np.asarray(float(value)) for value in settings.start)
-    task, scenario = load_task(settings.task), load_scenario(settings.scenario)
+    task, scenario, form = load_task(settings.task), load_scenario(settings.scenario), robot.state_type
+    if len(settings.start) > len(form.NUMBERS):
+        raise ConfigError(
+            f"start = {list(settings.start)}: robot '{robot.name}' moves in {form.WORLD}, where a start is "
+            f"{', '.join(form.NUMBERS)} [m, deg]."
+        )
+    if task.state_type is not form:
+        task.check(robot)
     episode = draw_episode(robot, task, scenario, seed=settings.seed, number=0)
-    return Episode(at_rest(x, y, np.deg2rad(heading)), episode.goal, episode.world)
+    return Episode(form.resting(form.target_at(settings.start)), episode.goal, episode.world)

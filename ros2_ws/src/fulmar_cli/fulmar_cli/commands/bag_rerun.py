@@ -40,7 +40,9 @@ def rerun(
     ] = None,
     robot: Annotated[str | None, option("R", "Whose bag it is, if it does not say.")] = None,
     task: Annotated[str | None, option("T", "What was to be done, if it does not say.")] = None,
-    goal: Annotated[str | None, option("x,y,deg", "The goal, for a bag that holds none.")] = None,
+    goal: Annotated[
+        str | None, option("x,y,deg", "The goal, for a bag that holds none; in space x,y,z,roll,pitch,yaw.")
+    ] = None,
     control_hz: Annotated[
         float | None, option("HZ", "Command rate, if the bag does not say it.", min=0.01)
     ] = None,

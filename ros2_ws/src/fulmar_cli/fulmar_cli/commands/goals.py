@@ -29,7 +29,8 @@ def goals(
         str | None,
         option(
             "X,Y,DEG",
-            "One goal instead of a file: x [m], y [m], heading [deg]; or x,y for a position.",
+            "One goal instead of a file: x [m], y [m], heading [deg], or x,y for a position; in space "
+            "x,y,z,roll,pitch,yaw or x,y,z.",
             "--pose",
         ),
     ] = None,
@@ -70,7 +71,7 @@ def goals(
     if robot is None:
         example = name if place is None else f"--pose {pose}"
         raise ConfigError(f"whose goals? Example: fulmar goals {example} --robot floating_platform")
-    from fulmar_bringup.goal_plan import check_pace, places_of
+    from fulmar_bringup.goal_plan import check_pace, places_of, whole_pose
     from fulmar_bringup.node_table import goals_spec
     from fulmar_bringup.processes import command_line
     from fulmar_core.goal_files import load_goals, single_goal
@@ -79,7 +80,9 @@ def goals(
     from fulmar_core.safety.geofence import check_places
 
     the_robot = load_robot(robot)
-    given = None if place is None else single_goal(place)
+    if place is not None:
+        whole_pose(place, the_robot, "--pose")  # refuses numbers of another robot
+    given = None if place is None else single_goal(place, the_robot.state_type)
     file = given or load_goals(name or "")
     goal_sequence(file, the_robot, as_path=as_path)  # rejects goals that the robot cannot have
     check_pace(file, name or "", the_robot)

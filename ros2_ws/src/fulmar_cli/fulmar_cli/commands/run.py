@@ -17,11 +17,12 @@ RUN_TASK_HELP = (
     f"{cli.TASK_HELP} By default the goal decides: go_to_position for x,y, go_to_pose for x,y,deg and without a goal, "
     "and the task that takes the goals of --goals."
 )
-GOAL_HELP = "Where to go, with or without a heading; drawn from the seed by default, as many targets are."
+GOAL_HELP = "Where to go, in space x,y,z[,roll,pitch,yaw]; drawn from the seed by default."
+START_HELP = "Where to begin, in space x,y,z[,roll,pitch,yaw]; drawn from the seed by default."
 GOALS_HELP = "Goals one after another, or a path to follow: a name from `fulmar list goals`, or a .yaml file."
 ESTIMATOR_HELP = "Estimate odometry from poses and inertial readings: a name from configs/estimators."
 END_HELP = "An e-stop ends and fails the run; by default the robot waits for a reset and a new goal."
-AREA_HELP = "x_min, x_max, y_min, y_max that the robot must not leave [m]: --area=-2,2,-1,1."
+AREA_HELP = "x_min, x_max, y_min, y_max, in space also z_min, z_max, not to be left [m]: --area=-2,2,-1,1."
 RECORDING_HELP = (
     "whole: every message. ring: the last 30 s stay in memory and are written only when a fault occurs (an error of "
     "plant or controller, the watchdog, the e-stop), with 5 s after it; without a fault there is no bag and no result "
@@ -51,7 +52,7 @@ def run(
     policy: cli.PolicyOption = None,
     goal: Annotated[str | None, option("x,y[,deg]", GOAL_HELP)] = None,
     goals: Annotated[str | None, option("NAME", GOALS_HELP)] = None,
-    start: Annotated[str | None, option("x,y,deg", "Where to begin; drawn from the seed by default.")] = None,
+    start: Annotated[str | None, option("x,y,deg", START_HELP)] = None,
     duration: Annotated[
         float | None, option("S", "Simulated seconds; the task's episode by default.", min=0.1)
     ] = None,
@@ -110,6 +111,8 @@ def run(
 
     fulmar run floating_platform --controller classical --goals circle
 
+    fulmar run spacecraft_16 --goal 1,0,-0.5,0,30,90 --lockstep
+
     fulmar run turtlebot2 --backend hardware --emulate --task go_to_position --seed 3
 
     fulmar run turtlebot2 --task go_to_position --controller external
@@ -127,15 +130,13 @@ def run(
     if note:
         log_line(note)
     guards = {
-        "estimator": estimator, "estop": estop or None, "fallback": fallback,
-        "trusted_keys": str(trusted_keys) if trusted_keys else None,
-        "area": read_area(area), "max_run_time_s": max_run_time,
+        "estimator": estimator, "estop": estop or None, "fallback": fallback, "max_run_time_s": max_run_time,
+        "trusted_keys": str(trusted_keys) if trusted_keys else None, "area": read_area(area),
     }  # fmt: skip
     request = plan_run(
         robot=robot, name=name, task=task, controller=controller, backend=backend, policy=policy,
-        goal=(place[0], place[1], place[2] if len(place) > 2 else 0.0) if place else None, goals=goals,
-        start=read_pose(start, "--start"), duration_s=duration, lockstep=lockstep, rate=rate,
-        control_hz=control_hz, scenario=scenario, seed=seed, hardware=hardware, emulate=emulate, arm=arm,
+        goal=place, goals=goals, start=read_pose(start, "--start"), duration_s=duration, lockstep=lockstep,
+        rate=rate, control_hz=control_hz, scenario=scenario, seed=seed, hardware=hardware, emulate=emulate, arm=arm,
         record=record or dated_folder("runs", name or robot, controller), command=cli.invoked_command(),
         guards={key: value for key, value in guards.items() if value is not None}, recording=recording,
         copies=copies, controller_network=controller_network, mocap_hz=mocap_hz, remap=remap or (),

@@ -18,6 +18,7 @@ from fulmar_cli.commands.arguments import argument, dated_folder, flag, option
 from fulmar_cli.commands.values import read_pose
 from fulmar_core.errors import DONE, FAILED
 
+START_HELP = "Where a simulated robot begins, in space x,y,z[,roll,pitch,yaw]; the origin by default."
 RECORDING_HELP = (
     "whole: one bag. goals: one bag for each goal, DIR/goal_001 and so on. ring: only the time around a fault. "
     "The system file's by default."
@@ -39,9 +40,7 @@ def up(
     policy: cli.PolicyOption = None,
     scenario: cli.ScenarioOption = "nominal",
     seed: cli.SeedOption = 0,
-    start: Annotated[
-        str | None, option("x,y,deg", "Where a simulated robot begins; 0,0,0 by default.")
-    ] = None,
+    start: Annotated[str | None, option("x,y,deg", START_HELP)] = None,
     rate: cli.RateOption = 1.0,
     estop: cli.EstopOption = False,
     record: cli.RecordOption = None,

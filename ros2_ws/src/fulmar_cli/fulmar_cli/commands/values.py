@@ -9,7 +9,7 @@ from typing import Any
 from fulmar_core.errors import ConfigError, UnknownNameError
 from fulmar_core.safety.geofence import check_area
 
-Area = tuple[float, float, float, float]  # x_min, x_max, y_min, y_max [m]
+Area = tuple[float, ...]  # x_min, x_max, y_min, y_max, in space also z_min, z_max [m]
 
 
 def read_names(text: str, family: str, known: Sequence[str], *, as_given: bool = False) -> tuple[str, ...]:
@@ -31,12 +31,15 @@ def read_names(text: str, family: str, known: Sequence[str], *, as_given: bool =
 
 
 def read_area(text: str | None) -> Area | None:
-    """Read `x_min,x_max,y_min,y_max` of --area [m].
+    """Read `x_min,x_max,y_min,y_max` of --area, in space with `z_min,z_max` behind them [m].
 
     Raises:
         ConfigError: If it is not such an area.
     """
-    wanted = "x_min,x_max,y_min,y_max in m with x_min < x_max and y_min < y_max, such as --area=-2,2,-1,1."
+    wanted = (
+        "x_min,x_max,y_min,y_max in m with x_min < x_max and y_min < y_max, such as --area=-2,2,-1,1. "
+        "In space z_min,z_max follow."
+    )
 
     def is_area(values: tuple[float, ...]) -> bool:
         check_area(values)
@@ -46,26 +49,29 @@ def read_area(text: str | None) -> Area | None:
 
 
 def read_goal(text: str | None, option: str = "--goal") -> tuple[float, ...] | None:
-    """Read `x,y` or `x,y,deg`: x [m], y [m] and, for a pose, heading [deg].
+    """Read a place or a pose: `x,y` or `x,y,deg`, in space `x,y,z` or `x,y,z,roll,pitch,yaw` [m, deg].
 
     Raises:
-        ConfigError: If it is not two or three finite numbers.
+        ConfigError: If it is not two, three or six finite numbers.
     """
     wanted = (
         "two or three finite numbers: x [m], y [m] and, for a pose, heading [deg]. "
-        f"Example: {option} 1,-0.5 or {option} 1,-0.5,90"
+        f"Example: {option} 1,-0.5 or {option} 1,-0.5,90. In space x,y,z or x,y,z,roll,pitch,yaw [m, deg]."
     )
-    return _read(text, option, wanted, lambda values: len(values) in (2, 3))
+    return _read(text, option, wanted, lambda values: len(values) in (2, 3, 6))
 
 
-def read_pose(text: str | None, option: str) -> tuple[float, float, float] | None:
-    """Read `x,y,deg`: x [m], y [m] and heading [deg].
+def read_pose(text: str | None, option: str) -> tuple[float, ...] | None:
+    """Read a pose: `x,y,deg`, in space `x,y,z`, upright, or `x,y,z,roll,pitch,yaw` [m, deg].
 
     Raises:
-        ConfigError: If it is not three finite numbers.
+        ConfigError: If it is not three or six finite numbers.
     """
-    wanted = f"three finite numbers: x [m], y [m], heading [deg]. Example: {option} 1,-0.5,90"
-    return _read(text, option, wanted, lambda values: len(values) == 3)
+    wanted = (
+        f"three finite numbers: x [m], y [m], heading [deg]. Example: {option} 1,-0.5,90. "
+        "In space x,y,z,roll,pitch,yaw [m, deg]."
+    )
+    return _read(text, option, wanted, lambda values: len(values) in (3, 6))
 
 
 def _read(text: str | None, option: str, wanted: str, fits: Callable[[tuple[float, ...]], bool]) -> Any:

@@ -12,7 +12,9 @@ from fulmar_core.errors import ConfigError, did_you_mean
 from fulmar_core.estimation.estimator import Estimator
 from fulmar_core.estimation.settings import EstimatorSettings, PlanarMotionSettings, SpatialMotionSettings
 from fulmar_core.paths import config_path
+from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
+from fulmar_core.state import State
 from fulmar_core.topics import IMU, MOCAP, ODOMETRY, SENSOR_WIRES, Wire
 
 DEFAULT_KIND = "planar_motion"  # of a file that names none
@@ -28,6 +30,7 @@ class EstimatorKind:
     publishes: tuple[Wire, ...]  # each from the same estimate
     takes_if_there: Mapping[str, Wire] = field(default_factory=dict)  # readings that improve the estimate
     needs: tuple[str, ...] = ()  # modules of extras
+    form: type[State] = PlanarState  # state type of the robots whose motion it estimates
 
     @property
     def readings(self) -> dict[str, Wire]:
@@ -97,6 +100,22 @@ def load_estimator(name: str) -> EstimatorSettings:
     return load_config(estimator_kind(name).settings, estimator_path(name))
 
 
+def check_estimator(name: str, robot: Robot) -> None:
+    """Refuse a file that cannot be read, and an estimator that does not estimate how a robot moves.
+
+    Raises:
+        ConfigError: As of `load_estimator`, or the robot is of the other space.
+    """
+    load_estimator(name)
+    form = estimator_kind(name).form
+    if robot.state_type is not form:
+        raise ConfigError(
+            f"estimator '{name}' is of motion in {form.WORLD}, and robot '{robot.name}' moves in "
+            f"{robot.state_type.WORLD}. Leave it out, or name another file of configs/estimators."
+        )
+
+
 def make_estimator(name: str, robot: Robot) -> Estimator:
-    """A new estimator of a robot with the settings of a file; errors as of `load_estimator`."""
+    """A new estimator of a robot with the settings of a file; errors as of `check_estimator`."""
+    check_estimator(name, robot)
     return estimator_kind(name).make(load_estimator(name), robot)

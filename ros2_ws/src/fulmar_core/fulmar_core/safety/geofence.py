@@ -18,31 +18,49 @@ OUT_OF_BOUNDS = "out of bounds: "  # how the reason begins by which a controller
 
 
 def check_area(area: Sequence[float]) -> None:
-    """Reject an invalid area: x_min, x_max, y_min, y_max [m].
+    """Reject an invalid area: x_min, x_max, y_min, y_max, in space also z_min, z_max [m].
 
     Raises:
         ValueError: It has no extent, or is not finite.
     """
-    good = len(area) == 4 and all(math.isfinite(side) for side in area)
-    if not good or not (area[0] < area[1] and area[2] < area[3]):
+    good = len(area) in (4, 6) and all(math.isfinite(side) for side in area)
+    if not good or not all(low < high for low, high in _spans(area)):
         raise ValueError(
-            f"area = {list(area)} must be x_min, x_max, y_min, y_max with x_min < x_max, y_min < y_max."
+            f"area = {list(area)} must be x_min, x_max, y_min, y_max with x_min < x_max, y_min < y_max; in space with "
+            "z_min < z_max behind them."
         )
 
 
-def outside(x: float, y: float, area: Sequence[float]) -> str:
-    """Message that a place lies outside an area; empty if it does not [m]."""
-    if is_inside(x, y, area):
+def check_area_of(robot: Robot, area: Sequence[float]) -> None:
+    """Reject an area that has not two sides for each coordinate of a robot.
+
+    Raises:
+        ConfigError: A rectangle in space, or a box in the plane.
+    """
+    form = robot.state_type
+    if tuple(area) != NO_AREA and len(area) != 2 * form.AXES:
+        sides = ",".join(f"{axis}_min,{axis}_max" for axis in "xyz"[: form.AXES])
+        raise ConfigError(
+            f"area = {list(area)}: '{robot.name}' moves in {form.WORLD}, where an area has {2 * form.AXES} "
+            f"sides: {sides}."
+        )
+
+
+def outside(place: Sequence[float], area: Sequence[float]) -> str:
+    """Message that a place (x, y or x, y, z) lies outside an area; empty if it does not [m]."""
+    if is_inside(place, area):
         return ""
     return (
-        f"the robot was at x = {x:.2f} m, y = {y:.2f} m, outside its area of {_sides(area)}. "
+        f"the robot was at {_words(place, '.2f')}, outside its area of {_sides(area)}. "
         "Bring it back by hand, then give a goal."
     )
 
 
-def is_inside(x: float, y: float, area: Sequence[float]) -> bool:
-    """Whether a place [m] lies in an area."""
-    return tuple(area) == NO_AREA or (area[0] <= x <= area[1] and area[2] <= y <= area[3])
+def is_inside(place: Sequence[float], area: Sequence[float]) -> bool:
+    """Whether a place lies in an area, as far as that has sides [m]."""
+    if tuple(area) == NO_AREA:
+        return True
+    return all(low <= value <= high for value, (low, high) in zip(place, _spans(area), strict=False))
 
 
 def unreachable(what: str, places: Iterable[Sequence[float]], area: Sequence[float]) -> str:
@@ -50,17 +68,17 @@ def unreachable(what: str, places: Iterable[Sequence[float]], area: Sequence[flo
 
     Args:
         what: What the places are, such as `goal`.
-        places: Each x [m], y [m] and whatever follows.
+        places: Each x [m], y [m] and whatever follows in the plane: at most three numbers; x, y, z [m] and the attitude
+            in space: more.
         area: Area of the robot.
     """
-    for x, y, *_ in places:
-        if not is_inside(x, y, area):
-            return f"{what} x = {x:g} m, y = {y:g} m lies outside the area of {_sides(area)}."
-        if not math.hypot(x, y) <= FARTHEST_M:  # also where it is not a number
-            return (
-                f"{what} x = {x:g} m, y = {y:g} m lies {math.hypot(x, y):,.0f} m from the origin, "
-                f"farther than {FARTHEST_M:,.0f} m."
-            )
+    for numbers in places:
+        place = numbers[: 3 if len(numbers) > 3 else 2]
+        if not is_inside(place, area):
+            return f"{what} {_words(place, 'g')} lies outside the area of {_sides(area)}."
+        away = math.hypot(*place)
+        if not away <= FARTHEST_M:  # also where it is not a number
+            return f"{what} {_words(place, 'g')} lies {away:,.0f} m from the origin, farther than {FARTHEST_M:,.0f} m."
     return ""
 
 
@@ -76,7 +94,17 @@ def check_places(what: str, places: Iterable[Sequence[float]], area: Sequence[fl
 
 
 def _sides(area: Sequence[float]) -> str:
-    return f"x {area[0]:g} to {area[1]:g} m, y {area[2]:g} to {area[3]:g} m"
+    return ", ".join(
+        f"{axis} {low:g} to {high:g} m" for axis, (low, high) in zip("xyz", _spans(area), strict=False)
+    )
+
+
+def _spans(area: Sequence[float]) -> list[tuple[float, float]]:
+    return list(zip(area[::2], area[1::2], strict=True))
+
+
+def _words(place: Sequence[float], form: str) -> str:
+    return ", ".join(f"{axis} = {value:{form}} m" for axis, value in zip("xyz", place, strict=False))
 
 
 def check_starts(robot: Robot, task: Task, *, training: bool = False) -> None:

@@ -33,7 +33,14 @@ class InputGate:
     stamp shuts the gate for ever. `epoch` counts these jumps.
     """
 
-    def __init__(self, limits: Limits, *, frozen_after: int = FROZEN_AFTER, jump_m: float = math.inf) -> None:
+    def __init__(
+        self,
+        limits: Limits,
+        *,
+        frozen_after: int = FROZEN_AFTER,
+        jump_m: float = math.inf,
+        turns_freely: bool = False,
+    ) -> None:
         """Check against a robot's limits.
 
         Args:
@@ -42,7 +49,9 @@ class InputGate:
                 simulated sensors without noise.
             jump_m: So much further from the last place than the highest speed explains is a jump; infinite where
                 episodes may begin anywhere [m].
+            turns_freely: Whether the robot turns about any axis; the limit then counts for the length of its turn rate.
         """
+        self._turns_freely = turns_freely
         self._limits, self._frozen_after, self._jump_m = limits, frozen_after, jump_m
         self._last: Measurement | None = None
         self._equal = 0
@@ -81,11 +90,11 @@ class InputGate:
         speed = math.hypot(*velocity)
         if speed > self._limits.speed:
             return f"odom speed {speed:.2f} m/s is beyond the possible {self._limits.speed:g} m/s"
-        yaw_rate = abs(turning[2])
-        if yaw_rate > self._limits.yaw_rate:
-            return (
-                f"odom yaw rate {yaw_rate:.2f} rad/s is beyond the possible {self._limits.yaw_rate:g} rad/s"
-            )
+        rate, what = (
+            (math.hypot(*turning), "turn rate") if self._turns_freely else (abs(turning[2]), "yaw rate")
+        )
+        if rate > self._limits.yaw_rate:
+            return f"odom {what} {rate:.2f} rad/s is beyond the possible {self._limits.yaw_rate:g} rad/s"
         return None
 
     def _stamp_problem(self, measurement: Measurement, ahead_ns: int) -> str | None:

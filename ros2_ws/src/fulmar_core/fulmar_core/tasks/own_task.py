@@ -126,7 +126,8 @@ class OwnTask(Task[PlanarState]):
         return source_of(type(self.own))
 
     def check(self, robot: Robot) -> None:
-        """Call every member once on drawn episodes, many at once and one alone."""
+        """Call every member once on drawn episodes, many at once and one alone; see `Task.check`."""
+        super().check(robot)
         draws = Draws(0, np.arange(TRIED), np.zeros(TRIED, dtype=int), START)
         starts, goals = self.draw(draws, robot, training=False)
         for state, drawn in ((starts, goals), (starts[0], goals[0])):
@@ -185,6 +186,8 @@ class OwnTask(Task[PlanarState]):
             "heading": limits.heading_deg,
             "velocity": limits.velocity or found.yaw_rate is not None,
             "yaw_rate": limits.yaw_rate_deg or found.velocity is not None,
+            "attitude": limits.attitude_deg,
+            "rate": limits.rate_deg,
         }
         for name, value in values.items():
             if value is None and asked[name]:

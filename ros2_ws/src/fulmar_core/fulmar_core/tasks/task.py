@@ -6,6 +6,7 @@ from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING, Generic, Self
 
 from fulmar_core.counter_rng import Draws
+from fulmar_core.errors import ConfigError
 from fulmar_core.goal import Goal, goal_at
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
@@ -83,8 +84,14 @@ class Task(ABC, Generic[S]):
         """Refuse a task that does not work with a robot, before anything moves.
 
         Raises:
+            ConfigError: The task is of the other space.
             TaskError: A member of a user's own task raises, or returns what no task returns.
         """
+        if robot.state_type is not self.state_type:
+            raise ConfigError(
+                f"task '{self.name}' is about motion in {self.state_type.WORLD}, and robot '{robot.name}' moves in "
+                f"{robot.state_type.WORLD}. `fulmar list tasks` shows the others; those in space end in _3d."
+            )
 
     def goal_of(self, targets: Array) -> Goal:
         """The goal of one robot from targets that were received.

@@ -13,6 +13,7 @@ from fulmar_bags.contents import Bag
 from fulmar_bags.control_steps import ControlSteps, control_steps_of, policy_folder
 from fulmar_bags.figures import controllers_of
 from fulmar_core.errors import ConfigError, UnknownNameError
+from fulmar_core.goal import PoseTuple
 from fulmar_core.own_class import is_own
 from fulmar_evaluation.rerun.embedded_configs import calibrated_as, knowing_what_it_carries
 from fulmar_evaluation.rerun.replay_controllers import answers_of
@@ -39,7 +40,7 @@ class RerunRequest:
     through: str  # one of `THROUGH`
     robot: str | None
     task: str | None
-    goal: tuple[float, float, float] | None  # x [m], y [m], heading [deg]
+    goal: PoseTuple | None  # as `State.NUMBERS` of the robot [m, deg]
     control_hz: float | None  # [Hz]
     odometry: str | None  # topic
     out: Path | None  # file for the answers

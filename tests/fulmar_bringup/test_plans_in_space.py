@@ -1,0 +1,146 @@
+"""Plans of runs of a spacecraft: starts, goals and areas with six numbers."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from fulmar_bringup.goal_plan import check_heading, default_task, task_of_goals, task_of_run
+from fulmar_bringup.node_table import controller_spec, plant_spec
+from fulmar_core.errors import ConfigError
+from fulmar_core.spatial import SpatialState
+
+
+class Still:
+    """A controller that does nothing."""
+
+    def __init__(self, robot, task, settings):
+        """Keep nothing."""
+
+    def reset(self):
+        """Forget nothing."""
+
+    def act(self, inputs):
+        """Open no valve."""
+        return np.zeros_like(inputs.previous)
+
+
+STILL = f"{__name__}:Still"
+SPACE = {"robot": "spacecraft_16", "task": "go_to_pose_3d", "controller": "external"}
+GOAL, START = (1.0, 0.0, -0.5, 0.0, 30.0, 90.0), (0.0, 0.5, 0.0, 10.0, 20.0, 30.0)
+
+
+def test_what_was_said_is_kept_and_reaches_the_plant(plan):
+    request = plan(**SPACE, goal=GOAL, start=START)
+    assert (request.goal, request.plan.start) == (GOAL, START)
+    assert plant_spec(request.plan).parameters["start"] == list(START)
+    assert SpatialState.written(request.mission.current) == pytest.approx(GOAL)
+
+
+def test_a_place_alone_is_upright(plan):
+    request = plan(**SPACE, goal=GOAL[:3], start=START[:3])
+    assert request.goal == (*GOAL[:3], 0.0, 0.0, 0.0)
+    assert request.plan.start == (*START[:3], 0.0, 0.0, 0.0)
+
+
+def test_one_seed_gives_one_plan_as_far_from_the_goal_as_the_task_says(plan):
+    request = plan(**SPACE, seed=7)
+    assert request == plan(**SPACE, seed=7)
+    assert request.goal != plan(**SPACE, seed=8).goal
+    assert (len(request.goal), len(request.plan.start)) == (6, 6)
+    assert 0.25 <= math.dist(request.goal[:3], request.plan.start[:3]) <= 6.0
+
+
+def test_a_goal_alone_moves_the_start_along_and_keeps_its_attitude(plan):
+    drawn, moved = plan(**SPACE, seed=3), plan(**SPACE, seed=3, goal=(5.0, 5.0, -5.0, 0.0, 0.0, 0.0))
+    offsets = [np.subtract(each.plan.start, each.goal)[:3] for each in (drawn, moved)]
+    assert offsets[0] == pytest.approx(offsets[1])
+    assert moved.plan.start[3:] == drawn.plan.start[3:]
+
+
+def test_a_box_reaches_the_controller(plan):
+    box = (-9.0, 9.0, -9.0, 9.0, -9.0, 9.0)
+    request = plan(**SPACE | {"controller": STILL}, goal=GOAL, start=START, guards={"area": box})
+    assert controller_spec(request.plan).parameters["area"] == list(box)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"goal": (1.0, 2.0)}, "--goal = '1,2' has 2 numbers; 'spacecraft_16' moves in space: x,y,z [m] or"),
+        ({"start": (1.0, 2.0, 0.0, 90.0)}, "--start = '1,2,0,90' has 4 numbers"),
+        ({"goal": (0.0, 0.0, 30.0), "start": (0.0, 0.0, 0.0)}, "start and goal are 30.0 m apart"),
+        ({"goal": (0.0, 0.0, 2000.0)}, "z = 2000 m lies 2,000 m from the origin"),
+        ({"goal": (0.0, math.inf, 0.0)}, "must be finite"),
+        (
+            {"guards": {"estimator": "mocap_imu"}},
+            "estimator 'mocap_imu' is of motion in the plane, and robot",
+        ),
+        ({"task": "go_to_pose"}, "task 'go_to_pose' is about motion in the plane"),
+        ({"robot": "floating_platform"}, "task 'go_to_pose_3d' is about motion in space"),
+        (
+            {"controller": STILL, "guards": {"area": (-1.0, 1.0, -1.0, 1.0)}},
+            "moves in space, where an area has 6",
+        ),
+    ],
+)
+def test_what_cannot_be_is_refused(change, words, plan):
+    with pytest.raises(ConfigError) as caught:
+        plan(**SPACE | change)
+    assert words in str(caught.value)
+
+
+def test_a_box_in_the_plane_is_refused(plan):
+    with pytest.raises(ConfigError, match="moves in the plane, where an area has 4 sides"):
+        plan(guards={"area": (-1.0, 1.0, -1.0, 1.0, -1.0, 1.0)})
+
+
+@pytest.mark.parametrize(
+    ("goal", "task"),
+    [(None, "go_to_pose_3d"), (GOAL, "go_to_pose_3d"), (GOAL[:3], "go_to_position_3d")],
+)
+def test_the_goal_decides_the_task(goal, task):
+    assert default_task("spacecraft_16", "external", goal=goal) == task
+
+
+def test_a_place_is_no_pose_and_an_attitude_without_effect_is_said():
+    with pytest.raises(ConfigError, match="needs an attitude: --goal x,y,z,roll,pitch,yaw"):
+        check_heading("go_to_pose_3d", GOAL[:3])
+    note = check_heading("go_to_position_3d", GOAL)
+    assert note == "task 'go_to_position_3d' has no attitude: the 0, 30, 90 deg of --goal have no effect"
+    with pytest.raises(ConfigError, match="has 2 numbers"):
+        task_of_run(None, "spacecraft_16", "lqr", "mujoco", goal=(1.0, 2.0), goals=None, policy=None)
+
+
+@pytest.mark.parametrize(
+    ("text", "task"),
+    [
+        ("kind: positions\ntitle: t\npositions: [[1, 0, 1]]\n", "go_to_position_3d"),
+        ("kind: poses\ntitle: t\nposes: [[1, 0, 1, 0, 0, 90]]\n", "go_to_pose_3d"),
+        (
+            "kind: velocities\ntitle: t\nvelocities:\n- {velocity: [0, 0, 0.1, 0, 5, 0], hold_s: 4}\n",
+            "track_velocities_3d",
+        ),
+    ],
+)
+def test_a_file_in_space_is_for_the_tasks_in_space(text, task, plan, tmp_path):
+    (tmp_path / "goals.yaml").write_text(text)
+    goals = str(tmp_path / "goals.yaml")
+    assert task_of_goals(goals) == task
+    request = plan(**SPACE | {"task": task}, goals=goals)
+    assert len(request.plan.start) == 6
+    with pytest.raises(ConfigError, match="no goals of task"):
+        plan(
+            **SPACE | {"task": "go_through_poses_3d" if "velocities" in text else "track_velocities_3d"},
+            goals=goals,
+        )
+
+
+def test_a_turn_rate_beyond_the_limit_is_refused_whatever_its_axis(plan, tmp_path):
+    (tmp_path / "fast.yaml").write_text(
+        "kind: velocities\ntitle: t\nvelocities:\n- {velocity: [0, 0, 0, 300, 300, 0], hold_s: 4}\n"
+    )
+    with pytest.raises(ConfigError, match="ask for 424"):
+        plan(**SPACE | {"task": "track_velocities_3d"}, goals=str(tmp_path / "fast.yaml"))

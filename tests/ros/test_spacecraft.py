@@ -1,0 +1,150 @@
+"""A spacecraft through the nodes: a run in lock step, its bytes again, its re-run, and many episodes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from mcap.reader import make_reader
+
+from tests.conftest import RosDomain
+from tests.ros.cli import fulmar, json_of
+
+CONTROLLER = '''
+"""Opens the valves that push and turn towards the goal."""
+import numpy as np
+
+
+class Hold:
+    def __init__(self, robot, task, settings):
+        self.wrench = robot.actuators.wrench_per_newton  # (16, 6) [N, N·m]
+        self.names = task.observation_names
+
+    def reset(self):
+        pass
+
+    def act(self, inputs):
+        terms = dict(zip(self.names, np.moveaxis(inputs.observation, -1, 0), strict=True))
+
+        def vector(name):
+            return np.stack([terms[name.format(axis)] for axis in "xyz"], axis=-1)
+
+        force = 0.2 * vector("goal_{}_in_body") - 1.5 * vector("velocity_{}_in_body")
+        torque = 0.05 * vector("attitude_error_{}") - 0.2 * vector("turn_rate_{}")
+        scores = force @ self.wrench[:, :3].T + 3.0 * torque @ self.wrench[:, 3:].T
+        return (scores > 0.01).astype(float)
+'''
+OWN = ("--controller", "by_hand:Hold")
+GOAL = ("--goal", "0.5,0.2,-0.3,0,20,30", "--start", "0,0,0,-20,0,10")
+RUN = ("run", "spacecraft_16", *OWN, *GOAL, "--lockstep", "--seed", "3", "--duration", "40", "--json")
+HEALTH = ("/clock", "/diagnostics", "/spacecraft_16/controller/status")  # these follow the wall clock
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """The current folder of every command, with the controller in it."""
+    (tmp_path / "by_hand.py").write_text(CONTROLLER, encoding="utf-8")
+    return tmp_path
+
+
+def wires_of(bag: Path) -> dict[str, list[bytes]]:
+    """Every message of a bag by its topic, as it was on the wire, but for those of the wall clock."""
+    found: dict[str, list[bytes]] = {}
+    (file,) = bag.glob("*.mcap")
+    with file.open("rb") as stream:
+        for _, channel, message in make_reader(stream).iter_messages():
+            found.setdefault(channel.topic, []).append(message.data)
+    return {topic: data for topic, data in found.items() if topic not in HEALTH}
+
+
+def test_two_runs_of_one_seed_have_the_same_bytes_come_near_the_goal_and_answer_the_same_again(
+    ros_domain: RosDomain, folder: Path
+) -> None:
+    for bag in ("one", "two"):
+        done = fulmar(*RUN, "--record", bag, env=ros_domain.env, cwd=folder)
+        summary = json_of(done.stdout)
+        assert summary["failure"] is None, done.stderr
+    assert summary["task"] == "go_to_pose_3d"  # as six numbers ask for
+    assert summary["steps"] == 200
+    assert summary["final_position_error_m"] < 0.05
+    assert 0.0 < summary["final_attitude_error_deg"] < 10.0
+    assert summary["final_heading_error_deg"] is None
+    one, two = wires_of(folder / "one"), wires_of(folder / "two")
+    assert len(one["/spacecraft_16/odom"]) == len(one["/spacecraft_16/controller/action"]) == 200
+    assert {topic for topic in one if one[topic] != two.get(topic)} == set()
+    done = fulmar("bag", "diff", "one", "two", env=ros_domain.env, cwd=folder)
+    assert done.returncode == 0, done.stdout
+    for source in ("observations", "odometry"):
+        done = fulmar("bag", "rerun", "one", *OWN, "--from", source, "--json", env=ros_domain.env, cwd=folder)
+        assert done.returncode == 0, done.stdout + done.stderr
+        assert json_of(done.stdout)["asked"] == 200
+
+
+@pytest.mark.slow
+def test_an_evaluation_through_the_nodes_has_the_figures_of_the_one_through_mujoco(
+    ros_domain: RosDomain, folder: Path
+) -> None:
+    found = []
+    for through in ("ros", "mujoco"):
+        asked = ("evaluate", "spacecraft_16", "go_to_pose_3d", *OWN, "--through", through)
+        done = fulmar(
+            *asked,
+            "--episodes",
+            "2",
+            "--steps",
+            "150",
+            "--seed",
+            "5",
+            "--json",
+            env=ros_domain.env,
+            cwd=folder,
+        )
+        assert done.returncode == 0, done.stderr
+        found.append(json_of(done.stdout))
+    ros, mujoco = found
+    assert ros["final_attitude_error_deg"] == mujoco["final_attitude_error_deg"]
+    assert ros["final_position_error_m"] == mujoco["final_position_error_m"]
+
+
+@pytest.mark.slow
+def test_goals_of_a_file_are_taken_one_after_another_inside_a_box(
+    ros_domain: RosDomain, folder: Path
+) -> None:
+    (folder / "two.yaml").write_text(
+        "kind: positions\ntitle: two places\npositions: [[0.3, 0, 0.3], [0.3, 0, -0.3]]\n"
+    )
+    asked = ("run", "spacecraft_16", *OWN, "--goals", "two.yaml", "--lockstep", "--json")
+    start, box = ("--start", "0,0,0"), "--area=-1,1,-1,1,-1,1"
+    (folder / "by_hand.py").write_text(  # this task has no attitude error
+        CONTROLLER.replace('0.05 * vector("attitude_error_{}") - ', "-"), encoding="utf-8"
+    )
+    done = fulmar(*asked, *start, box, "--record", "bag", env=ros_domain.env, cwd=folder)
+    summary = json_of(done.stdout)
+    assert summary["failure"] is None, done.stderr
+    assert summary["task"] == "go_to_position_3d"
+    assert summary["goals_progress"] == "2 of 2 targets reached"
+    done = fulmar(*asked, *start, "--area=-1,1,-1,1,-1,0.2", env=ros_domain.env, cwd=folder)
+    assert done.returncode == 2
+    assert "z = 0.3 m lies outside the area" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        ("run spacecraft_16 --task go_to_pose --lockstep", "robot 'spacecraft_16' moves in space"),
+        ("evaluate floating_platform go_to_pose_3d", "'floating_platform' moves in the plane"),
+        ("train spacecraft_16 go_to_position", "robot 'spacecraft_16' moves in space"),
+        ("up mujoco_lqr --robot spacecraft_16 --controller external", "task 'go_to_pose' is about motion in"),
+        ("goals --robot spacecraft_16 --pose 1,2", "x,y,z [m] or x,y,z,roll,pitch,yaw [m, deg]"),
+        ("goals --robot floating_platform --pose 1,2,3,4,5,6", "x,y [m] or x,y,deg [m, deg]"),
+        ("up mujoco_lqr --start 1,2,3,4,5,6", "--start = '1,2,3,4,5,6' has 6 numbers"),
+    ],
+)
+def test_what_belongs_to_the_other_space_is_one_line_before_anything_starts(
+    command: str, words: str, ros_domain: RosDomain, tmp_path: Path
+) -> None:
+    done = fulmar(*command.split(), env=ros_domain.env, cwd=tmp_path)
+    assert done.returncode == 2
+    assert words in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
+    assert not list(tmp_path.iterdir())
