@@ -14,6 +14,7 @@ from fulmar_core.estimation.settings import EstimatorSettings, PlanarMotionSetti
 from fulmar_core.paths import config_path
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
+from fulmar_core.spatial import SpatialState
 from fulmar_core.state import State
 from fulmar_core.topics import IMU, MOCAP, ODOMETRY, SENSOR_WIRES, Wire
 
@@ -65,6 +66,7 @@ KINDS: dict[str, EstimatorKind] = {
         takes={"mocap": MOCAP, "imu": IMU},
         publishes=(ODOMETRY,),
         takes_if_there={"star_tracker": SENSOR_WIRES["star_tracker"]},
+        form=SpatialState,
         needs=("filterpy",),
     ),
 }
