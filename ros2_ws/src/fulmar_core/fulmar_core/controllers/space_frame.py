@@ -48,24 +48,15 @@ class SpaceFrame:
         state, target = inputs.state, inputs.goal.current
         alive = None if estimate is None else estimate.alive
         velocity, rate = _rows(state.velocity_in_body), _rows(state.rate)
-        still = np.zeros_like(state.qw)
-        to_goal = (
-            product(conjugate(state.quat), quat_of(target))
-            if self.heads
-            else (still, still, still, still + 1.0)
-        )
+        none = np.zeros_like(state.qw)
+        to_goal = none, none, none, none + 1.0
+        if self.heads:
+            to_goal = product(conjugate(state.quat), quat_of(target))
         if self.tracks:
             missing = velocity - target[..., :3], rate - target[..., 3:]
             return SpaceMotion(np.zeros_like(velocity), to_goal, *missing, velocity, rate, alive)
-        return SpaceMotion(
-            _rows(turn_back(state.quat, minus(position_of(target), state.position))),
-            to_goal,
-            velocity,
-            rate,
-            velocity,
-            rate,
-            alive,
-        )
+        way = _rows(turn_back(state.quat, minus(position_of(target), state.position)))
+        return SpaceMotion(way, to_goal, velocity, rate, velocity, rate, alive)
 
     def next_leg(self, inputs: Inputs[SpatialState]) -> np.ndarray:
         """Way from the current target to the one after it, in the body's frame, shape (n, 3) [m]."""

@@ -1,8 +1,8 @@
 """Proportional-derivative control of a body in space.
 
-Force −K_p Rᵀ Δp − K_d v and torque −k_R e_R − k_ω ω + ω × J ω, with e_R = half of the vector of R_e − R_eᵀ, and R_e the rotation from
-the wanted attitude to the body's (Lee, Leok and McClamroch, "Geometric Tracking Control of a Quadrotor UAV on SE(3)",
-CDC 2010, eq. 10, 11 and 16, for a goal at rest).
+Force −K_p Rᵀ Δp − K_d v and torque −k_R e_R − k_ω ω + ω × J ω, with R_e the rotation from the wanted attitude to the
+body's, and e_R the vector of ½ (R_e − R_eᵀ) (Lee, Leok and McClamroch, "Geometric Tracking Control of a Quadrotor UAV
+on SE(3)", CDC 2010, eq. 10, 11 and 16, for a goal at rest).
 """
 
 from __future__ import annotations
