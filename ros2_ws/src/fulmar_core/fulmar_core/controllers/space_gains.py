@@ -22,7 +22,11 @@ POSITION_LIMIT, ATTITUDE_LIMIT_DEG = 1.0, 45.0
 OVERSHOOT = 0.5  # of a waypoint, in errors at which cruising begins
 CARRIED = 0.6, 0.48  # of the strongest force and torque of one valve
 TRIES = 4096  # directions of the sphere
-OPEN_VALVE = 0.01  # of missing the weakest force
+# Of an open valve, where missing the weakest force costs 1: a third less gas for a millimetre and half a degree.
+LQR_VALVE, PD_VALVE = 0.2, 0.1
+TORQUE_ERROR = (
+    2.0  # what the PD law pays for a missed torque, in Bryson's: one step of one valve turns a light body far
+)
 
 
 @dataclass(frozen=True)
@@ -53,7 +57,7 @@ def space_lqr_weights(robot: Robot) -> SpaceLqrWeights:
         rate=(can.turning / TURN_PRECISION) ** 2,
         force=1.0 / can.force**2,
         torque=1.0 / can.torque**2,
-        open_valve=OPEN_VALVE,
+        open_valve=LQR_VALVE,
         **_limits(can),
     )
 
@@ -71,8 +75,8 @@ def space_pd_gains(robot: Robot) -> SpacePdGains:
         attitude=attitude,
         rate=2.0 * math.sqrt(can.inertia * attitude),
         force_error=1.0 / can.force**2,
-        torque_error=1.0 / can.torque**2,
-        open_valve=OPEN_VALVE,
+        torque_error=TORQUE_ERROR / can.torque**2,
+        open_valve=PD_VALVE,
         **_limits(can),
     )
 
