@@ -17,7 +17,8 @@ from fulmar_core.controllers.space_pd import SpacePdGains
 from fulmar_core.robot import Robot
 
 PRECISION, TURN_PRECISION = 0.05, math.radians(5.0)  # errors at which full thrust is asked for [m], [rad]
-BRAKING = 0.35  # of the weakest force or torque: they share the thrust, and a push may have its part of it
+# Of the weakest force or torque, with one line that both share, and without; a push may have its part of the rest.
+BRAKING_SHARED, BRAKING = 0.35, 0.6
 POSITION_LIMIT, ATTITUDE_LIMIT_DEG = 1.0, 45.0
 OVERSHOOT = 0.5  # of a waypoint, in errors at which cruising begins
 CARRIED = 0.6, 0.48  # of the strongest force and torque of one valve
@@ -35,6 +36,7 @@ class _Ability:
 
     force: float  # in the weakest direction [N]
     torque: float  # same [N·m]
+    braking: float  # share of these to brake with [-]
     valve: float  # force of the strongest [N]
     valve_torque: float  # torque of the strongest [N·m]
     settling: float  # time in which full thrust crosses `PRECISION` [s]
@@ -85,8 +87,8 @@ def _limits(can: _Ability) -> dict[str, float]:
     return {
         "position_error_limit": POSITION_LIMIT,
         "attitude_error_limit_deg": ATTITUDE_LIMIT_DEG,
-        "braking_force": BRAKING * can.force,
-        "braking_torque": BRAKING * can.torque,
+        "braking_force": can.braking * can.force,
+        "braking_torque": can.braking * can.torque,
         "carried_force": CARRIED[0] * can.valve,
         "carried_torque": CARRIED[1] * can.valve_torque,
         "overshoot": OVERSHOOT,
@@ -112,6 +114,7 @@ def _ability(robot: Robot) -> _Ability:
     return _Ability(
         force,
         torque,
+        braking=BRAKING_SHARED if actuators.shared_pressure else BRAKING,
         valve=strongest,
         valve_torque=float(np.linalg.norm(full[:, 3:], axis=1).max()),
         settling=max(3.0 * step, math.sqrt(2.0 * PRECISION * mass / force)),
