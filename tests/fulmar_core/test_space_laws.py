@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -171,6 +171,16 @@ def test_a_body_that_cannot_be_turned_about_every_axis_is_refused():
         ConfigError, match="do not push in every direction and turn the body about every axis"
     ):
         check_pair(lame, POSE, law="pd")
+
+
+@LAWS
+def test_the_metadata_hash_changes_with_every_gain(law):
+    gains, entry = gains_of(ROBOT, law), SPACE_LAWS[law]
+    metadata = entry.law(ROBOT, POSE, gains).metadata()
+    assert (metadata["law"], metadata["gains"]) == (law, asdict(gains))
+    for name, value in asdict(gains).items():
+        other = replace(gains, **{name: 1.01 * value + 0.001})
+        assert entry.law(ROBOT, POSE, other).metadata()["sha256"] != metadata["sha256"]
 
 
 def test_gains_that_cannot_be_are_refused():
