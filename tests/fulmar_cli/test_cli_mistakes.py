@@ -45,7 +45,7 @@ def broken_configs(tmp_path, monkeypatch):
         (["run", "leatherback", "--controller", "lqr"], "controller 'lqr' is for robots with thrusters"),
         (
             [*RUN, "--controller", "pid"],
-            "unknown controller 'pid'. Known: classical, excite, external, lqr, lqr_drift, mpc, policy.",
+            "unknown controller 'pid'. Known: classical, excite, external, lqr, lqr_drift, mpc, pd, policy.",
         ),
         ([*RUN, "--backend", "gazebo"], "unknown backend 'gazebo'. Known: hardware, mock, mujoco."),
         (["run", "jetbot", "--backend", "hardware"], "there is no hardware driver for 'jetbot'"),

@@ -200,7 +200,7 @@ def test_gains_that_cannot_be_are_refused():
             "spacecraft_16",
             "go_to_pose_3d",
             "mpc",
-            "'spacecraft_16' floats in space. Use --controller one of: lqr, pd",
+            "'spacecraft_16' floats in space. Use --controller lqr or pd",
         ),
         ("spacecraft_16", "go_to_pose", "lqr", "'go_to_pose' is a task in the plane"),
         ("floating_platform", "go_to_pose_3d", "lqr", "'go_to_pose_3d' is a task in space"),

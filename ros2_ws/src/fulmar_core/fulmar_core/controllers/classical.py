@@ -70,7 +70,6 @@ OTHERS = {
     "lqr_drift": ("thrusters", Entry(LqrDrift, DriftWeights, ("go_to_pose",))),
 }
 
-
 # Laws of bodies in space, whose states are `SpatialState`; the first one is that of every family.
 SPACE_LAWS = {
     "lqr": Entry(SpaceLqr, SpaceLqrWeights, IN_SPACE, space_lqr_weights),
@@ -149,23 +148,20 @@ def _check_space(robot: Robot, law: str | None) -> None:
     Raises:
         ConfigError: With what would be allowed.
     """
-    named = law in LAWS or law in OTHERS or law in SPACE_LAWS
-    if not named or (law in SPACE_LAWS if is_in_space(robot) else law not in SPACE_LAWS or law in LAWS):
+    in_plane, space = (*LAWS, *OTHERS), is_in_space(robot)
+    if law in (SPACE_LAWS if space else in_plane) or law not in (*in_plane, *SPACE_LAWS):
         return
-    here, there = (
-        ("floats in space", "in the plane") if is_in_space(robot) else ("moves in the plane", "in space")
-    )
-    allowed = f"one of: {', '.join(SPACE_LAWS)}" if is_in_space(robot) else "classical"
+    here, there = ("floats in space", "in the plane") if space else ("moves in the plane", "in space")
     raise ConfigError(
         f"controller '{law}' is for robots with {' or '.join(families_of(law))} {there}; '{robot.name}' {here}. "
-        f"Use --controller {allowed}."
+        f"Use --controller {' or '.join(SPACE_LAWS) if space else 'classical'}."
     )
 
 
 def has_law(robot: Robot, task: Task) -> bool:
     """Whether there is a classical law for a pair."""
     if is_in_space(robot):
-        return task.kind in IN_SPACE
+        return task.kind in IN_SPACE and robot.actuators.kind in SPACE_FAMILIES
     entry = LAWS.get(robot.actuators.law)
     return entry is not None and task.kind in entry.tasks
 

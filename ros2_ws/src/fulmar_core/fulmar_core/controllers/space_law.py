@@ -49,6 +49,7 @@ class SpaceLaw(Law):
         if not isinstance(self.robot.actuators, Pushing):
             raise ValueError("the law allocates valves or fans; this robot has neither.")
         self.frame = SpaceFrame(self.task)
+        self._modulation: DeltaSigma | None = None
         self._com = np.array(self.robot.body.com)
         self._inertia = self.robot.body.inertia_matrix
 
@@ -66,16 +67,14 @@ class SpaceLaw(Law):
         cost = gains.open_valve / self.control_hz
         self.allocation = allocation_of(actuators, weight=weight, cost=cost)
         most = np.repeat((gains.carried_force, gains.carried_torque), 3)
-        self._modulation = DeltaSigma(self.allocation, actuators, most=most) if actuators.binary else None
+        if actuators.binary:
+            self._modulation = DeltaSigma(self.allocation, actuators, most=most)
 
     def reset(self) -> None:
         """Forget what the valves owe."""
         super().reset()
-        modulation: DeltaSigma | None = getattr(
-            self, "_modulation", None
-        )  # the first reset precedes `prepare`
-        if modulation is not None:
-            modulation.reset()
+        if self._modulation is not None:
+            self._modulation.reset()
 
     def command(self, inputs: Inputs) -> np.ndarray:
         """Choose commands; shapes as in `Controller.act`."""
