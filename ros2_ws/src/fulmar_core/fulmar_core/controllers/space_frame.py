@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -40,12 +41,9 @@ class SpaceFrame:
         self.tracks, self.passes = task.goal_topic == "goal_velocity", task.goal_topic == "goal_path"
         self.heads = task.goal_topic == "goal_pose" or bool(getattr(task, "turns", False))
 
-    def motion(self, inputs: Inputs[SpatialState]) -> SpaceMotion:
+    def motion(self, inputs: Inputs) -> SpaceMotion:
         """Errors and motion; of the estimated state, where there is an estimate."""
-        estimate = inputs.estimates
-        if estimate is not None:
-            inputs = replace(inputs, state=estimate.state)
-        state, target = inputs.state, inputs.goal.current
+        estimate, state, target = inputs.estimates, _state(inputs), inputs.goal.current
         alive = None if estimate is None else estimate.alive
         velocity, rate = _rows(state.velocity_in_body), _rows(state.rate)
         none = np.zeros_like(state.qw)
@@ -58,11 +56,17 @@ class SpaceFrame:
         way = _rows(turn_back(state.quat, minus(position_of(target), state.position)))
         return SpaceMotion(way, to_goal, velocity, rate, velocity, rate, alive)
 
-    def next_leg(self, inputs: Inputs[SpatialState]) -> np.ndarray:
+    def next_leg(self, inputs: Inputs) -> np.ndarray:
         """Way from the current target to the one after it, in the body's frame, shape (n, 3) [m]."""
-        state = inputs.state if inputs.estimates is None else inputs.estimates.state
         here, there = inputs.goal.current, inputs.goal.ahead(1)
-        return _rows(turn_back(state.quat, minus(position_of(there), position_of(here))))
+        return _rows(turn_back(_state(inputs).quat, minus(position_of(there), position_of(here))))
+
+
+def _state(inputs: Inputs) -> SpatialState:
+    """The state to act on."""
+    source: Any = inputs if inputs.estimates is None else inputs.estimates
+    state: SpatialState = source.state
+    return state
 
 
 def _rows(vector: Vector) -> np.ndarray:

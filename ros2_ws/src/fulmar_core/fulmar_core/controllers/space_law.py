@@ -136,9 +136,9 @@ def _cut(error: np.ndarray, most: float, braking: float, lead: float) -> np.ndar
     limit = np.full_like(length, most)
     if braking > 0.0:
         limit = np.minimum(limit, lead * np.sqrt(2.0 * braking * length))
-    return error * np.minimum(1.0, limit / length)
+    return np.asarray(error * np.minimum(1.0, limit / length))
 
 
 def _length(vectors: np.ndarray) -> np.ndarray:
     """Lengths, no less than a nanometre, shape (n, 1)."""
-    return np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-9)
+    return np.asarray(np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-9))

@@ -60,7 +60,7 @@ def linearise(robot: Robot, state: State, command: np.ndarray, dt: float) -> Lin
         low, high = np.maximum(low, actuators.lowest), np.minimum(high, actuators.scale)
     dynamics, off_centre = dynamics_of(robot), any(robot.body.center_of_mass)
 
-    def moved(states: State, commands: np.ndarray) -> State:
+    def moved(states: Any, commands: np.ndarray) -> Any:
         count = commands.shape[1]
         world, still = nominal_worlds(robot, count), (np.zeros(count),) * 3
         actuation = actuation_of(robot, commands)
@@ -105,7 +105,7 @@ def linearise_wrench(robot: Robot, state: State, wrench: np.ndarray, dt: float) 
             "commands."
         )
 
-    def moved(now: State, inputs: np.ndarray) -> State:
+    def moved(now: Any, inputs: np.ndarray) -> Any:
         count, physics_dt = inputs.shape[1], robot.timing.physics_dt
         world = nominal_worlds(robot, count)
         still = (np.zeros(count),) * 3
@@ -139,8 +139,9 @@ class _Chart:
 
 def _chart(state: State, moved: Callable[[State], State]) -> _Chart:
     """The vectors of a state; `moved` does the step with nothing but the trim, for states of shapes (1,)."""
-    if not isinstance(state, SpatialState):
+    if isinstance(state, PlanarState):
         return _Chart(_columns(state), lambda x: PlanarState(*x), _columns)
+    assert isinstance(state, SpatialState)  # there is no other
     before = state.in_float64().mapped(lambda column: column.reshape(1))
     after = moved(before)
     assert isinstance(after, SpatialState)
