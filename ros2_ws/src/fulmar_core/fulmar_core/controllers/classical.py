@@ -131,7 +131,7 @@ def check_pair(robot: Robot, task: Task, *, law: str | None = None) -> None:
         theirs = ("space", "the plane") if is_in_space(robot) else ("the plane", "space")
         raise ConfigError(
             f"'{robot.name}' moves in {theirs[0]}, '{task.name}' is a task in {theirs[1]}. "
-            f"Laws for '{robot.name}' do: {', '.join(entry.tasks)}."
+            f"Choose one of: {', '.join(entry.tasks)}."
         )
     if task.kind not in entry.tasks:
         raise ConfigError(
