@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from fulmar_core.controllers.classical import LAWS, check_pair, families_of, load_classical
+from fulmar_core.controllers.classical import LAWS, check_pair, families_of, is_in_space, load_classical
 from fulmar_core.controllers.controller import Controller
 from fulmar_core.controllers.excite import TASKS as EXCITE_TASKS
 from fulmar_core.controllers.excite import Excite
@@ -80,6 +80,11 @@ def _load_excite(robot: Robot, task: Task, choice: Choice) -> Controller:
 
 
 def _check_excite(robot: Robot, task: Task) -> None:
+    if is_in_space(robot):
+        raise ConfigError(
+            f"controller 'excite' is for robots in the plane; '{robot.name}' floats in space. "
+            "Use --controller lqr or pd."
+        )
     if task.kind not in EXCITE_TASKS:
         raise ConfigError(
             f"controller 'excite' stays around one place, '{task.name}' has none. "
@@ -108,6 +113,7 @@ CONTROLLERS = {
         "a learned policy bundle", _load_policy, _any_pair, ("onnxruntime",), runs_bundle=True
     ),
     "lqr": _law("linear-quadratic regulator with valve allocation", "lqr"),
+    "pd": _law("proportional-derivative control of bodies in space", "pd"),
     "mpc": _law("predictive control that tries combinations of valves", "mpc"),
     "lqr_drift": _law("the published LQR of DRIFT, to compare with", "lqr_drift"),
     "classical": _law(f"the law of the robot's family: {_LAWS}", None),

@@ -11,16 +11,16 @@ from fulmar_core.controllers.controller import Inputs
 from fulmar_core.goal import Goal, goal_in_float64
 from fulmar_core.health.actuator_estimator import ActuatorEstimate
 from fulmar_core.observation import Observer
-from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
 from fulmar_core.simulation import BatchSimulation
+from fulmar_core.state import State
 from fulmar_core.tasks import Task
 
 
 def inputs_at(
     robot: Robot,
     task: Task,
-    state: PlanarState,
+    state: State,
     goal: Goal,
     *,
     previous: Any = None,
@@ -38,9 +38,7 @@ def inputs_at(
         estimates: Of an actuator estimator.
         stamp_ns: Of the measurement [ns].
     """
-    one = PlanarState(
-        *(np.atleast_1d(np.asarray(getattr(state, name), dtype=float)) for name in PlanarState.COLUMNS)
-    )
+    one = state.mapped(lambda column: np.atleast_1d(np.asarray(column, dtype=float)))
     count = len(one.x)
     goals = goal_in_float64(goal if np.ndim(goal.done) else goal[None])
     if len(goals.done) != count:

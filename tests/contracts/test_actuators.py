@@ -24,8 +24,12 @@ ROBOTS = robots_of_every_family()
 EACH = pytest.mark.parametrize("robot", ROBOTS.values(), ids=ROBOTS)
 PUSHED = {name: robot for name, robot in ROBOTS.items() if isinstance(robot.actuators, Pushing)}
 WHEELED = {name: robot for name, robot in ROBOTS.items() if isinstance(robot.actuators, Rolling)}
-PUSHED_IN_PLANE = {name: robot for name, robot in PUSHED.items() if robot.state_type is PlanarState}
 EACH_PUSHED = pytest.mark.parametrize("robot", PUSHED.values(), ids=PUSHED)
+# Of bodies in space `fulmar_core/test_linear_model_in_space.py` tests the linear models.
+IN_PLANE = {name: robot for name, robot in ROBOTS.items() if robot.state_type is PlanarState}
+EACH_IN_PLANE = pytest.mark.parametrize("robot", IN_PLANE.values(), ids=IN_PLANE)
+PUSHED_IN_PLANE = {name: robot for name, robot in PUSHED.items() if name in IN_PLANE}
+EACH_PUSHED_IN_PLANE = pytest.mark.parametrize("robot", PUSHED_IN_PLANE.values(), ids=PUSHED_IN_PLANE)
 EACH_WHEELED = pytest.mark.parametrize("robot", WHEELED.values(), ids=WHEELED)
 SECOND_NS = 10**9
 # Seconds after commands end, beyond the longest ramp of the robots here.
@@ -220,7 +224,7 @@ def stacked(state):
     return np.array([float(getattr(state, name)) for name in PlanarState.COLUMNS])
 
 
-@EACH
+@EACH_IN_PLANE
 def test_the_linear_model_predicts_a_step_about_a_trim(robot):
     state, command = trim_of(robot)
     dt = robot.timing.control_s
@@ -241,7 +245,7 @@ def test_the_linear_model_predicts_a_step_about_a_trim(robot):
         np.testing.assert_allclose(predicted, found, rtol=0, atol=20.0 * small**2)
 
 
-@pytest.mark.parametrize("robot", PUSHED_IN_PLANE.values(), ids=PUSHED_IN_PLANE)
+@EACH_PUSHED_IN_PLANE
 def test_the_linear_model_of_a_wrench_is_that_of_the_commands_behind_it(robot):
     """Both go through the same dynamics, one with what the actuators make of commands."""
     state, command = trim_of(robot)

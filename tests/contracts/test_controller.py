@@ -20,6 +20,7 @@ from fulmar_core.paths import config_names
 from fulmar_core.planar import at_rest
 from fulmar_core.policy_bundle import read_passport
 from fulmar_core.simulation import BatchSimulation
+from fulmar_core.spatial import SpatialState, at_rest_in_space, position_of, quat_of
 from fulmar_core.tasks import load_task
 from policy_server.controllers import CONTROLLERS, Choice, load_controller, shipped_policies
 from tests.inputs import some_of
@@ -147,12 +148,15 @@ def test_it_answers_a_robot_at_rest_where_it_shall_be(case):
     simulation = BatchSimulation(robot, task, load_scenario("ideal"), worlds=1, seed=1)
     goal = simulation.goal
     target = np.asarray(goal.targets[:, 0], dtype=float)
-    if task.goal_topic == "goal_velocity":
-        targets, place = 0.0 * target, 0.0 * target
+    in_space, tracks = task.state_type is SpatialState, task.goal_topic == "goal_velocity"
+    targets = 0.0 * target if tracks else target
+    if in_space:
+        place = np.array([[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]]) if tracks else target
+        still = at_rest_in_space(position_of(place), quat_of(place))
     else:
-        targets, place = target, target
+        still = at_rest(*targets.T)
     goal = replace(goal, targets=targets[:, None], things=dict.fromkeys(goal.things, targets))
-    simulation.put(at_rest(*place.T), goal, simulation.command)
+    simulation.put(still, goal, simulation.command)
     controller.reset()
     assert np.isfinite(controller.act(measured(robot, task, controller, simulation))).all()
 
@@ -194,10 +198,13 @@ def test_pairs_without_a_law_are_refused_with_what_to_use_instead(name):
     lacking = [(r, t) for r in ROBOTS.values() for t in TASKS.values() if not has_one(name, r, t)]
     assert lacking
     for robot, task in lacking:
-        with pytest.raises(ConfigError, match="Use --controller") as raised:
+        with pytest.raises(ConfigError, match=r"Use --controller|Choose one of") as raised:
             load_controller(name, robot, task, Choice(robot.timing.control_hz))
         words = str(raised.value)
         assert f"'{robot.name}'" in words
+        if task.state_type is not robot.state_type:  # no controller does that
+            assert "is a task in " in words or "is for robots with" in words
+            continue
         assert "is for robots with thrusters" in words or "there is one for: go_to_" in words
 
 

@@ -63,7 +63,16 @@ def test_the_list_is_one_json_object(fulmar):
         "robots", "tasks", "controllers", "systems", "policies", "goals", "hardware", "scenarios", "estimators",
     ]  # fmt: skip
     assert "nominal" in found["scenarios"]
-    assert found["controllers"] == ["policy", "lqr", "mpc", "lqr_drift", "classical", "excite", "external"]
+    assert found["controllers"] == [
+        "policy",
+        "lqr",
+        "pd",
+        "mpc",
+        "lqr_drift",
+        "classical",
+        "excite",
+        "external",
+    ]
     tasks = json.loads(fulmar("list", "tasks", "--json")[1])["tasks"]
     assert {"go_to_pose", "go_to_position", "go_through_positions", "track_velocities"} <= set(tasks)
 

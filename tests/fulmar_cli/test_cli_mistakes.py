@@ -44,8 +44,20 @@ def broken_configs(tmp_path, monkeypatch):
         ),
         (["run", "leatherback", "--controller", "lqr"], "controller 'lqr' is for robots with thrusters"),
         (
-            [*RUN, "--controller", "pid"],
-            "unknown controller 'pid'. Known: classical, excite, external, lqr, lqr_drift, mpc, policy.",
+            [*RUN, "--controller", "fuzzy"],
+            "unknown controller 'fuzzy'. Known: classical, excite, external, lqr, lqr_drift, mpc, pd, policy.",
+        ),
+        (
+            ["evaluate", "floating_platform", "go_to_pose", "--controller", "pd"],
+            "'pd' is for robots with thrusters or fans in space; 'floating_platform' moves in the plane",
+        ),
+        (
+            ["evaluate", "spacecraft_16", "go_to_pose", "--controller", "pd"],
+            "'spacecraft_16' moves in space, 'go_to_pose' is a task in the plane. Choose one of: go_to_position_3d",
+        ),
+        (
+            ["evaluate", "spacecraft_16", "go_to_pose_3d", "--controller", "excite"],
+            "'excite' is for robots in the plane; 'spacecraft_16' floats in space",
         ),
         ([*RUN, "--backend", "gazebo"], "unknown backend 'gazebo'. Known: hardware, mock, mujoco."),
         (["run", "jetbot", "--backend", "hardware"], "there is no hardware driver for 'jetbot'"),

@@ -11,7 +11,7 @@ import pytest
 from fulmar_core.actuators.family import Actuators
 from fulmar_core.actuators.response import Response
 from fulmar_core.config import load_config
-from fulmar_core.controllers.classical import LAWS, OTHERS, check_pair, has_law, load_classical
+from fulmar_core.controllers.classical import LAWS, OTHERS, SPACE_LAWS, check_pair, has_law, load_classical
 from fulmar_core.controllers.excite import Excite
 from fulmar_core.controllers.guidance import way_to_face
 from fulmar_core.disturbances.scenario import load_scenario
@@ -29,12 +29,7 @@ from tests.pairs import covering
 
 ROBOTS = {name: load_robot(name) for name in config_names("robots")}
 TASKS = {name: load_task(name) for name in config_names("tasks")}
-PAIRS = [
-    (robot, task)
-    for robot in ROBOTS.values()
-    for task in TASKS.values()
-    if task.kind in LAWS[robot.actuators.law].tasks
-]
+PAIRS = [(robot, task) for robot in ROBOTS.values() for task in TASKS.values() if has_law(robot, task)]
 WHEELED = [robot for robot in ROBOTS.values() if robot.actuators.kind in ("differential_drive", "ackermann")]
 BOAT = ROBOTS["kingfisher"]
 
@@ -193,8 +188,9 @@ def test_the_metadata_hash_changes_with_every_gain(robot, name):
 
 @pytest.mark.parametrize("robot", ROBOTS.values(), ids=ROBOTS)
 def test_a_rate_that_the_physics_cannot_keep_is_refused(robot):
+    task = "go_to_position" if robot.state_type is PlanarState else "go_to_position_3d"
     with pytest.raises(ConfigError, match=rf"'{robot.name}' at 7 Hz: control_hz = 7 must divide"):
-        load_classical(robot, TASKS["go_to_position"], control_hz=7.0)
+        load_classical(robot, TASKS[task], control_hz=7.0)
 
 
 def test_a_heading_gain_that_would_not_be_stable_is_refused():
@@ -206,13 +202,20 @@ def test_a_heading_gain_that_would_not_be_stable_is_refused():
 def test_docs_state_of_every_law_and_of_every_task_that_one_does():
     text = (Path(__file__).parents[2] / "docs/controllers.md").read_text(encoding="utf-8")
     entries = {**LAWS, **{law: entry for law, (_, entry) in OTHERS.items()}}
-    names = set(entries) | {entry.law.law for entry in entries.values()}
-    tasks = {task for entry in entries.values() for task in entry.tasks if task != "track_velocities"}
+    names = set(entries) | {entry.law.law for entry in entries.values()} | set(SPACE_LAWS)
+    tasks = {
+        task
+        for entry in (*entries.values(), *SPACE_LAWS.values())
+        for task in entry.tasks
+        if task != "track_velocities"
+    }
     assert {name for name in names | tasks if f"`{name}`" not in text} == set()
 
 
 def test_every_file_of_gains_belongs_to_a_robot_and_its_law():
-    every = {f"{robot.name}_{LAWS[robot.actuators.law].law.law}" for robot in ROBOTS.values()}
+    # Bodies in space do with default gains.
+    in_plane = [robot for robot in ROBOTS.values() if robot.state_type is PlanarState]
+    every = {f"{robot.name}_{LAWS[robot.actuators.law].law.law}" for robot in in_plane}
     others = {
         f"{robot.name}_{law}"
         for law, (family, _) in OTHERS.items()

@@ -17,6 +17,7 @@ from fulmar_core.rotation import Array
 
 Vector3 = tuple[float, float, float]
 PLANAR = [0, 1, 5]  # of a wrench: force ahead, to the left, and yaw moment
+WRENCH = 6  # numbers of a wrench in space: three forces, three torques
 
 
 @dataclass(frozen=True)
@@ -142,6 +143,19 @@ class Pushing(Actuators):
         across = images * np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
         same = np.abs(across[:, None] - images).max(axis=-1) < 1e-9 * np.abs(images).max()
         return same.astype(float) if (same.sum(axis=1) == 1).all() else None
+
+
+def wrench_columns(count: int) -> list[int]:
+    """Which of the six numbers of a wrench count where wrenches have so many: 3 of robots in the plane, or all 6.
+
+    Raises:
+        ValueError: Any other count.
+    """
+    if count not in (len(PLANAR), WRENCH):
+        raise ValueError(
+            f"a wrench has {len(PLANAR)} numbers in the plane and {WRENCH} in space, found {count}."
+        )
+    return PLANAR if count == len(PLANAR) else list(range(WRENCH))
 
 
 def unit(vector: Vector3) -> Vector3:

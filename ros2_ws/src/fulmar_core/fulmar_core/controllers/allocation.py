@@ -6,7 +6,7 @@ from typing import Protocol
 
 import numpy as np
 
-from fulmar_core.actuators.pushing import Pushing
+from fulmar_core.actuators.pushing import WRENCH, Pushing
 from fulmar_core.controllers.opening_allocation import OpeningAllocation
 from fulmar_core.controllers.thrust_allocation import ThrustAllocation
 from fulmar_core.controllers.valve_allocation import ValveAllocation
@@ -20,7 +20,7 @@ class Allocation(Protocol):
         """Commands with the least weighted error and price.
 
         Args:
-            wanted: Wrench [F_x, F_y, M_z] in the body frame, shape (..., 3) [N, N, N·m].
+            wanted: Wrench in the body frame, shape (..., 3) as [F_x, F_y, M_z] in the plane, or (..., 6) [N, N·m].
             alive: 1, or 0 for actuators that are dead, shape (..., n); all live by default.
             dearer: Cost of each actuator at full command beyond the usual one, shape (...,); none by default.
 
@@ -35,11 +35,12 @@ def allocation_of(actuators: Pushing, *, weight: np.ndarray, cost: float) -> All
 
     Args:
         actuators: On/off ones, those that share a supply by degrees, or any others that push one way by degrees.
-        weight: Cost of a wrench error [F_x, F_y, M_z], symmetric positive definite, shape (3, 3).
+        weight: Cost of a wrench error, symmetric positive definite, shape (3, 3) or (6, 6); columns as of
+            `wrench_columns`.
         cost: Of each actuator at full command, >= 0.
 
     Raises:
-        ValueError: They do not push one way.
+        ValueError: They do not push one way, or are valves that open by degrees on one line, in space.
     """
     if not actuators.one_way:
         raise ValueError(
@@ -48,5 +49,10 @@ def allocation_of(actuators: Pushing, *, weight: np.ndarray, cost: float) -> All
     if actuators.binary:
         return ValveAllocation(actuators, weight=weight, valve_cost=cost)
     if actuators.shared_pressure:
+        if len(weight) == WRENCH:
+            raise ValueError(
+                "valves that open by degrees on one line are allocated in the plane only; in space use on/off valves "
+                "('continuous: false'), or none that share ('shared_pressure: false')."
+            )
         return OpeningAllocation(actuators, weight=weight, valve_cost=cost)
     return ThrustAllocation(actuators, weight=weight, cost=cost)

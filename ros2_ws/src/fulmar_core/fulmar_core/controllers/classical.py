@@ -1,4 +1,4 @@
-"""The classical laws, and the tasks that each does; a family of actuators names the one that drives it.
+"""The classical laws, and the tasks that each does; a family of actuators names the one that drives it in the plane.
 
 The explicit table. Another law is one file here and one entry below.
 """
@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from fulmar_core.actuators.families import FAMILIES
+from fulmar_core.actuators.pushing import Pushing
 from fulmar_core.config import load_config
 from fulmar_core.controllers.default_gains import (
     line_of_sight_gains,
@@ -26,14 +27,21 @@ from fulmar_core.controllers.lqr_drift import DriftWeights, LqrDrift
 from fulmar_core.controllers.mpc import Mpc, MpcGains
 from fulmar_core.controllers.polar import Polar, PolarGains
 from fulmar_core.controllers.pure_pursuit import PurePursuit, PurePursuitGains
+from fulmar_core.controllers.space_gains import space_lqr_weights, space_pd_gains
+from fulmar_core.controllers.space_lqr import SpaceLqr, SpaceLqrWeights
+from fulmar_core.controllers.space_pd import SpacePd, SpacePdGains
 from fulmar_core.errors import ConfigError
 from fulmar_core.paths import config_names, config_path
 from fulmar_core.robot import Robot
+from fulmar_core.spatial import SpatialState
 from fulmar_core.tasks import Task
 
 POSITIONS = ("go_to_position", "go_to_position_with_obstacles", "go_through_positions", "race_waypoints")
 POSES = ("go_to_pose", "go_through_poses", "race_wayposes")
 VELOCITIES = ("track_velocities",)
+IN_SPACE = (
+    "go_to_position_3d", "go_to_pose_3d", "go_through_positions_3d", "go_through_poses_3d", "track_velocities_3d",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -62,11 +70,25 @@ OTHERS = {
     "lqr_drift": ("thrusters", Entry(LqrDrift, DriftWeights, ("go_to_pose",))),
 }
 
+# Laws of bodies in space, whose states are `SpatialState`; the first one is that of every family.
+SPACE_LAWS = {
+    "lqr": Entry(SpaceLqr, SpaceLqrWeights, IN_SPACE, space_lqr_weights),
+    "pd": Entry(SpacePd, SpacePdGains, IN_SPACE, space_pd_gains),
+}
+SPACE_FAMILIES = tuple(kind for kind, each in FAMILIES.items() if issubclass(each, Pushing) and each.one_way)
+
+
+def is_in_space(robot: Robot) -> bool:
+    """Whether a robot's laws are those of `SPACE_LAWS`."""
+    return robot.state_type is SpatialState
+
 
 def families_of(law: str | None) -> tuple[str, ...]:
-    """Families of actuators that a law is for; with None those that any of `LAWS` is for."""
+    """Families of actuators that a law is for; with None those that any law is for."""
     if law in OTHERS:
         return (OTHERS[law][0],)
+    if law in SPACE_LAWS and law not in LAWS:
+        return SPACE_FAMILIES
     return tuple(kind for kind, each in FAMILIES.items() if each.law and law in (None, each.law))
 
 
@@ -76,8 +98,12 @@ def entry_of(robot: Robot, law: str | None) -> Entry:
     Raises:
         ConfigError: No law is for actuators of this kind.
     """
+    if is_in_space(robot):
+        return SPACE_LAWS.get(law or "", SPACE_LAWS["lqr"])
     if law in OTHERS:
         return OTHERS[law][1]
+    if law in SPACE_LAWS and law not in LAWS:
+        return SPACE_LAWS[law]
     if robot.actuators.law not in LAWS:
         raise ConfigError(
             f"no classical law is for '{robot.name}' ({robot.actuators.kind}); there is one for: "
@@ -93,12 +119,19 @@ def check_pair(robot: Robot, task: Task, *, law: str | None = None) -> None:
     Raises:
         ConfigError: With what would be allowed.
     """
+    _check_space(robot, law)
     family, families = robot.actuators.kind, families_of(law)
     entry = entry_of(robot, law)
     if family not in families:
         raise ConfigError(
             f"controller '{law}' is for robots with {' or '.join(families)}; '{robot.name}' has {family}. "
             "Use --controller classical."
+        )
+    if task.state_type is not robot.state_type:
+        theirs = ("space", "the plane") if is_in_space(robot) else ("the plane", "space")
+        raise ConfigError(
+            f"'{robot.name}' moves in {theirs[0]}, '{task.name}' is a task in {theirs[1]}. "
+            f"Choose one of: {', '.join(entry.tasks)}."
         )
     if task.kind not in entry.tasks:
         raise ConfigError(
@@ -109,8 +142,26 @@ def check_pair(robot: Robot, task: Task, *, law: str | None = None) -> None:
         gains_of(robot, law)
 
 
+def _check_space(robot: Robot, law: str | None) -> None:
+    """Reject a law for robots in the plane on a body in space, and the other way round.
+
+    Raises:
+        ConfigError: With what would be allowed.
+    """
+    in_plane, space = (*LAWS, *OTHERS), is_in_space(robot)
+    if law in (SPACE_LAWS if space else in_plane) or law not in (*in_plane, *SPACE_LAWS):
+        return
+    here, there = ("floats in space", "in the plane") if space else ("moves in the plane", "in space")
+    raise ConfigError(
+        f"controller '{law}' is for robots with {' or '.join(families_of(law))} {there}; '{robot.name}' {here}. "
+        f"Use --controller {' or '.join(SPACE_LAWS) if space else 'classical'}."
+    )
+
+
 def has_law(robot: Robot, task: Task) -> bool:
     """Whether there is a classical law for a pair."""
+    if is_in_space(robot):
+        return task.kind in IN_SPACE and robot.actuators.kind in SPACE_FAMILIES
     entry = LAWS.get(robot.actuators.law)
     return entry is not None and task.kind in entry.tasks
 

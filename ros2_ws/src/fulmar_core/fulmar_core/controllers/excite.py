@@ -13,7 +13,7 @@ import numpy as np
 from fulmar_core.actuators.excitation import Excitation
 from fulmar_core.actuators.families import FAMILIES
 from fulmar_core.controllers.controller import Inputs
-from fulmar_core.controllers.law import Law
+from fulmar_core.controllers.planar_law import PlanarLaw
 from fulmar_core.identification.model import nominal_world
 from fulmar_core.motion import actuation_of, move
 from fulmar_core.planar import PlanarState
@@ -24,7 +24,7 @@ TASKS = ("go_to_position", "go_to_pose")  # kinds with one place to stay around
 SEED = 5  # of the commands: any number
 
 
-class Excite(Law):
+class Excite(PlanarLaw):
     """Random commands around a goal."""
 
     law = "excite"

@@ -1,4 +1,4 @@
-"""Base class of the classical laws: gains, inputs in the body's frame, and an identity."""
+"""Base class of the classical laws: gains, rate, and an identity."""
 
 from __future__ import annotations
 
@@ -10,9 +10,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from fulmar_core.controllers.body_frame import BodyFrame, Vector
 from fulmar_core.controllers.controller import Inputs
-from fulmar_core.controllers.guidance import passing_speed, room_ahead
 from fulmar_core.health.filters import HealthSettings
 from fulmar_core.observation import Observer
 from fulmar_core.robot import Robot
@@ -50,13 +48,15 @@ class Law(ABC):
         self.name = name or self.law
         self.control_hz = control_hz or robot.timing.control_hz
         self.robot, self.task, self.gains = robot, task, gains
-        self.frame = BodyFrame(robot, task)
         self.estimator: HealthSettings | None = None
-        if self.frame.crosses_obstacles and not gains.speed_around:
-            raise ValueError("'speed_around' is missing, which says how fast to go among obstacles.")
+        self.bind()
         robot.timing.substeps(self.control_hz)  # refuses rates that the physics cannot keep
         self.reset()
         self.prepare()
+
+    @abstractmethod
+    def bind(self) -> None:
+        """Choose the frame that robot and task are seen in; raises ValueError for gains that the task asks more of."""
 
     def prepare(self) -> None:  # noqa: B027 - most laws need no more than their gains
         """Compute once what the commands need; raises ValueError for a robot that the law is not for."""
@@ -67,36 +67,6 @@ class Law(ABC):
     def act(self, inputs: Inputs) -> np.ndarray:
         """Choose a command; shapes as in `Controller.act`."""
         return np.asarray(self.robot.actuators.limited(self.command(inputs)))
-
-    @property
-    def share_of_speed(self) -> float:
-        """How much of the cruising speed may be used [-]."""
-        return float(self.gains.speed_around) if self.frame.crosses_obstacles else 1.0
-
-    @property
-    def near(self) -> float:
-        """What counts as being there [m]."""
-        passed = 0.7 * getattr(self.task, "reach", 0.0) if self.frame.passes else 0.0
-        return max(float(self.gains.near), passed)
-
-    def room(self, inputs: Inputs, direction: np.ndarray) -> np.ndarray:
-        """What is free in the direction of travel, infinite where nothing stands about; see `room_ahead`."""
-        if not self.frame.crosses_obstacles:
-            return np.full_like(direction, np.inf)
-        return room_ahead(self.frame.obstacles(inputs), direction)
-
-    def last_speed(self, goal: Vector, inputs: Inputs, *, cruise: np.ndarray | float) -> np.ndarray:
-        """Speed at the current target, shape (...,) [m/s]: that of passing it, or none where the robot shall stay.
-
-        Args:
-            goal: Way to the target, shapes (...,) [m].
-            inputs: Hold where the next one is.
-            cruise: Speed where the path goes straight on [m/s].
-        """
-        if not self.frame.passes:
-            return np.zeros_like(goal[0])
-        leg = self.frame.next_leg(inputs)
-        return passing_speed(goal, leg, cruise=cruise, corner=self.gains.corner)
 
     @abstractmethod
     def command(self, inputs: Inputs) -> np.ndarray:

@@ -22,7 +22,7 @@ from fulmar_core.controllers.guidance import (
     way_to_face,
     way_to_turn_least,
 )
-from fulmar_core.controllers.law import Law
+from fulmar_core.controllers.planar_law import PlanarLaw
 from fulmar_core.controllers.propeller_allocation import PropellerAllocation
 
 
@@ -56,7 +56,7 @@ class LineOfSightGains:
             )
 
 
-class LineOfSight(Law):
+class LineOfSight(PlanarLaw):
     """Sails to positions, to poses, through waypoints, and at velocities."""
 
     law = "line_of_sight"

@@ -18,7 +18,7 @@ from fulmar_core.controllers.allocation import allocation_of
 from fulmar_core.controllers.body_frame import BodyState, Vector
 from fulmar_core.controllers.controller import Inputs
 from fulmar_core.controllers.force_authority import ForceAuthority
-from fulmar_core.controllers.law import Law
+from fulmar_core.controllers.planar_law import PlanarLaw
 from fulmar_core.dynamics.linear_model import linearise_wrench
 from fulmar_core.health.filters import HealthSettings
 from fulmar_core.planar import at_rest
@@ -94,7 +94,7 @@ class LqrWeights:
             raise ValueError("'braking' must lie in [0, 1].")
 
 
-class Lqr(Law):
+class Lqr(PlanarLaw):
     """LQR on the estimated or measured state; holds the heading where the task has one."""
 
     law = "lqr"

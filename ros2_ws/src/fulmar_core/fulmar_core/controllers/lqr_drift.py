@@ -41,8 +41,8 @@ import numpy as np
 from fulmar_core.actuators.pushing import PLANAR
 from fulmar_core.actuators.thrusters import Thrusters
 from fulmar_core.controllers.controller import Inputs
-from fulmar_core.controllers.law import Law
 from fulmar_core.controllers.lqr import regulator
+from fulmar_core.controllers.planar_law import PlanarLaw
 from fulmar_core.dynamics.free_body import free_body_step
 from fulmar_core.dynamics.linear_model import nominal_worlds, slopes
 from fulmar_core.planar import PlanarState
@@ -69,7 +69,7 @@ class DriftWeights:
             raise ValueError("the weights of states and inputs must be greater than 0.")
 
 
-class LqrDrift(Law):
+class LqrDrift(PlanarLaw):
     """The published law; remembers its heading, whose quaternion does not jump after half a turn."""
 
     law = "lqr_drift"

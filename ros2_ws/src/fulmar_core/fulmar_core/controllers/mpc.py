@@ -17,8 +17,8 @@ import numpy as np
 from fulmar_core.actuators.thrusters import Thrusters
 from fulmar_core.controllers.body_frame import BodyState
 from fulmar_core.controllers.controller import Inputs
-from fulmar_core.controllers.law import Law
 from fulmar_core.controllers.lqr import Lqr, LqrWeights
+from fulmar_core.controllers.planar_law import PlanarLaw
 from fulmar_core.controllers.valve_allocation import ValveAllocation
 
 
@@ -44,7 +44,7 @@ class MpcGains(LqrWeights):
             raise ValueError("'observer' is missing, which the model has its push from.")
 
 
-class Mpc(Law):
+class Mpc(PlanarLaw):
     """Looks ahead before it opens valves; for poses that stay where they are."""
 
     law = "mpc"

@@ -23,7 +23,7 @@ from fulmar_core.controllers.guidance import (
     stopping_speed,
     way_to_face,
 )
-from fulmar_core.controllers.law import Law
+from fulmar_core.controllers.planar_law import PlanarLaw
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class PolarGains:
             raise ValueError("'velocity' must lie in [0, 1), 'corner' must not be negative.")
 
 
-class Polar(Law):
+class Polar(PlanarLaw):
     """Drives to poses, to positions, through waypoints, and at velocities."""
 
     law = "polar"

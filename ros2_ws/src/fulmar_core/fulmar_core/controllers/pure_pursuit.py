@@ -25,7 +25,7 @@ from fulmar_core.controllers.guidance import (
     stopping_speed,
     way_to_face,
 )
-from fulmar_core.controllers.law import Law
+from fulmar_core.controllers.planar_law import PlanarLaw
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class PurePursuitGains:
             raise ValueError("gains must be greater than 0; 'corner' not negative, 'velocity' in [0, 1).")
 
 
-class PurePursuit(Law):
+class PurePursuit(PlanarLaw):
     """Drives to positions, through waypoints, and at velocities."""
 
     law = "pure_pursuit"

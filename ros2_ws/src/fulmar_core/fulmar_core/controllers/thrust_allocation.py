@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fulmar_core.actuators.pushing import PLANAR, Pushing
+from fulmar_core.actuators.pushing import Pushing, wrench_columns
 from fulmar_core.rotation import Array
 
 LEAST_COST = (
@@ -29,13 +29,15 @@ class ThrustAllocation:
 
         Args:
             actuators: Those that push.
-            weight: Cost of a wrench error [F_x, F_y, M_z], symmetric positive definite, shape (3, 3).
+            weight: Cost of a wrench error, symmetric positive definite, shape (k, k); columns as of `wrench_columns`.
             cost: Of each actuator at full thrust, >= 0.
         """
-        self._full = actuators.full_thrust[:, None] * actuators.wrench_per_newton[:, PLANAR]  # (n, 3)
+        self._full = (
+            actuators.full_thrust[:, None] * actuators.wrench_per_newton[:, wrench_columns(len(weight))]
+        )
         # Units in which the weight is the identity: λ, w and the slope are then of one size.
         self._root = np.linalg.cholesky(weight)
-        self._columns = self._full @ self._root  # (n, 3)
+        self._columns = self._full @ self._root  # (n, k)
         size = float(np.square(self._columns).sum(axis=1).max())
         self._cost, self._scale = max(cost, LEAST_COST * size), np.sqrt(size)
 
@@ -43,7 +45,7 @@ class ThrustAllocation:
         """See `Allocation.best`."""
         wanted = np.asarray(wanted, dtype=float)
         leading, count = wanted.shape[:-1], len(self._columns)
-        aim = wanted.reshape(-1, 3) @ self._root
+        aim = wanted.reshape(-1, len(self._root)) @ self._root
         works = np.ones((len(aim), count)) if alive is None else np.asarray(alive).reshape(-1, count)
         price = np.full(len(aim), self._cost)
         if dearer is not None:
@@ -69,12 +71,12 @@ class ThrustAllocation:
     def _slopes(
         self, lam: np.ndarray, aim: np.ndarray, works: np.ndarray, price: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Slope (rows, 3) and second derivative (rows, 3, 3) of the dual function."""
+        """Slope (rows, k) and second derivative (rows, k, k) of the dual function."""
         pull = _rows(lam, self._columns) / price[:, None]
         shares = works * np.clip(pull, 0.0, 1.0)
         slope = lam + _rows(shares, self._columns.T) - aim
         free = works * ((pull > 0.0) & (pull < 1.0)) / price[:, None]
-        return slope, np.eye(3) + np.einsum("rn,ni,nj->rij", free, self._columns, self._columns)
+        return slope, np.eye(len(self._root)) + np.einsum("rn,ni,nj->rij", free, self._columns, self._columns)
 
     def _length(
         self,

@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from fulmar_core.actuators.pushing import Pushing
+from fulmar_core.actuators.pushing import WRENCH, Pushing, wrench_columns
 from fulmar_core.rotation import Array
 
 MOST_IN_TABLE = 2**16  # combinations; 16 valves take 0.2 ms a wrench, and more are searched for in less
@@ -26,9 +26,9 @@ class ValveAllocation:
     """Table of every combination of valves that is worth opening.
 
     Attributes:
-        every: Commands (k, n), wrenches (k, 3), and costs of these without the part that depends on what is wanted,
-            (k,); all combinations, or those of few valves where all would be more than `MOST_LISTED`.
-        weight: Cost of a wrench error, shape (3, 3).
+        every: Commands (k, n), wrenches (k, 3 or 6), and costs of these without the part that depends on what is
+            wanted, (k,); all combinations, or those of few valves where all would be more than `MOST_LISTED`.
+        weight: Cost of a wrench error, shape (3, 3) or (6, 6).
     """
 
     def __init__(self, thrusters: Pushing, *, weight: np.ndarray, valve_cost: float) -> None:
@@ -36,14 +36,21 @@ class ValveAllocation:
 
         Args:
             thrusters: The bank.
-            weight: Cost of a wrench error [F_x, F_y, M_z], symmetric positive definite, shape (3, 3).
+            weight: Cost of a wrench error, symmetric positive definite, shape (3, 3) or (6, 6); columns as of
+                `wrench_columns`. In space the table is that of few valves (16: at most four), with a shared line
+                without improvement: more of them only share the thrust out.
             valve_cost: Cost of each open valve, >= 0; settles ties in favour of fewer valves.
         """
         count = len(thrusters.names)
         self._thrusters, self._valve_cost, self.weight = thrusters, valve_cost, weight
+        self._columns = wrench_columns(len(weight))
         self._whole = 2**count <= MOST_IN_TABLE
         few = self._listed(_few(count) if 2**count > MOST_LISTED else _all(count))
-        self.every, self._table = few, self._listed(_all(count)) if self._whole else few
+        if len(weight) == WRENCH:
+            self._whole = thrusters.shared_pressure or len(few[0]) == 2**count
+            self.every = self._table = few
+        else:
+            self.every, self._table = few, self._listed(_all(count)) if self._whole else few
         keep = _cheapest_of_equal_wrench(self._table[1], valve_cost * self._table[0].sum(axis=1))
         self._worth = tuple(each[keep] for each in self._table)
         self._changes = np.vstack((np.zeros(count), _of_size(count, 1), _of_size(count, 2)))
@@ -54,7 +61,7 @@ class ValveAllocation:
         A dead valve stays closed and takes no pressure from the others, so nothing is lost by never opening it.
 
         Args:
-            wanted: Wrench [F_x, F_y, M_z] in the body frame, shape (..., 3) [N, N, N·m].
+            wanted: Wrench in the body frame, shape (..., 3) as [F_x, F_y, M_z] in the plane, or (..., 6) [N, N·m].
             alive: 1, or 0 for valves that are dead, shape (..., n); all live by default.
             dearer: Cost of each open valve beyond `valve_cost`, shape (...,); none by default.
 
@@ -102,9 +109,9 @@ class ValveAllocation:
         return commands, wrench, offset + self._valve_cost * commands.sum(axis=1)
 
     def _wrench(self, commands: Array) -> np.ndarray:
-        """Force ahead and to the left, and yaw moment, shape (..., 3)."""
+        """Those numbers of the wrench that count, shape (..., 3 or 6)."""
         force, torque = self._thrusters.wrench_in_body(commands)
-        return np.concatenate((force[..., 0:2], torque[..., 2:3]), axis=-1)
+        return np.take(np.concatenate((force, torque), axis=-1), self._columns, axis=-1)
 
 
 def _all(count: int) -> np.ndarray:

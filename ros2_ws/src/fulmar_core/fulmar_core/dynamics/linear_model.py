@@ -1,35 +1,45 @@
-"""Linear models of a robot about any state, by central differences through the core's own dynamics."""
+"""Linear models of a robot about any state, by central differences through the core's own dynamics.
+
+In the plane x is the state itself. In space it is a departure of twelve numbers: position [m], rotation vector [rad],
+velocity [m/s] and turn rate [rad/s], three each and in the body's frame (Solà, arXiv 1711.02508, §4: errors of the
+attitude are local). Departures before a step are from the trim, those after it from where the step takes the trim.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from fulmar_core.actuators.rolling import Rolling
+from fulmar_core.attitude import Vector, exponential, minus, plus, product, rotation_error, turn, turn_back
+from fulmar_core.batch_dynamics import dynamics_of
 from fulmar_core.counter_rng import Draws
-from fulmar_core.disturbances.scenario import Scenario, draw_world
-from fulmar_core.disturbances.world import World
+from fulmar_core.disturbances.scenario import Scenario
 from fulmar_core.dynamics.free_body import free_body_step
+from fulmar_core.dynamics.rigid_body import inertia_of, rigid_body_step
 from fulmar_core.errors import ConfigError
-from fulmar_core.motion import actuation_of, move
+from fulmar_core.motion import actuation_of
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
+from fulmar_core.spatial import SpatialState
+from fulmar_core.state import State
 
 DELTA = 1e-4  # of states and inputs, in their own units and in shares of full command
-STATES = len(PlanarState.COLUMNS)
+DEPARTURES = 12  # numbers of a departure in space
 
 
 @dataclass(frozen=True)
 class LinearModel:
-    """x⁺ = A x + B u for small departures x of the state and u of the input; states as in `PlanarState`."""
+    """x⁺ = A x + B u for small departures x of the state and u of the input."""
 
-    a: np.ndarray  # (6, 6)
-    b: np.ndarray  # (6, m)
+    a: np.ndarray  # (n, n), n = 6 in the plane, in the order of `PlanarState`, 12 in space
+    b: np.ndarray  # (n, m)
 
 
-def linearise(robot: Robot, state: PlanarState, command: np.ndarray, dt: float) -> LinearModel:
+def linearise(robot: Robot, state: State, command: np.ndarray, dt: float) -> LinearModel:
     """Model of one control step, with commands as inputs, for every family.
 
     Commands count as applied: delay, slew and lag are of actuators that remember, and x has no room for what they do.
@@ -42,22 +52,21 @@ def linearise(robot: Robot, state: PlanarState, command: np.ndarray, dt: float) 
         dt: Time of one control step, a multiple of the physics step [s].
 
     Returns:
-        A (6, 6) and B (6, n), the latter per unit of command.
+        A and B, the latter per unit of command.
     """
     actuators, command = robot.actuators, np.asarray(command, dtype=float)
     low, high = command - DELTA * actuators.scale, command + DELTA * actuators.scale
     if not actuators.binary:  # at an end of its range an actuator goes one way only
         low, high = np.maximum(low, actuators.lowest), np.minimum(high, actuators.scale)
-    off_centre = any(robot.body.center_of_mass)
+    dynamics, off_centre = dynamics_of(robot), any(robot.body.center_of_mass)
 
-    def moved(states: np.ndarray, commands: np.ndarray) -> np.ndarray:
-        world = nominal_worlds(robot, states.shape[1])
+    def moved(states: Any, commands: np.ndarray) -> Any:
+        count = commands.shape[1]
+        world, still = nominal_worlds(robot, count), (np.zeros(count),) * 3
         actuation = actuation_of(robot, commands)
         actuation.begin(commands, world, None)
-        still = (np.zeros(states.shape[1]),) * 3
-        after = move(
-            robot,
-            PlanarState(*states),
+        return dynamics.move(
+            states,
             actuation,
             world,
             still,
@@ -65,27 +74,27 @@ def linearise(robot: Robot, state: PlanarState, command: np.ndarray, dt: float) 
             latest_s=0.0,
             off_centre=off_centre,
         )
-        return _columns(after)
 
-    trim = _columns(state)
-    each = np.tile(command[:, None], 2 * STATES)
-    a = slopes(lambda states: moved(states, each), trim - DELTA, trim + DELTA)
-    held = np.tile(trim[:, None], 2 * len(command))
-    b = slopes(lambda commands: moved(held, commands), low, high, around=command)
+    chart = _chart(state, lambda trim: moved(trim, command[:, None]))
+    each = np.tile(command[:, None], 2 * len(chart.trim))
+    a = slopes(lambda x: chart.numbers(moved(chart.state(x), each)), chart.trim - DELTA, chart.trim + DELTA)
+    held = chart.state(np.tile(chart.trim[:, None], 2 * len(command)))
+    b = slopes(lambda commands: chart.numbers(moved(held, commands)), low, high, around=command)
     return LinearModel(a, b)
 
 
-def linearise_wrench(robot: Robot, state: PlanarState, wrench: np.ndarray, dt: float) -> LinearModel:
+def linearise_wrench(robot: Robot, state: State, wrench: np.ndarray, dt: float) -> LinearModel:
     """Model of one control step with a wrench on the body as input, of robots that forces push.
 
     Args:
         robot: A robot with its nominal body, in a still world.
         state: Of the centre of mass, where to linearise, shapes ().
-        wrench: Held there, about the centre of mass and in the body's frame, [F_x, F_y, M_z], shape (3,) [N, N, N·m].
+        wrench: Held there, about the centre of mass and in the body's frame: [F_x, F_y, M_z], shape (3,), or in space
+            force and torque, shape (6,) [N, N·m].
         dt: Time of one control step, a multiple of the physics step [s].
 
     Returns:
-        A (6, 6) and B (6, 3).
+        A and B.
 
     Raises:
         ConfigError: The robot rolls on wheels, which take no wrench.
@@ -95,18 +104,75 @@ def linearise_wrench(robot: Robot, state: PlanarState, wrench: np.ndarray, dt: f
             f"'{robot.name}' rolls on wheels, which take commands and no wrench. Use `linearise`, whose inputs are "
             "commands."
         )
-    trim = np.concatenate((_columns(state), wrench))
 
-    def moved(inputs: np.ndarray) -> np.ndarray:
-        count = inputs.shape[1]
-        world, still = nominal_worlds(robot, count), (np.zeros(count),) * 3
-        now, push = PlanarState(*inputs[:STATES]), (inputs[6], inputs[7], inputs[8])
+    def moved(now: Any, inputs: np.ndarray) -> Any:
+        count, physics_dt = inputs.shape[1], robot.timing.physics_dt
+        world = nominal_worlds(robot, count)
+        still = (np.zeros(count),) * 3
         for _ in range(robot.timing.substeps(1.0 / dt)):
-            now = free_body_step(now, push, still, world, robot.hydrodynamics, robot.timing.physics_dt)
-        return _columns(now)
+            if isinstance(now, SpatialState):
+                force, torque = _vector(inputs[:3]), _vector(inputs[3:])
+                inertia = inertia_of(tuple(world.inertia))
+                now = rigid_body_step(now, force, torque, None, world.mass, inertia, physics_dt)
+            else:
+                push = (inputs[0], inputs[1], inputs[2])
+                now = free_body_step(now, push, still, world, robot.hydrodynamics, physics_dt)
+        return now
 
-    both = slopes(moved, trim - DELTA, trim + DELTA)
-    return LinearModel(both[:, :STATES], both[:, STATES:])
+    wrench = np.asarray(wrench, dtype=float)
+    chart = _chart(state, lambda trim: moved(trim, wrench[:, None]))
+    count, trim = len(chart.trim), np.concatenate((chart.trim, wrench))
+    both = slopes(
+        lambda x: chart.numbers(moved(chart.state(x[:count]), x[count:])), trim - DELTA, trim + DELTA
+    )
+    return LinearModel(both[:, :count], both[:, count:])
+
+
+@dataclass(frozen=True)
+class _Chart:
+    """States near a trim as vectors."""
+
+    trim: np.ndarray  # shape (n,)
+    state: Callable[[np.ndarray], Any]  # from vectors (n, k) to states before a step, shapes (k,)
+    numbers: Callable[[Any], np.ndarray]  # from states after it to vectors
+
+
+def _chart(state: State, moved: Callable[[State], State]) -> _Chart:
+    """The vectors of a state; `moved` does the step with nothing but the trim, for states of shapes (1,)."""
+    if isinstance(state, PlanarState):
+        return _Chart(_columns(state), lambda x: PlanarState(*x), _columns)
+    assert isinstance(state, SpatialState)  # there is no other
+    before = state.in_float64().mapped(lambda column: column.reshape(1))
+    after = moved(before)
+    assert isinstance(after, SpatialState)
+    return _Chart(np.zeros(DEPARTURES), lambda x: _departed(before, x), lambda s: _departure(after, s))
+
+
+def _departed(trim: SpatialState, x: np.ndarray) -> SpatialState:
+    """The states that depart from a trim by x, shape (12, k)."""
+    place, rotation, velocity, rate = (_vector(x[i : i + 3]) for i in (0, 3, 6, 9))
+    return SpatialState(
+        *plus(trim.position, turn(trim.quat, place)),
+        *product(trim.quat, exponential(rotation)),
+        *plus(trim.velocity, turn(trim.quat, velocity)),
+        *plus(trim.rate, rate),
+    )
+
+
+def _departure(trim: SpatialState, states: SpatialState) -> np.ndarray:
+    """By what states depart from a trim, shape (12, k)."""
+    return np.stack(
+        (
+            *turn_back(trim.quat, minus(states.position, trim.position)),
+            *rotation_error(trim.quat, states.quat),
+            *turn_back(trim.quat, minus(states.velocity, trim.velocity)),
+            *minus(states.rate, trim.rate),
+        )
+    )
+
+
+def _vector(rows: np.ndarray) -> Vector:
+    return rows[0], rows[1], rows[2]
 
 
 def slopes(
@@ -141,7 +207,7 @@ def _columns(state: PlanarState) -> np.ndarray:
     return np.stack([np.asarray(getattr(state, name), dtype=float) for name in PlanarState.COLUMNS])
 
 
-def nominal_worlds(robot: Robot, count: int) -> World:
-    """Worlds without any disturbance."""
+def nominal_worlds(robot: Robot, count: int) -> Any:
+    """Worlds of the robot's dynamics without any disturbance."""
     calm = Scenario("calm", sensor_noise=False, body="nominal")
-    return draw_world(robot, calm, Draws(0, np.zeros(count), np.zeros(count)))
+    return dynamics_of(robot).draw_world(calm, Draws(0, np.zeros(count), np.zeros(count)))
