@@ -40,7 +40,7 @@ class Motion:
     position: np.ndarray  # (n, 3) in the world [m]
     quat_xyzw: np.ndarray  # (n, 4) [-]
     velocity_in_world: np.ndarray  # (n, 3) [m/s]
-    yaw_rate: np.ndarray  # (n,) [rad/s]
+    angular_velocity_in_body: np.ndarray  # (n, 3) [rad/s]
 
     def __len__(self) -> int:
         """Number of samples."""
@@ -54,9 +54,9 @@ class Motion:
     @property
     def states(self) -> RigidBodyState:
         """The same as a batch of states."""
-        turn = np.zeros((len(self), 3))
-        turn[:, 2] = self.yaw_rate
-        return RigidBodyState(self.position, self.quat_xyzw, self.velocity_in_world, turn)
+        return RigidBodyState(
+            self.position, self.quat_xyzw, self.velocity_in_world, self.angular_velocity_in_body
+        )
 
 
 @dataclass(frozen=True)
@@ -245,7 +245,7 @@ def _motion(found: Odometries) -> Motion:
         position=found.pose[:, :3],
         quat_xyzw=quat,
         velocity_in_world=rotate(quat, found.twist[:, :3]),
-        yaw_rate=found.twist[:, 5],
+        angular_velocity_in_body=found.twist[:, 3:],
     )
 
 

@@ -69,7 +69,7 @@ def evaluate_execution(request: RunRequest, execution: Execution) -> RunOutcome:
 def _nothing_recorded(request: RunRequest) -> RunRecord:
     """The record of a run without a bag: its plan, and nothing else."""
     none, vectors = np.empty(0), np.empty((0, 3))
-    motion = Motion(none, none, none, vectors, np.empty((0, 4)), vectors, none)
+    motion = Motion(none, none, none, vectors, np.empty((0, 4)), vectors, vectors)
     actuation = Actuation(none, none, none, (), np.empty((0, 0)))
     return RunRecord(
         path=request.record,

@@ -18,10 +18,12 @@ PERCENTILES = ("p50", "p99", "max")
 FIGURES = (
     "final_position_error_m",
     "final_heading_error_deg",
+    "final_attitude_error_deg",
     "time_to_target_s",
     "goals_reached",
     "velocity_error_m_s",
     "yaw_rate_error_deg_s",
+    "rate_error_deg_s",
 )  # of `metrics.episode_metrics`; None where the task does not ask
 Spread = dict[str, float | None]
 
@@ -198,9 +200,11 @@ def last_beliefs(record: RunRecord) -> str:
 FIGURE_TEXTS = {
     "final_position_error_m": "{:.3f} m off",
     "final_heading_error_deg": "{:.1f}° off",
+    "final_attitude_error_deg": "attitude {:.1f}° off",
     "goals_reached": "{:.0f} targets reached",
     "velocity_error_m_s": "velocity {:.3f} m/s off",
     "yaw_rate_error_deg_s": "turn rate {:.1f}°/s off",
+    "rate_error_deg_s": "turn rate {:.1f}°/s off",
     "path_error_m": "path {:.3f} m off",
     "goals_progress": "{}",
 }
