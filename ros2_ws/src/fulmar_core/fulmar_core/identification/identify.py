@@ -18,6 +18,7 @@ from fulmar_core.identification.fit import Estimate, Fit, fit
 from fulmar_core.identification.model import Known, Model, Unknown
 from fulmar_core.identification.platform import PlatformModel, ballast_name
 from fulmar_core.identification.wheels import WheelModel
+from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
 
 EXACT = 1e-6  # relative standard deviation of what is said to be known without an error
@@ -116,6 +117,11 @@ def _prepared(
     robot: Robot, known: list[Known], ballasts: Mapping[int, Weight]
 ) -> tuple[Model, str, bool, list[Known]]:
     """Model, what sets the scale, whether that was measured, and everything known."""
+    if robot.state_type is not PlanarState:
+        raise ConfigError(
+            f"there is no model to identify '{robot.name}' by, which moves in space; there are models for robots in "
+            "the plane. Its mass, inertia and thrust stay those of its YAML."
+        )
     if isinstance(robot.actuators, Thrusters):
         for load, weight in ballasts.items():
             std = max(weight.error / SIGMAS, EXACT * weight.mass)

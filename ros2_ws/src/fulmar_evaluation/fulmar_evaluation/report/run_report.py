@@ -44,7 +44,7 @@ def write_report(
         raise ConfigError("there is no run to report on. Give at least one bag.")
     _check_alike(records)
     runs = views(records)
-    task = str(runs[0].summary["task"] or "run").replace("_", " ").capitalize()
+    task = str(runs[0].summary["task"] or "run").replace("_3d", " in space").replace("_", " ").capitalize()
     title = title or f"{task}: {' and '.join(run.label for run in runs)}"
     return write_document(
         Path(out),
@@ -147,17 +147,17 @@ def _origin(run: View) -> str:
 def _overview(runs: Sequence[View], title: str) -> Figure:
     """All of it on one sheet."""
     rows, space = len(runs), in_space(runs)
-    high, low = 6.4 if space else 4.9, rows * actuators_height(runs, 1.5) + 0.2
+    count, motion = _rows(runs), MOTION_ROWS if space else 0
+    high, low = 1.28 * (count + motion + 1) if space else 4.9, rows * actuators_height(runs, 1.5) + 0.2
     figure = Figure(figsize=(11.0, high + low + 0.5), layout="constrained")
     top, bottom = figure.subfigures(2, 1, height_ratios=(high, low))
     left, right = top.subfigures(1, 2, width_ratios=(1.2 if space else 1.0, 1.0))
     if space:
-        draw_space(left, runs)
+        draw_space(left, runs, stacked=True)
     else:
         path = left.subplots()
         draw_trajectory(path, runs)
         legend(path, loc="best")
-    count, motion = _rows(runs), MOTION_ROWS if space else 0
     axes = right.subplots(
         count + motion + 1, 1, gridspec_kw={"height_ratios": (*[1.0] * (count + motion), 0.9)}
     )

@@ -39,8 +39,13 @@ class Side:
 SIDES = (Side("from above", (0, 1)), Side("from the side", (0, 2)))
 
 
-def draw_space(figure: Figure | SubFigure, runs: Sequence[View]) -> bool:
+def draw_space(figure: Figure | SubFigure, runs: Sequence[View], *, stacked: bool = False) -> bool:
     """Both views, and where the goal is a place, both close looks below them.
+
+    Args:
+        figure: Where.
+        runs: What; at least one has a result.
+        stacked: Put the views below one another where there are no close looks.
 
     Returns:
         Whether there are close looks.
@@ -49,7 +54,11 @@ def draw_space(figure: Figure | SubFigure, runs: Sequence[View]) -> bool:
     (left, right), vertical = _room(runs)
     wide, tall = right - left, float(np.max(np.diff(vertical, axis=1)))
     heights = [PANEL * tall / wide, *([NEAR] if near else [])]
-    grid = figure.subplots(len(heights), 2, squeeze=False, height_ratios=heights)
+    grid = (
+        figure.subplots(2, 1, squeeze=False).T
+        if stacked and not near
+        else figure.subplots(len(heights), 2, squeeze=False, height_ratios=heights)
+    )
     for side, axes, (low, high) in zip(SIDES, grid[0], vertical, strict=True):
         middle = 0.5 * (low + high)
         _path(axes, runs, side, reach=0.05 * wide)
