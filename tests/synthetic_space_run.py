@@ -1,4 +1,4 @@
-"""A recorded run of a spacecraft without ROS: the core's simulation under a plain law, as the nodes would publish it."""
+"""A recorded run of a spacecraft without ROS: simulation and a plain law, written as the nodes would publish it."""
 
 from __future__ import annotations
 
@@ -86,7 +86,13 @@ def write_space_run(folder: Path, plan: SpacePlan = SpacePlan()) -> Path:
     """Write one run into a bag folder and return the folder."""
     robot, task = load_robot(ROBOT), load_task(plan.task)
     simulation = BatchSimulation(
-        robot, task, load_scenario("nominal"), worlds=1, seed=plan.seed, control_hz=1.0 / TICK_S, dtype=np.float64
+        robot,
+        task,
+        load_scenario("nominal"),
+        worlds=1,
+        seed=plan.seed,
+        control_hz=1.0 / TICK_S,
+        dtype=np.float64,
     )
     if plan.start:
         pose = _posed(plan.start)

@@ -80,12 +80,17 @@ def _drawings(bag: Bag, seen: Odometries) -> list[Drawing]:
     speed = np.linalg.norm(seen.twist[:, : 3 if space else 2], axis=1)
     turning = np.linalg.norm(seen.twist[:, 3:], axis=1) if space else seen.twist[:, 5]
 
+    low, high = (pick(seen.pose[:, :3], axis=0) if space else np.zeros(3) for pick in (np.min, np.max))
+    middle, reach = 0.5 * (low + high), 0.6 * max(*(high - low)[1:], 0.4 * (high - low)[0], 0.1)
+
     def path(axes: Axes, up: int = 1) -> None:
         axes.plot(seen.pose[:, 0], seen.pose[:, up], color=COLOUR)
         if len(seen):
             axes.plot(*seen.pose[0, [0, up]], "o", color=COLOUR, fillstyle="none", label="begin")
             axes.plot(*seen.pose[-1, [0, up]], "o", color=COLOUR, label="end")
         axes.set_aspect("equal", adjustable="datalim")
+        if space:  # the same span, and so one scale for both views
+            axes.set_ylim(middle[up] - reach, middle[up] + reach)
         axes.set_xlabel("x [m]")
         axes.set_ylabel(f"{'xyz'[up]} [m]")
         legend(axes, loc="best")
@@ -107,8 +112,10 @@ def _drawings(bag: Bag, seen: Odometries) -> list[Drawing]:
 
     found = [
         Drawing("The path, seen from above", "As the odometry reports it.", 4.0, path),
-        *([Drawing("The path, seen from the side", "The same, with z up.", 4.0, side)] if space else []),
-        Drawing("How fast", _PACE_IN_SPACE if space else "Speed and turn rate in the body's frame.", 2.2, pace),
+        *([Drawing("The path, seen from the side", "At the same scale.", 4.0, side)] if space else []),
+        Drawing(
+            "How fast", _PACE_IN_SPACE if space else "Speed and turn rate in the body's frame.", 2.2, pace
+        ),
     ]
     for topic in bag.topics.values():
         if topic.type in COMMANDS and len(topic):

@@ -151,7 +151,8 @@ def _overview(runs: Sequence[View], title: str) -> Figure:
     high, low = 1.28 * (count + motion + 1) if space else 4.9, rows * actuators_height(runs, 1.5) + 0.2
     figure = Figure(figsize=(11.0, high + low + 0.5), layout="constrained")
     top, bottom = figure.subfigures(2, 1, height_ratios=(high, low))
-    left, right = top.subfigures(1, 2, width_ratios=(1.2 if space else 1.0, 1.0))
+    near = space and any(has_place(result) for _, result in evaluated(runs))
+    left, right = top.subfigures(1, 2, width_ratios=(1.2 if near else 1.0, 1.0))
     if space:
         draw_space(left, runs, stacked=True)
     else:
