@@ -222,9 +222,9 @@ def _space_path(runs: Sequence[View]) -> Plot:
             " Numbered circles are the targets, as large as the tolerance; those that were reached are grey."
         )
     if near:
-        caption += """ The white dot is the goal, as large as the tolerance; where an attitude is asked for, thin strokes
-        are the wanted axes. Below, the last stretch: bold is the closing window, the dot is the end, the dashed circle
-        is the tolerance."""
+        caption += """ The white dot is the goal, as large as the tolerance; where an attitude is asked for, thin
+        strokes are the wanted axes. Below, the last stretch: bold is the closing window, the dot is the end, the dashed
+        circle is the tolerance."""
     return Plot("The path, seen from above and from the side", caption, figure)
 
 

@@ -134,9 +134,10 @@ def rule(runs: Sequence[View]) -> str:
                     f"reaches {task.required} of them as a success."
                 )
             if tolerance.velocity > 0.0:
+                rate_deg = tolerance.rate_deg or tolerance.yaw_rate_deg
                 return (
                     f"A run counts as kept if the velocity stays within {tolerance.velocity:g} m/s and the turn rate "
-                    f"within {tolerance.rate_deg or tolerance.yaw_rate_deg:g}°/s of the target for all of the last {tolerance.hold_s:g} s."
+                    f"within {rate_deg:g}°/s of the target for all of the last {tolerance.hold_s:g} s."
                 )
             return (
                 f"A run counts as reached if the {task.subject} stays within {100 * tolerance.position:g} cm"
