@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from fulmar_bags.decode import odometries
 from fulmar_bags.run_record import read_run
 from fulmar_cli.main import app
 from fulmar_core.attitude import angle_between
+from fulmar_core.calibration import load_calibration
 from fulmar_core.rotation import rotate
 from fulmar_core.spatial import SpatialState, quat_of
 from fulmar_core.topics import ODOMETRY
@@ -192,8 +194,14 @@ def test_a_bag_without_a_task_shows_space_where_the_body_leaves_the_plane(tmp_pa
     assert not any("side" in d.title for d in _drawings(flat, odometries(flat.of(ODOMETRY))))
 
 
-def test_a_body_in_space_is_not_identified_and_one_line_says_so(flown):
-    done = CliRunner().invoke(app, ["identify", str(flown)])
-    assert done.exit_code != 0
-    assert "no model to identify 'spacecraft_16'" in str(done.exception)
-    assert "\n" not in str(done.exception)
+def test_a_body_in_space_is_identified_from_its_bag(flown, tmp_path):
+    out = tmp_path / "calibration.yaml"
+    done = CliRunner().invoke(
+        app, ["identify", str(flown), "--known", "mass=5.32+-0.01", "--out", str(out), "--json"]
+    )
+    assert done.exit_code == 0, done.exception
+    found = json.loads(done.stdout[done.stdout.index("{") :])
+    assert found["estimates"]["pitch_inertia"]["value"] == pytest.approx(0.2045, rel=0.05)
+    assert found["estimates"]["thrust"]["value"] == pytest.approx(1.0, rel=0.02)
+    assert {"x_m", "y_m", "z_m", "quaternion_w_rad"} <= set(found["residuals"])
+    assert load_calibration(out).pitch_inertia is not None
