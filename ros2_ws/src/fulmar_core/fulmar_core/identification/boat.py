@@ -30,7 +30,8 @@ from fulmar_core.robot import Robot
 class BoatModel:
     """Unknowns: mass, yaw inertia, delay, linear and quadratic drag of surge, sway and yaw."""
 
-    kinds, channels = IN_PLANE, PLANE_CHANNELS
+    kinds: tuple[int, ...] = IN_PLANE
+    channels: tuple[str, ...] = PLANE_CHANNELS
     own = 9  # six of the state; a constant push along the world's x and y [m/s²] (wind) and in yaw [rad/s²]
     spans_s: tuple[float, ...] = (5.0, 10.0)
 

@@ -208,5 +208,5 @@ def cut(drives: Sequence[Drive], *, length_s: float, dt: float) -> Windows:
 def _by_sign(pose: np.ndarray) -> np.ndarray:
     """Poses of a window; in space with the quaternion's sign so that it begins within half a turn."""
     if pose.shape[1] == 7 and pose[0, 6] < 0.0:
-        return pose * np.array((1.0, 1.0, 1.0, -1.0, -1.0, -1.0, -1.0))
+        return np.concatenate((pose[:, :3], -pose[:, 3:]), axis=1)
     return pose

@@ -27,8 +27,8 @@ class FreeFlyerModel:
     # Position, rotation vector, velocity and turn rate; a constant push in the world [m/s²] and turn of the body
     # [rad/s²]: three numbers each.
     own = 18
-    kinds = (0, 0, 0, 1, 1, 1, 1)
-    channels = (
+    kinds: tuple[int, ...] = (0, 0, 0, 1, 1, 1, 1)
+    channels: tuple[str, ...] = (
         "x_m",
         "y_m",
         "z_m",
@@ -78,7 +78,7 @@ class FreeFlyerModel:
         inertia = inertia_of(moments + products if any(self._products) else moments)
         com: Vector = (values[PLACES[0]], values[PLACES[1]], values[PLACES[2]])
         inputs = self._inputs(values, windows) * values["thrust"]
-        place, rotation, velocity, rate, push, twist = (tuple(part) for part in np.split(own, 6))
+        place, rotation, velocity, rate, push, twist = map(_vector, np.split(own, 6))
         state = shifted(SpatialState(*place, *exponential(rotation), *velocity, *rate), com)
         back = scaled(-1.0, com)
         around, outside = times(inertia.tensor, twist), scaled(mass, push)
@@ -108,3 +108,7 @@ class FreeFlyerModel:
     def _wrench(self, command: np.ndarray) -> np.ndarray:
         """Force and torque if one open valve gave 1 N, shape (k, 6)."""
         return np.concatenate(self._thrusters.wrench_in_body(command), axis=1) / self._thrusters.thrust
+
+
+def _vector(rows: np.ndarray) -> Vector:
+    return rows[0], rows[1], rows[2]

@@ -43,7 +43,8 @@ def of_load(quantity: str, load: int) -> str:
 class PlatformModel:
     """Unknowns: thrust, mass, delays; and for each load inertia and centre of mass."""
 
-    kinds, channels = IN_PLANE, PLANE_CHANNELS
+    kinds: tuple[int, ...] = IN_PLANE
+    channels: tuple[str, ...] = PLANE_CHANNELS
     own = 9  # six of the state; a constant push along the world's x and y [m/s²] and in yaw [rad/s²]
     spans_s: tuple[float, ...] = (2.0, 5.0, 10.0)
 

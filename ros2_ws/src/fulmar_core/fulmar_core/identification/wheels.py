@@ -22,7 +22,8 @@ SECOND_LAG_S = 0.0025
 class WheelModel:
     """Unknowns: factors on speed and turn rate, lag of the wheels' servos, delay."""
 
-    kinds, channels = IN_PLANE, PLANE_CHANNELS
+    kinds: tuple[int, ...] = IN_PLANE
+    channels: tuple[str, ...] = PLANE_CHANNELS
     own = 6
     spans_s: tuple[float, ...] = (3.0, 8.0, 15.0)
 
