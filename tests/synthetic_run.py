@@ -20,7 +20,7 @@ from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.goal import Goal, goal_at, goal_in_float64
 from fulmar_core.planar import PlanarState, at_rest
 from fulmar_core.robot import Robot, load_robot
-from fulmar_core.rotation import from_yaw, rotate_inverse
+from fulmar_core.rotation import rotate_inverse
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.state import RigidBodyState
 from fulmar_core.tasks import Task, load_task
@@ -180,6 +180,7 @@ class RunMessages:
     ) -> None:
         """Create the bag, with the topics of some wires."""
         self._robot, self._command_wire = robot.name, command_wire(robot)
+        self._rigid_targets = robot.state_type.rigid_targets
         self._store, self._names = type_store(), np.array(robot.actuators.names)
         self._types = {wire.name: wire.type for wire in WIRES}
         self.writer = BagWriter(folder, run_info=info)
@@ -217,22 +218,28 @@ class RunMessages:
 
     def goal(self, name: str, goal: Goal, log_ns: int) -> None:
         frame = "base_link" if name == "goal_velocity" else "odom"
-        header, target = self._header(0.0, frame), np.asarray(goal.current)
+        twists = name == "goal_velocity"
+        target = self._rigid_targets(np.asarray(goal.current), twists=twists)
+        header = self._header(0.0, frame)
         if name == "goal_point":
-            point = self._vector("Point", np.array([target[0], target[1], 0.0]))
+            point = self._vector("Point", target[:3])
             message = self._new("geometry_msgs/msg/PointStamped", header=header, point=point)
         elif name == "goal_velocity":
-            twist = self._twist(np.array([target[0], target[1], 0.0]), np.array([0.0, 0.0, target[2]]))
+            twist = self._twist(target[:3], target[3:])
             message = self._new("geometry_msgs/msg/TwistStamped", header=header, twist=twist)
         elif name == "goal_path":
-            poses = [self._planar(each, 0.0) for each in goal.targets]
+            targets = self._rigid_targets(np.asarray(goal.targets), twists=False)
+            poses = [self._posed(each, 0.0) for each in targets]
             message = self._new("nav_msgs/msg/Path", header=header, poses=poses)
         else:
-            message = self._planar(target, 0.0)
+            message = self._posed(target, 0.0)
         self._write(name, message, log_ns)
 
     def _planar(self, pose: np.ndarray, time_s: float) -> Any:
-        body = self._pose(np.array([pose[0], pose[1], 0.0]), from_yaw(np.asarray(pose[2])))
+        return self._posed(PlanarState.rigid_targets(pose, twists=False), time_s)
+
+    def _posed(self, pose: np.ndarray, time_s: float) -> Any:
+        body = self._pose(pose[:3], pose[3:])
         return self._new("geometry_msgs/msg/PoseStamped", header=self._header(time_s), pose=body)
 
     def obstacles(self, discs: np.ndarray) -> None:

@@ -18,6 +18,7 @@ from fulmar_core.actuators.differential_drive import DifferentialDrive
 from fulmar_core.actuators.thrusters import Thrusters
 from fulmar_core.config import load_config
 from fulmar_core.errors import ConfigError
+from fulmar_core.spatial import SpatialState
 
 if TYPE_CHECKING:
     from fulmar_core.robot import Robot
@@ -46,9 +47,12 @@ class Calibration:
     robot: str
     runs: tuple[str, ...] = ()  # bags that it was made from
     mass: Measured | None = None  # [kg]
+    roll_inertia: Measured | None = None  # of bodies in space, about the centre of mass [kg·m²]
+    pitch_inertia: Measured | None = None  # same
     yaw_inertia: Measured | None = None  # about the centre of mass [kg·m²]
     center_of_mass_x: Measured | None = None  # ahead of the body's origin [m]
     center_of_mass_y: Measured | None = None  # to its left [m]
+    center_of_mass_z: Measured | None = None  # above it, of bodies in space [m]
     thrust: Measured | None = None  # of one valve that is open alone [N]
     delay: Measured | None = None  # from command to action, with that of the odometry [s]
     opening_delay: Measured | None = None  # by which valves open later than they close [s]
@@ -128,7 +132,9 @@ def _places(robot: Robot) -> tuple[str, ...]:
     """Names of the quantities that a calibration of this robot may have."""
     if isinstance(robot.actuators, DifferentialDrive):
         return "wheel_scale", "turn_scale", "lag", "delay"
-    body = ("mass", "yaw_inertia", "center_of_mass_x", "center_of_mass_y", "delay")
+    body: tuple[str, ...] = ("mass", "yaw_inertia", "center_of_mass_x", "center_of_mass_y", "delay")
+    if robot.state_type is SpatialState:
+        body += ("roll_inertia", "pitch_inertia", "center_of_mass_z")
     if isinstance(robot.actuators, Thrusters):
         return *body, "thrust", "opening_delay"
     if robot.hydrodynamics is not None:
@@ -139,19 +145,20 @@ def _places(robot: Robot) -> tuple[str, ...]:
 def _body(robot: Robot, calibration: Calibration) -> Robot:
     body, spans = robot.body, robot.uncertainty
     mass, inertia = calibration.mass, calibration.yaw_inertia
-    cx, cy = calibration.center_of_mass_x, calibration.center_of_mass_y
+    cx, cy, cz = (getattr(calibration, f"center_of_mass_{axis}") for axis in "xyz")
     if mass:
         body, spans = replace(body, mass=mass.value), replace(spans, mass=(mass.low, mass.high))
     if inertia:
         # As in the simulators: roll and pitch grow and shrink with yaw.
         roll, pitch, yaw = (part * inertia.value / body.inertia[2] for part in body.inertia[:3])
-        body = replace(body, inertia=(roll, pitch, yaw))
+        if calibration.roll_inertia and calibration.pitch_inertia:
+            roll, pitch = calibration.roll_inertia.value, calibration.pitch_inertia.value
+        body = replace(body, inertia=(roll, pitch, yaw, *body.inertia[3:]))
         spans = replace(spans, yaw_inertia=(inertia.low, inertia.high))
     if cx and cy:
-        reach = (
-            max(cx.high - cx.value, cx.value - cx.low) ** 2 + max(cy.high - cy.value, cy.value - cy.low) ** 2
-        ) ** 0.5
-        body = replace(body, center_of_mass=(cx.value, cy.value))
+        found = (cx, cy, cz) if cz else (cx, cy)
+        reach = sum(max(c.high - c.value, c.value - c.low) ** 2 for c in found) ** 0.5
+        body = replace(body, center_of_mass=tuple(c.value for c in found))
         spans = replace(spans, center_of_mass=reach)
     return replace(robot, body=body, uncertainty=spans)
 

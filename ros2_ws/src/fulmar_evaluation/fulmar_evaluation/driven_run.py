@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from fulmar_bags.run_record import read_run
 from fulmar_core.errors import ConfigError
-from fulmar_core.identification.drives import Drive, drive_of
+from fulmar_core.identification.drives import Drive, drive_in_space, drive_of
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.rotation import yaw_of
+from fulmar_core.spatial import SpatialState
 
 
 def driven_run(path: Path, *, load: int = 0) -> tuple[Robot, Drive, tuple[str, ...]]:
@@ -37,6 +39,10 @@ def driven_run(path: Path, *, load: int = 0) -> tuple[Robot, Drive, tuple[str, .
             f"{path}: commands have {actuation.effort.shape[1]} values, '{robot.name}' takes {width}."
         )
     odometry = record.odom
+    if robot.state_type is SpatialState:
+        pose = np.column_stack((odometry.position, odometry.quat_xyzw))
+        drive = drive_in_space(str(path), odometry.stamp_s, pose, actuation.stamp_s, actuation.effort)
+        return robot, replace(drive, load=load), record.warnings
     drive = drive_of(
         str(path),
         odometry.stamp_s,

@@ -91,7 +91,7 @@ def _document(
             for name, e in fit.estimates.items()
         },
         "untold": list(found.undetermined),
-        "residuals": dict(zip(("x_m", "y_m", "heading_rad"), fit.noise, strict=True)),
+        "residuals": dict(zip(found.channels, fit.noise, strict=True)),
         "windows": fit.windows,
         "calibration": None if out is None else str(out),
     }

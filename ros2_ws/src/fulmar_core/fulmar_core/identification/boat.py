@@ -15,7 +15,14 @@ from fulmar_core.dynamics.free_body import free_body_step
 from fulmar_core.dynamics.hydrodynamics import drag
 from fulmar_core.identification.drives import Windows
 from fulmar_core.identification.held_input import followed, for_each_copy
-from fulmar_core.identification.model import USEFUL_DELAY_S, Unknown, Values, nominal_world
+from fulmar_core.identification.model import (
+    IN_PLANE,
+    PLANE_CHANNELS,
+    USEFUL_DELAY_S,
+    Unknown,
+    Values,
+    nominal_world,
+)
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
 
@@ -23,6 +30,8 @@ from fulmar_core.robot import Robot
 class BoatModel:
     """Unknowns: mass, yaw inertia, delay, linear and quadratic drag of surge, sway and yaw."""
 
+    kinds: tuple[int, ...] = IN_PLANE
+    channels: tuple[str, ...] = PLANE_CHANNELS
     own = 9  # six of the state; a constant push along the world's x and y [m/s²] (wind) and in yaw [rad/s²]
     spans_s: tuple[float, ...] = (5.0, 10.0)
 

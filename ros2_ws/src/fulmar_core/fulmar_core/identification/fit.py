@@ -45,12 +45,12 @@ class Fit:
 
     Attributes:
         estimates: By name, in the order of the model's unknowns.
-        noise: Standard deviations of what is left of x and y [m] and the heading [rad].
+        noise: Standard deviations of what is left, one for each of the model's channels [m or rad].
         windows: How many there were.
     """
 
     estimates: dict[str, Estimate]
-    noise: tuple[float, float, float]
+    noise: tuple[float, ...]
     windows: int
 
 
@@ -75,7 +75,7 @@ def fit(
     place = np.array([u.to_search(u.start) for u in model.unknowns])
     for i, value, _ in (_prior(model, each) for each in known):
         place[i] = value
-    sigma = np.array([noise[0], noise[0], noise[1]])
+    sigma = np.array([noise[kind] for kind in model.kinds])
     longest = max(drive.duration_s for drive in drives)
     spans = [span for span in model.spans_s if span <= longest] or [model.spans_s[0]]
     for span in spans:
@@ -93,7 +93,7 @@ def fit(
     estimates = {
         u.name: Estimate(u.name, values[i], lows[i], highs[i], u.unit) for i, u in enumerate(model.unknowns)
     }
-    return Fit(estimates, (float(sigma[0]), float(sigma[1]), float(sigma[2])), len(search.windows))
+    return Fit(estimates, tuple(map(float, sigma)), len(search.windows))
 
 
 class _Search:
@@ -102,7 +102,7 @@ class _Search:
     def __init__(self, model: Model, windows: Windows, known: Sequence[Known], sigma: np.ndarray) -> None:
         self.model, self.windows, self.sigma = model, windows, sigma
         self._own = model.own_of(windows.first_states())
-        self._weight = windows.valid[:, :, None] * np.ones(3)
+        self._weight = windows.valid[:, :, None] * np.ones(len(model.kinds))
         self._prior = [_prior(model, each) for each in known]
 
     @np.errstate(over="ignore", invalid="ignore")  # a step whose prediction leaves all bounds is taken back
@@ -137,14 +137,17 @@ class _Search:
         return place
 
     def spread(self) -> np.ndarray:
-        """Standard deviations of what is left, robust against outliers, shape (3,)."""
+        """Standard deviations of what is left, robust against outliers, one for each channel."""
         residual, _, own_slopes = self._last
         raw = residual * self.sigma
         valid = self.windows.valid
-        used = own_slopes.shape[0] / 3.0 / np.maximum(valid.sum(axis=1).mean(), 1.0)
+        used = own_slopes.shape[0] / raw.shape[-1] / np.maximum(valid.sum(axis=1).mean(), 1.0)
         lost = np.sqrt(1.0 / max(1.0 - used, 0.1))
         return np.array(
-            [max(1.4826 * float(np.median(np.abs(raw[..., c][valid]))) * lost, 1e-9) for c in range(3)]
+            [
+                max(1.4826 * float(np.median(np.abs(raw[..., c][valid]))) * lost, 1e-9)
+                for c in range(raw.shape[-1])
+            ]
         )
 
     def deviations(self, place: np.ndarray) -> tuple[np.ndarray, int]:
@@ -230,7 +233,7 @@ class _Search:
         return change
 
     def _residual(self, place: np.ndarray, own: np.ndarray) -> np.ndarray:
-        """Measured minus predicted, in standard deviations, shape (w, n, 3)."""
+        """Measured minus predicted, in standard deviations, shape (w, n, channels)."""
         return np.asarray(self._residuals(place[:, None], own[:, None, :])[0])
 
     def _residuals(self, places: np.ndarray, own: np.ndarray) -> np.ndarray:
@@ -240,7 +243,7 @@ class _Search:
         return np.asarray((self.windows.pose - self.windows.at_measurements(grid)) / self.sigma)
 
     def _slopes(self, place: np.ndarray, own: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Residual (w, n, 3), and slopes of the prediction: (p, w, n, 3) and (q, w, n, 3)."""
+        """Residual (w, n, c), and slopes of the prediction: (p, w, n, c) and (q, w, n, c)."""
         p, q = len(place), len(own)
         places = np.repeat(place[:, None], 1 + p + q, axis=1)
         owns = np.repeat(own[:, None, :], 1 + p + q, axis=1)

@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from fulmar_core.identification.drives import Windows
+from fulmar_core.identification.drives import Drive, Windows
 
 
 def mean_over_steps(
@@ -40,6 +40,45 @@ def mean_over_steps(
         [np.interp(edges, knots, integral[:, c], left=0.0) for c in range(integral.shape[1])], axis=1
     )
     return np.diff(at_edges, axis=0) / dt
+
+
+def valve_wrench(
+    windows: Windows, wrench: Callable[[np.ndarray], np.ndarray], delay: float, opening: float
+) -> np.ndarray:
+    """Wrench of valves in each step: they close at once and open later.
+
+    Args:
+        windows: With the commands of their runs.
+        wrench: From commands, shape (k, m), to wrenches, shape (k, c).
+        delay: Until a command acts [s].
+        opening: Until a closed valve is open, beyond that [s].
+
+    Returns:
+        Shape (steps, c, w).
+    """
+    width = wrench(windows.drives[0].command[:1]).shape[1]
+    held = np.zeros((windows.steps, width, len(windows)))
+    for number, drive in enumerate(windows.drives):
+        mine = windows.drive == number
+        if mine.any():
+            event_s, change = _valve_events(drive, wrench, delay, opening)
+            held[:, :, mine] = mean_over_steps(
+                event_s, change, windows.begin_s[mine], steps=windows.steps, dt=windows.dt
+            )
+    return held
+
+
+def _valve_events(
+    drive: Drive, wrench: Callable[[np.ndarray], np.ndarray], delay: float, opening: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """When the wrench of valves changes, and by how much."""
+    command = drive.command
+    before = np.concatenate((np.zeros((1, command.shape[1])), command[:-1]))
+    meanwhile = wrench(np.minimum(before, command))
+    closing = meanwhile - wrench(before)
+    opened = wrench(command) - meanwhile
+    times = np.concatenate((drive.switch_s + delay, drive.switch_s + delay + opening))
+    return times, np.concatenate((closing, opened))
 
 
 def late_events(switch_s: np.ndarray, command: np.ndarray, delay: float) -> tuple[np.ndarray, np.ndarray]:

@@ -15,10 +15,12 @@ from fulmar_core.errors import ConfigError, UnknownNameError
 from fulmar_core.identification.boat import BoatModel
 from fulmar_core.identification.drives import Drive
 from fulmar_core.identification.fit import Estimate, Fit, fit
+from fulmar_core.identification.free_flyer import FreeFlyerModel
 from fulmar_core.identification.model import Known, Model, Unknown
 from fulmar_core.identification.platform import PlatformModel, ballast_name
 from fulmar_core.identification.wheels import WheelModel
 from fulmar_core.robot import Robot
+from fulmar_core.spatial import SpatialState
 
 EXACT = 1e-6  # relative standard deviation of what is said to be known without an error
 NO_MOTION = "the runs show nothing of the robot: it hardly moved. Drive it, as with --controller excite."
@@ -40,6 +42,7 @@ class Identified:
     fit: Fit
     scale: str  # what the scale of forces rests on, in a sentence
     trusted: bool  # whether that was measured; False: it is the robot's YAML
+    channels: tuple[str, ...]  # names of `fit.noise`
     undetermined: tuple[str, ...] = ()  # quantities whose intervals are wider than their values
 
 
@@ -87,7 +90,7 @@ def identify(
         for unknown in model.unknowns
         if not _is_determined(unknown, found.estimates[unknown.name])
     )
-    return Identified(found, scale, trusted, undetermined)
+    return Identified(found, scale, trusted, model.channels, undetermined)
 
 
 def _is_determined(unknown: Unknown, found: Estimate) -> bool:
@@ -117,10 +120,16 @@ def _prepared(
 ) -> tuple[Model, str, bool, list[Known]]:
     """Model, what sets the scale, whether that was measured, and everything known."""
     if isinstance(robot.actuators, Thrusters):
+        in_space = robot.state_type is SpatialState
+        if in_space and ballasts:
+            raise ConfigError(
+                f"--ballast is for robots in the plane; weigh '{robot.name}' and give --known mass=KG+-KG."
+            )
         for load, weight in ballasts.items():
             std = max(weight.error / SIGMAS, EXACT * weight.mass)
             known.append(Known(ballast_name(load), weight.mass, std))
-        model = PlatformModel(robot, {load: weight.mass for load, weight in ballasts.items()})
+        loads = {load: weight.mass for load, weight in ballasts.items()}
+        model: Model = FreeFlyerModel(robot) if in_space else PlatformModel(robot, loads)
         named = sorted({each.name for each in known} & {"mass", "thrust"})
         if named or ballasts:
             said = [f"a known {name}" for name in named] + (["a ballast of known mass"] if ballasts else [])
@@ -129,9 +138,9 @@ def _prepared(
         known.append(Known("mass", robot.body.mass, (high - low) / (2.0 * SIGMAS)))
         scale = (
             f"mass and thrust rest on the mass of the robot's YAML, {low:g} to {high:g} kg, since motion shows only "
-            "their ratio: weigh the robot (--known mass=KG+-KG), or record another run with a ballast "
-            "(--ballast BAG=KG+-KG)"
+            "their ratio: weigh the robot (--known mass=KG+-KG)"
         )
+        scale += "" if in_space else ", or record another run with a ballast (--ballast BAG=KG+-KG)"
         return model, scale, False, known
     if ballasts:
         raise ConfigError(

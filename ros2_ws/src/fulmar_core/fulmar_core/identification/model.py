@@ -15,6 +15,7 @@ from fulmar_core.identification.drives import Windows
 from fulmar_core.robot import Robot
 
 USEFUL_DELAY_S, USEFUL_PLACE_M = 0.1, 0.1  # a worse one helps no simulation
+IN_PLANE, PLANE_CHANNELS = (0, 0, 1), ("x_m", "y_m", "heading_rad")  # of models in the plane
 Values = Mapping[str, np.ndarray]  # each unknown in its own unit, shape (copies, 1)
 
 
@@ -53,11 +54,15 @@ class Model(Protocol):
 
     Attributes:
         unknowns: The same for all windows.
+        kinds: Of each channel of a pose: 0 for a length, 1 for an angle.
+        channels: Their names, with units.
         own: How many numbers each window has for itself: its first state, and what pushes during it.
         spans_s: Lengths of windows, from the first fit to the last one: short ones find their way from far off.
     """
 
     unknowns: tuple[Unknown, ...]
+    kinds: tuple[int, ...]
+    channels: tuple[str, ...]
     own: int
     spans_s: tuple[float, ...]
 
@@ -66,16 +71,16 @@ class Model(Protocol):
 
         Args:
             values: The unknowns.
-            own: Each window's own numbers, of which the first six are its first state, shape (own, copies, windows).
+            own: Each window's own numbers, of which the first are its first state, shape (own, copies, windows).
             windows: Their commands and times.
 
         Returns:
-            Shape (steps + 1, 3, copies, windows) [m, m, rad].
+            Shape (steps + 1, channels, copies, windows), as of `drives.Drive.pose`.
         """
         ...
 
     def own_of(self, states: np.ndarray) -> np.ndarray:
-        """Each window's own numbers to begin with, shape (own, w), from its first state, shape (6, w)."""
+        """Each window's own numbers to begin with, shape (own, w), from its first state, `Windows.first_states`."""
         ...
 
 

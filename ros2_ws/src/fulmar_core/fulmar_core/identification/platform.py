@@ -14,9 +14,17 @@ import numpy as np
 
 from fulmar_core.actuators.thrusters import Thrusters
 from fulmar_core.dynamics.free_body import free_body_step
-from fulmar_core.identification.drives import Drive, Windows
-from fulmar_core.identification.held_input import for_each_copy, mean_over_steps
-from fulmar_core.identification.model import USEFUL_DELAY_S, USEFUL_PLACE_M, Unknown, Values, nominal_world
+from fulmar_core.identification.drives import Windows
+from fulmar_core.identification.held_input import for_each_copy, valve_wrench
+from fulmar_core.identification.model import (
+    IN_PLANE,
+    PLANE_CHANNELS,
+    USEFUL_DELAY_S,
+    USEFUL_PLACE_M,
+    Unknown,
+    Values,
+    nominal_world,
+)
 from fulmar_core.motion import to_center
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
@@ -35,6 +43,8 @@ def of_load(quantity: str, load: int) -> str:
 class PlatformModel:
     """Unknowns: thrust, mass, delays; and for each load inertia and centre of mass."""
 
+    kinds: tuple[int, ...] = IN_PLANE
+    channels: tuple[str, ...] = PLANE_CHANNELS
     own = 9  # six of the state; a constant push along the world's x and y [m/s²] and in yaw [rad/s²]
     spans_s: tuple[float, ...] = (2.0, 5.0, 10.0)
 
@@ -99,31 +109,10 @@ class PlatformModel:
     def _inputs(self, values: Values, windows: Windows) -> np.ndarray:
         """Wrench of 1 N valves in each step, shape (steps, 3, copies, windows)."""
         return for_each_copy(
-            lambda delay, opening: self._held(delay, opening, windows),
+            lambda delay, opening: valve_wrench(windows, self._wrench, delay, opening),
             values["delay"],
             values["opening_delay"],
         )
-
-    def _held(self, delay: float, opening: float, windows: Windows) -> np.ndarray:
-        held = np.zeros((windows.steps, 3, len(windows)))
-        for number, drive in enumerate(windows.drives):
-            mine = windows.drive == number
-            if mine.any():
-                event_s, change = self._events(drive, delay, opening)
-                held[:, :, mine] = mean_over_steps(
-                    event_s, change, windows.begin_s[mine], steps=windows.steps, dt=windows.dt
-                )
-        return held
-
-    def _events(self, drive: Drive, delay: float, opening: float) -> tuple[np.ndarray, np.ndarray]:
-        """When the wrench of 1 N valves changes, and by how much: valves close at once and open later."""
-        command = drive.command
-        before = np.concatenate((np.zeros((1, command.shape[1])), command[:-1]))
-        meanwhile = self._wrench(np.minimum(before, command))
-        closing = meanwhile - self._wrench(before)
-        opened = self._wrench(command) - meanwhile
-        times = np.concatenate((drive.switch_s + delay, drive.switch_s + delay + opening))
-        return times, np.concatenate((closing, opened))
 
     def _wrench(self, command: np.ndarray) -> np.ndarray:
         """Forces and moment if one open valve gave 1 N, shape (k, 3)."""

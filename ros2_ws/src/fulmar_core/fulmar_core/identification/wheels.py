@@ -12,7 +12,7 @@ from fulmar_core.actuators.differential_drive import DifferentialDrive
 from fulmar_core.actuators.rolling import SERVO_S
 from fulmar_core.identification.drives import Windows
 from fulmar_core.identification.held_input import followed, for_each_copy
-from fulmar_core.identification.model import USEFUL_DELAY_S, Unknown, Values
+from fulmar_core.identification.model import IN_PLANE, PLANE_CHANNELS, USEFUL_DELAY_S, Unknown, Values
 from fulmar_core.robot import Robot
 
 # A servo has a second, faster lag, and wheels give way a little: which of it looks like delay is open.
@@ -22,6 +22,8 @@ SECOND_LAG_S = 0.0025
 class WheelModel:
     """Unknowns: factors on speed and turn rate, lag of the wheels' servos, delay."""
 
+    kinds: tuple[int, ...] = IN_PLANE
+    channels: tuple[str, ...] = PLANE_CHANNELS
     own = 6
     spans_s: tuple[float, ...] = (3.0, 8.0, 15.0)
 

@@ -30,6 +30,9 @@ COMMANDS = {
     TWIST: twist_vectors,
 }
 MOST_ACTUATORS = 16
+LARGEST_TILT = np.deg2rad(30.0)  # of a body in the plane [rad]; a hull rolls in waves
+LARGEST_RISE = 0.3  # of a body in the plane, of its way [-]
+_PACE_IN_SPACE = "Size of the velocity, and of the turn rate about whatever axis it is."
 
 
 @dataclass(frozen=True)
@@ -73,21 +76,31 @@ def write_bag_report(
 
 def _drawings(bag: Bag, seen: Odometries) -> list[Drawing]:
     time_s = (seen.stamp_ns - seen.stamp_ns[0]) / 1e9 if len(seen) else np.zeros(0)
-    speed = np.hypot(seen.twist[:, 0], seen.twist[:, 1])
+    space = _leaves_the_plane(seen)
+    speed = np.linalg.norm(seen.twist[:, : 3 if space else 2], axis=1)
+    turning = np.linalg.norm(seen.twist[:, 3:], axis=1) if space else seen.twist[:, 5]
 
-    def path(axes: Axes) -> None:
-        axes.plot(seen.pose[:, 0], seen.pose[:, 1], color=COLOUR)
+    low, high = (pick(seen.pose[:, :3], axis=0) if space else np.zeros(3) for pick in (np.min, np.max))
+    middle, reach = 0.5 * (low + high), 0.6 * max(*(high - low)[1:], 0.4 * (high - low)[0], 0.1)
+
+    def path(axes: Axes, up: int = 1) -> None:
+        axes.plot(seen.pose[:, 0], seen.pose[:, up], color=COLOUR)
         if len(seen):
-            axes.plot(*seen.pose[0, :2], "o", color=COLOUR, fillstyle="none", label="begin")
-            axes.plot(*seen.pose[-1, :2], "o", color=COLOUR, label="end")
+            axes.plot(*seen.pose[0, [0, up]], "o", color=COLOUR, fillstyle="none", label="begin")
+            axes.plot(*seen.pose[-1, [0, up]], "o", color=COLOUR, label="end")
         axes.set_aspect("equal", adjustable="datalim")
+        if space:  # the same span, and so one scale for both views
+            axes.set_ylim(middle[up] - reach, middle[up] + reach)
         axes.set_xlabel("x [m]")
-        axes.set_ylabel("y [m]")
+        axes.set_ylabel(f"{'xyz'[up]} [m]")
         legend(axes, loc="best")
+
+    def side(axes: Axes) -> None:
+        path(axes, up=2)
 
     def pace(axes: Axes) -> None:
         axes.plot(time_s, speed, color=COLOUR, label="speed [m/s]")
-        axes.plot(time_s, seen.twist[:, 5], color=CONTROLLER_COLOURS["lqr"], label="turn rate [rad/s]")
+        axes.plot(time_s, turning, color=CONTROLLER_COLOURS["lqr"], label="turn rate [rad/s]")
         axes.set_xlabel("time [s]")
         legend(axes, loc="best", ncols=2)
 
@@ -99,7 +112,10 @@ def _drawings(bag: Bag, seen: Odometries) -> list[Drawing]:
 
     found = [
         Drawing("The path, seen from above", "As the odometry reports it.", 4.0, path),
-        Drawing("How fast", "Speed and turn rate in the body's frame.", 2.2, pace),
+        *([Drawing("The path, seen from the side", "At the same scale.", 4.0, side)] if space else []),
+        Drawing(
+            "How fast", _PACE_IN_SPACE if space else "Speed and turn rate in the body's frame.", 2.2, pace
+        ),
     ]
     for topic in bag.topics.values():
         if topic.type in COMMANDS and len(topic):
@@ -112,6 +128,15 @@ def _drawings(bag: Bag, seen: Odometries) -> list[Drawing]:
         )
     )
     return found
+
+
+def _leaves_the_plane(seen: Odometries) -> bool:
+    """Whether a body tilts as none does that stands, floats or rolls upright, or moves up and down by as much."""
+    if not len(seen):
+        return False
+    upright = 1.0 - 2.0 * np.sum(seen.pose[:, 3:5] ** 2, axis=1)  # cosine of the tilt
+    wide = np.ptp(seen.pose[:, :3], axis=0)
+    return bool(np.min(upright) < np.cos(LARGEST_TILT) or wide[2] > LARGEST_RISE * max(1.0, *wide[:2]))
 
 
 def _seconds(vectors: Vectors, seen: Odometries, unstamped: bool) -> np.ndarray:

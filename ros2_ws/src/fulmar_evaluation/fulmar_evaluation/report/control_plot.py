@@ -16,6 +16,7 @@ from fulmar_evaluation.run_summary import percentiles
 
 BINS = 48  # of latencies
 SHORTEST_MS = 0.01
+ROW = 0.165  # least height of an actuator's row [inch]
 
 Span = tuple[float, float]  # begin and end, in simulated time since the first state [s]
 
@@ -50,6 +51,11 @@ def _spans(record: RunRecord, flags: np.ndarray) -> list[Span]:
         (float(stamp_s[first] - begin_s), float(ends[last - 1]))
         for first, last in zip(edges[::2], edges[1::2], strict=True)
     ]
+
+
+def actuators_height(runs: Sequence[View], least: float) -> float:
+    """Height of one raster in which the rows of every run can be read [inch]."""
+    return max(least, *(ROW * len(run.record.actuation.names) for run in runs))
 
 
 def draw_actuators(axes: Axes, run: View) -> None:

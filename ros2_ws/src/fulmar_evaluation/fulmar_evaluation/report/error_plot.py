@@ -1,4 +1,4 @@
-"""Errors of position, heading and motion over time, or targets reached, as the task asks."""
+"""Errors of position, heading or attitude, and motion over time, or targets reached, as the task asks."""
 
 from __future__ import annotations
 
@@ -36,6 +36,14 @@ STRIPS = (
     Strip(
         "heading error", ANGLES, 2e-2, lambda r: _deg(r.run.heading_error[0]), lambda t: t.heading_deg, "°"
     ),
+    Strip(
+        "attitude error",
+        ANGLES,
+        2e-2,
+        lambda r: _in_space(r, r.run.attitude_error),
+        lambda t: t.attitude_deg,
+        "°",
+    ),
     Strip("velocity error", SPEEDS, 2e-3, lambda r: r.run.velocity_error[0], lambda t: t.velocity, "m/s"),
     Strip(
         "turn rate error",
@@ -45,11 +53,24 @@ STRIPS = (
         lambda t: t.yaw_rate_deg,
         "°/s",
     ),
+    Strip(
+        "turn rate error",
+        TURN_RATES,
+        2e-2,
+        lambda r: _in_space(r, r.run.rate_error),
+        lambda t: t.rate_deg,
+        "°/s",
+    ),
 )
 
 
 def _deg(angle: np.ndarray) -> np.ndarray:
     return np.asarray(np.abs(np.rad2deg(angle)))
+
+
+def _in_space(result: RunResult, errors: np.ndarray | None) -> np.ndarray:
+    """Errors that robots in the plane have not; NaN for them."""
+    return np.full(len(result.time_s), np.nan) if errors is None else _deg(errors[0])
 
 
 def strips(runs: Sequence[View]) -> list[Strip]:

@@ -12,10 +12,12 @@ from matplotlib.figure import Figure
 
 from fulmar_bags.run_record import RunRecord
 from fulmar_core.errors import ConfigError
-from fulmar_evaluation.report.control_plot import draw_actuators, draw_latency, draw_use
+from fulmar_evaluation.report.control_plot import actuators_height, draw_actuators, draw_latency, draw_use
 from fulmar_evaluation.report.error_plot import counting, draw_progress, strips
+from fulmar_evaluation.report.motion_plot import MOTION_ROWS, draw_motion
 from fulmar_evaluation.report.page import Part, Plot, cells, faint, html_page, table
-from fulmar_evaluation.report.run_view import View, evaluated, result_of, rule, table_rows, views
+from fulmar_evaluation.report.run_view import View, evaluated, in_space, result_of, rule, table_rows, views
+from fulmar_evaluation.report.space_plot import draw_space, space_height
 from fulmar_evaluation.report.style import legend, quiet_grid
 from fulmar_evaluation.report.trajectory_plot import draw_close_up, draw_trajectory, has_place
 from fulmar_evaluation.report.writer import write_document
@@ -42,7 +44,7 @@ def write_report(
         raise ConfigError("there is no run to report on. Give at least one bag.")
     _check_alike(records)
     runs = views(records)
-    task = str(runs[0].summary["task"] or "run").replace("_", " ").capitalize()
+    task = str(runs[0].summary["task"] or "run").replace("_3d", " in space").replace("_", " ").capitalize()
     title = title or f"{task}: {' and '.join(run.label for run in runs)}"
     return write_document(
         Path(out),
@@ -65,7 +67,8 @@ def _check_alike(records: Sequence[RunRecord]) -> None:
 
 
 def _parts(runs: Sequence[View]) -> list[Part]:
-    plots = (_trajectory, _progress, _actuators, _use, _latency) if evaluated(runs) else ()
+    path = (_space_path, _progress, _motion) if in_space(runs) else (_trajectory, _progress)
+    plots = (*path, _actuators, _use, _latency) if evaluated(runs) else ()
     return [
         *faint(_subtitle(runs)),
         f'<div class="results">{"".join(map(_result, runs))}</div>',
@@ -143,16 +146,26 @@ def _origin(run: View) -> str:
 
 def _overview(runs: Sequence[View], title: str) -> Figure:
     """All of it on one sheet."""
-    rows = len(runs)
-    figure = Figure(figsize=(11.0, 5.6 + 1.5 * rows), layout="constrained")
-    top, bottom = figure.subfigures(2, 1, height_ratios=(4.9, 1.5 * rows + 0.2))
-    left, right = top.subfigures(1, 2, width_ratios=(1.0, 1.0))
-    path = left.subplots()
-    draw_trajectory(path, runs)
-    legend(path, loc="best")
-    count = _rows(runs)
-    axes = right.subplots(count + 1, 1, gridspec_kw={"height_ratios": (*[1.0] * count, 0.9)})
-    draw_progress(axes[:-1], runs)
+    rows, space = len(runs), in_space(runs)
+    count, motion = _rows(runs), MOTION_ROWS if space else 0
+    high, low = 1.28 * (count + motion + 1) if space else 4.9, rows * actuators_height(runs, 1.5) + 0.2
+    figure = Figure(figsize=(11.0, high + low + 0.5), layout="constrained")
+    top, bottom = figure.subfigures(2, 1, height_ratios=(high, low))
+    near = space and any(has_place(result) for _, result in evaluated(runs))
+    left, right = top.subfigures(1, 2, width_ratios=(1.2 if near else 1.0, 1.0))
+    if space:
+        draw_space(left, runs, stacked=True)
+    else:
+        path = left.subplots()
+        draw_trajectory(path, runs)
+        legend(path, loc="best")
+    axes = right.subplots(
+        count + motion + 1, 1, gridspec_kw={"height_ratios": (*[1.0] * (count + motion), 0.9)}
+    )
+    draw_progress(axes[:count], runs)
+    if space:
+        axes[count - 1].set_xlabel("")
+        draw_motion(axes[count:-1], runs)
     draw_latency(axes[-1], runs)
     for one, run in zip(bottom.subplots(rows, 1, sharex=True, squeeze=False)[:, 0], runs, strict=True):
         draw_actuators(one, run)
@@ -198,6 +211,31 @@ def _trajectory(runs: Sequence[View]) -> Plot:
     return Plot("The path, seen from above", caption, figure)
 
 
+def _space_path(runs: Sequence[View]) -> Plot:
+    figure = Figure(figsize=(WIDTH, space_height(runs)), layout="constrained")
+    near = draw_space(figure, runs)
+    caption = """
+    Both views have one scale. Circles show the robot's outline along the way, the strokes inside the axes of its body:
+    one that points at you looks short."""
+    if counting(runs):
+        caption += (
+            " Numbered circles are the targets, as large as the tolerance; those that were reached are grey."
+        )
+    if near:
+        caption += """ The white dot is the goal, as large as the tolerance; where an attitude is asked for, thin
+        strokes are the wanted axes. Below, the last stretch: bold is the closing window, the dot is the end, the dashed
+        circle is the tolerance."""
+    return Plot("The path, seen from above and from the side", caption, figure)
+
+
+def _motion(runs: Sequence[View]) -> Plot:
+    figure = Figure(figsize=(WIDTH, 0.5 + 1.4 * MOTION_ROWS), layout="constrained")
+    rows = figure.subplots(MOTION_ROWS, 1, sharex=True)
+    draw_motion(rows, runs)
+    legend(rows[0], loc="upper right", ncols=len(runs))
+    return Plot("How fast it moved and turned", "The turn rate counts about whatever axis it is.", figure)
+
+
 def _progress(runs: Sequence[View]) -> Plot:
     count, counts = _rows(runs), counting(runs)
     figure = Figure(figsize=(WIDTH, 0.5 + 1.7 * count), layout="constrained")
@@ -212,7 +250,7 @@ def _progress(runs: Sequence[View]) -> Plot:
 
 
 def _actuators(runs: Sequence[View]) -> Plot:
-    figure = Figure(figsize=(WIDTH, 0.5 + 1.75 * len(runs)), layout="constrained")
+    figure = Figure(figsize=(WIDTH, 0.5 + len(runs) * actuators_height(runs, 1.75)), layout="constrained")
     axes = figure.subplots(len(runs), 1, sharex=True, squeeze=False)[:, 0]
     for one, run in zip(axes, runs, strict=True):
         draw_actuators(one, run)

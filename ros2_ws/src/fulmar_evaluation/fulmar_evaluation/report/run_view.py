@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from fulmar_bags.run_record import RunRecord
+from fulmar_core.spatial import SpatialState
 from fulmar_evaluation.report.style import colours
 from fulmar_evaluation.run_evaluation import RunResult, evaluate_run
 from fulmar_evaluation.run_summary import latencies_ms, summarise
@@ -65,6 +66,11 @@ def evaluated(runs: Sequence[View]) -> list[tuple[View, RunResult]]:
     return [(run, run.result) for run in runs if run.result is not None]
 
 
+def in_space(runs: Sequence[View]) -> bool:
+    """Whether the runs are of bodies that move in three dimensions."""
+    return any(result.task.state_type is SpatialState for _, result in evaluated(runs))
+
+
 def result_of(run: View) -> tuple[str, str]:
     """One word and one or two sentences on how a run went."""
     result = run.result
@@ -90,12 +96,13 @@ def result_of(run: View) -> tuple[str, str]:
     if run.summary["velocity_error_m_s"] is not None:
         return ("Kept" if result.success else "Missed"), (
             f"Over {result.duration_s:.0f} s the velocity was {run.summary['velocity_error_m_s']:.3f} m/s off "
-            f"and the turn rate {run.summary['yaw_rate_error_deg_s']:.1f}°/s, on average, "
+            f"and the turn rate {_known(run, 'yaw_rate_error_deg_s', 'rate_error_deg_s'):.1f}°/s, on average, "
             "changes of the target included."
         )
     what, error = f"the {result.task.subject}", _length(run.summary["final_position_error_m"])
-    if run.summary["final_heading_error_deg"] is not None:
-        error += f" and {_value(run.summary['final_heading_error_deg'], '°', 1)}"
+    turned = _known(run, "final_heading_error_deg", "final_attitude_error_deg")
+    if turned is not None:
+        error += f" and {_value(turned, '°', 1)}"
     if result.success:
         return "Reached", (
             f"The goal was reached after {result.figure('time_to_target_s'):.1f} s and held to the end. "
@@ -107,12 +114,18 @@ def result_of(run: View) -> tuple[str, str]:
     )
 
 
+def _known(run: View, *names: str) -> float | None:
+    """The first of some figures that there is: one of the plane, or its like in space."""
+    return next((run.summary[name] for name in names if run.summary[name] is not None), None)
+
+
 def rule(runs: Sequence[View]) -> str:
     """What counts as success, for the first run that has a result."""
     for run in runs:
         if run.result is not None:
             task, tolerance = run.result.task, run.result.task.tolerance
-            heading = f" and {tolerance.heading_deg:g}°" if tolerance.heading_deg > 0.0 else ""
+            angle_deg = tolerance.attitude_deg or tolerance.heading_deg
+            heading = f" and {angle_deg:g}°" if angle_deg > 0.0 else ""
             if run.result.progress is not None:
                 return "A run counts as done if the goals of its file came to their end and the last one was kept."
             if run.result.counts:
@@ -121,9 +134,10 @@ def rule(runs: Sequence[View]) -> str:
                     f"reaches {task.required} of them as a success."
                 )
             if tolerance.velocity > 0.0:
+                rate_deg = tolerance.rate_deg or tolerance.yaw_rate_deg
                 return (
                     f"A run counts as kept if the velocity stays within {tolerance.velocity:g} m/s and the turn rate "
-                    f"within {tolerance.yaw_rate_deg:g}°/s of the target for all of the last {tolerance.hold_s:g} s."
+                    f"within {rate_deg:g}°/s of the target for all of the last {tolerance.hold_s:g} s."
                 )
             return (
                 f"A run counts as reached if the {task.subject} stays within {100 * tolerance.position:g} cm"
@@ -144,12 +158,14 @@ def table_rows(runs: Sequence[View]) -> list[Row]:
     asked = [
         row("Final position error", "", lambda s: _length(s["final_position_error_m"])),
         row("Final heading error", "", lambda s: _value(s["final_heading_error_deg"], "°", 1)),
+        row("Final attitude error", "", lambda s: _value(s["final_attitude_error_deg"], "°", 1)),
         row("Time to goal", "from when on it stayed", lambda s: _value(s["time_to_target_s"], " s", 1)),
         row("Targets reached", "", lambda s: _value(s["goals_reached"], "", 0)),
         row("Goals of the file", "", lambda s: s["goals_progress"] or "–"),
         row("Distance from the path", "mean", lambda s: _length(s["path_error_m"])),
         row("Velocity error", "mean", lambda s: _value(s["velocity_error_m_s"], " m/s", 3)),
         row("Turn rate error", "mean", lambda s: _value(s["yaw_rate_error_deg_s"], "°/s", 1)),
+        row("Turn rate error", "mean, about all axes", lambda s: _value(s["rate_error_deg_s"], "°/s", 1)),
     ]
     return [
         *(line for line in asked if any(cell != "–" for cell in line[2])),

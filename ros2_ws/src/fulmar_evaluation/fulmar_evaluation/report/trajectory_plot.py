@@ -41,7 +41,7 @@ def draw_trajectory(axes: Axes, runs: Sequence[View]) -> None:
         if result.counts:
             _waypoints(axes, result, named=order == 0)
         elif has_place(result):
-            for target in _given(result):
+            for target in given_targets(result):
                 draw_goal(axes, target, result.task.tolerance, arrow=1.6 * radius)
             if order == 0:
                 _word(axes, "goal", result.targets[-1, :2], -radius, va="top")
@@ -52,16 +52,23 @@ def draw_trajectory(axes: Axes, runs: Sequence[View]) -> None:
 
 def draw_close_up(axes: Axes, runs: Sequence[View]) -> None:
     """The last seconds around the goal, with the tolerance."""
+    draw_near(axes, runs, (0, 1))
+    axes.set_xlabel("from the goal [cm]")
+    axes.set_title("close to the goal")
+
+
+def draw_near(axes: Axes, runs: Sequence[View], columns: tuple[int, int]) -> None:
+    """The last seconds around the goal, seen along one axis: `columns` of the place go to the right and up."""
     quiet_grid(axes)
     axes.set_aspect("equal")
-    half_cm = 15.0
+    shown, half_cm = list(columns), 15.0
     for run, result in evaluated(runs):
         tolerance_cm = 100.0 * result.task.tolerance.position
         half_cm = CLOSE_UP * tolerance_cm
-        places = run.record.motion.position[result.samples, :2]
+        places = run.record.motion.position[result.samples]
         if result.task.subject in result.things:
-            places = result.things[result.task.subject][:, :2]
-        x, y = 100.0 * (places - result.targets[-1, :2]).T
+            places = result.things[result.task.subject]
+        x, y = 100.0 * (places[:, shown] - result.targets[-1, shown]).T
         late = result.time_s >= result.window_start_s
         axes.plot(x, y, color=run.colour, linewidth=1.0, alpha=0.35)
         axes.plot(x[late], y[late], color=run.colour, linewidth=1.8)
@@ -70,8 +77,6 @@ def draw_close_up(axes: Axes, runs: Sequence[View]) -> None:
     axes.plot(0, 0, "+", color=INK, markersize=9)
     axes.set_xlim(-half_cm, half_cm)
     axes.set_ylim(-half_cm, half_cm)
-    axes.set_xlabel("from the goal [cm]")
-    axes.set_title("close to the goal")
 
 
 def has_place(result: RunResult) -> bool:
@@ -103,7 +108,7 @@ def _waypoints(axes: Axes, result: RunResult, *, named: bool) -> None:
             )
 
 
-def _given(result: RunResult) -> np.ndarray:
-    """Every place that was a goal at some time, in their order, shape (k, 3)."""
+def given_targets(result: RunResult) -> np.ndarray:
+    """Every target that was a goal at some time, in their order, shape (k, 3) or (k, 7)."""
     changed = np.any(np.diff(result.aims, axis=0, prepend=np.nan) != 0.0, axis=1)
     return result.aims[changed]
