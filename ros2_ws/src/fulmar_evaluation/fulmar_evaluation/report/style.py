@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 
 INK, FAINT, PAPER = "#1f2430", "#8a919e", "#fefefd"
 ALARM = "#d6336c"
-BODY_AXES = ("#c25b52", "#4f9a57", "#5578bd")  # x, y, z of a body in space
+BODY_AXES = ("#c25b52", "#4f9a57", "#7d5ba6")  # x, y, z of a body in space; no blue: policies are
 DASHED = (0, (4, 3))
 VARIABLES = {INK: "var(--ink)", FAINT: "var(--faint)", PAPER: "var(--paper)"}
 
