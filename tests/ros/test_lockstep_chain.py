@@ -15,6 +15,7 @@ from fulmar_core.paths import OWN_FOLDERS
 from tests.conftest import RosDomain
 from tests.ros.cli import fulmar, json_of, start_fulmar
 
+pytestmark = pytest.mark.real_time  # five processes at full speed leave other tests no processor
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "estimation.md"
 ESTIMATED = ("floating_platform", "--estimator", "mocap_imu", "--lockstep")
 HEALTH = ("/diagnostics", "/floating_platform/controller/status")  # these follow the wall clock
