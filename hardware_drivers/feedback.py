@@ -21,7 +21,7 @@ class Report:
         ValueError: `others` has odometry or IMU, which have fields of their own.
     """
 
-    odometry: RigidBodyState | None  # None: somebody else measures it
+    odometry: RigidBodyState | None  # None: another node measures it
     imu: ImuSample | None
     stamp_ns: int  # when it was captured, since the epoch [ns]
     # Of other sensors, by their names in the robot's YAML. One with a stamp of its own is published once.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fulmar_ros.plant_wires import SentStates
+from fulmar_ros.sent_states import SentStates
 
 MS = 1_000_000
 

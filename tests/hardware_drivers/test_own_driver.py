@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import re
 import threading
 
 import numpy as np
 import pytest
-import yaml
 
 from fulmar_core.backend import AirBearing
 from fulmar_core.errors import ConfigError, DeviceError
-from fulmar_core.paths import config_path
 from fulmar_core.robot import load_robot
 from hardware_drivers.devices import make_device, when_the_driver_dies
 from hardware_drivers.driver import MEMBERS, DeviceDriver
-from hardware_drivers.driver_backend import STOPS, DriverBackend
+from hardware_drivers.driver_backend import STOPS
 from hardware_drivers.kingfisher_driver import KingfisherDriver
 from hardware_drivers.kobuki_driver import KobukiDriver
 from hardware_drivers.mavlink_driver import MavlinkDriver
@@ -25,54 +22,14 @@ from hardware_drivers.settings import hardware_of, load_hardware
 from hardware_drivers.thruster_driver import ThrusterDriver
 from hardware_drivers.topic_driver import TopicDriver, ValveTopicDriver
 from tests.hardware_drivers.bench import episode_at, until
-from tests.own_files import own_folder
+from tests.hardware_drivers.own_board import BOARD, PLATFORM, made, with_method, written
 
-BOARD = """
-import numpy as np
-from hardware_drivers.driver import DeviceDriver
-
-class Board(DeviceDriver):
-    def __init__(self, robot, settings, *, patience_s):
-        self.settings, self.patience_s = settings, patience_s
-        self.sent, self.closed = [], 0
-    def write(self, command):
-        self.sent.append(command.tolist())
-    def close(self):
-        self.closed += 1
-"""
 FLOATING = """
     bearing_on = False
     def set_bearing(self, on):
         self.bearing_on = on
         return ""
 """
-PLATFORM = "floating_platform"
-
-
-@pytest.fixture
-def folder(tmp_path, monkeypatch):
-    with own_folder(tmp_path, monkeypatch):
-        yield tmp_path
-
-
-def written(folder, code, robot=PLATFORM, more=""):
-    """A hardware file whose driver is the class `Board` of this code."""
-    (folder / "own_board.py").write_text(code)
-    path = folder / "own.yaml"
-    path.write_text(f"title: t\nrobot: {robot}\ndriver:\n  kind: own_board:Board\n{more}")
-    return str(path)
-
-
-def made(folder, code=BOARD, robot=PLATFORM, more="", patience_s=1.5) -> tuple[DriverBackend, object]:
-    """The device, and the user's object in it."""
-    device = make_device(
-        load_robot(robot), load_hardware(written(folder, code, robot, more)), port="", patience_s=patience_s
-    )
-    return device, device._driver._driver
-
-
-def with_method(method, body):
-    return BOARD + f"    def {method}:\n        {body}\n"
 
 
 @pytest.mark.parametrize(
@@ -151,54 +108,6 @@ def test_a_class_that_measures_returns_reports(folder):
     assert sample.stamp_ns == 7
     hardware = load_hardware(str(folder / "own.yaml"))
     assert hardware.measures_odometry and not hardware.seen_from_outside
-
-
-STARS = """from fulmar_core.sensors.reading import Reading
-        from hardware_drivers.feedback import Report
-        return Report(None, None, 7, {{{name!r}: {reading}}})"""
-
-
-def starry(folder, monkeypatch, name="star_tracker", reading="Reading((0.0, 0.6, 0.0, 0.8), stamp_ns=5)"):
-    """The device of a robot with a star tracker, whose class reports it."""
-    robot = yaml.safe_load(config_path("robots", PLATFORM).read_text(encoding="utf-8"))
-    robot["sensors"]["star_tracker"] = {"std": 1e-4}
-    (folder / "robots").mkdir()
-    (folder / "robots" / "starry.yaml").write_text(yaml.safe_dump(robot | {"name": "starry"}))
-    monkeypatch.setenv("FULMAR_CONFIGS", str(folder))
-    return made(folder, with_method("read(self)", STARS.format(name=name, reading=reading)), "starry")[0]
-
-
-def test_a_class_reports_any_sensor_of_the_table_that_its_robot_has(folder, monkeypatch):
-    sample = starry(folder, monkeypatch).step(np.zeros(8))
-    assert sample.odometry is None and sample.imu is None
-    assert sample.stamp_ns == 7
-    assert sample.readings["star_tracker"].value == (0.0, 0.6, 0.0, 0.8)
-    assert sample.readings["star_tracker"].stamp_ns == 5
-
-
-@pytest.mark.parametrize(
-    ("name", "reading", "says"),
-    [
-        ("star_traker", "Reading((0, 0, 0, 1))", "'star_traker' is no sensor. Did you mean 'star_tracker'?"),
-        ("star_tracker", "(0, 0, 0, 1)", "'star_tracker' is tuple, which must be a Reading"),
-        ("star_tracker", "Reading((0, 0, 1))", "ValueError: [0.0, 0.0, 1.0] must be a unit quaternion"),
-        ("imu", "Reading(None)", "'imu' is a field of a report of its own: Report(imu=...)."),
-    ],
-)
-def test_a_reading_that_cannot_be_published_is_one_line_with_its_name(
-    folder, monkeypatch, name, reading, says
-):
-    device = starry(folder, monkeypatch, name, reading)
-    with pytest.raises(DeviceError, match=rf"^driver 'own_board:Board': read .*{re.escape(says)}") as caught:
-        device.step(np.zeros(8))
-    assert "\n" not in str(caught.value)
-
-
-def test_a_sensor_that_the_robot_s_file_does_not_name_is_refused(folder):
-    code = with_method("read(self)", STARS.format(name="star_tracker", reading="Reading((0, 0, 0, 1))"))
-    device, _ = made(folder, code)
-    with pytest.raises(DeviceError, match="is no sensor of this robot: add 'star_tracker:' below 'sensors:'"):
-        device.step(np.zeros(8))
 
 
 WRONG = (

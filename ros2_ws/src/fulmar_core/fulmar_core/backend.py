@@ -31,7 +31,7 @@ class Sample:
 
     @property
     def odometry(self) -> RigidBodyState | None:
-        """Measured motion, without a batch axis; None: somebody else measures it."""
+        """Measured motion, without a batch axis; None: another node measures it."""
         value: RigidBodyState | None = self._value("odometry")
         return value
 

@@ -12,7 +12,7 @@ import numpy as np
 from fulmar_core.rotation import Array, yaw_of
 
 if TYPE_CHECKING:
-    # A parameter that nobody gives is any state: most code passes states on without looking into them.
+    # Without a parameter, `Task` and its like stand for any state type: most code only passes states on.
     from typing_extensions import TypeVar
 
     S = TypeVar("S", bound="State", default=Any)

@@ -15,6 +15,7 @@ from fulmar_core.errors import shortened
 from fulmar_core.estimation.estimator import Estimate
 from fulmar_core.robot_name import Frames
 from fulmar_core.rotation import rotate_inverse
+from fulmar_core.sensors.imu import UNKNOWN
 from fulmar_core.sensors.kind import SensorKind
 from fulmar_core.sensors.reading import Reading
 from fulmar_core.sensors.table import SENSORS
@@ -40,7 +41,7 @@ def _sensor(kind: SensorKind) -> Read:
 
 
 def _imu(message: Imu, _frames: Frames) -> Reading | None:
-    if message.linear_acceleration_covariance[0] == -1.0 or message.angular_velocity_covariance[0] == -1.0:
+    if UNKNOWN in (message.linear_acceleration_covariance[0], message.angular_velocity_covariance[0]):
         return None  # REP-145: marks fields that are absent
     return reading_of(message, SENSORS["imu"])
 

@@ -6,26 +6,17 @@ import functools
 from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
-
-from fulmar_core.actuators.pushing import Push, Pushing, Vector3, unit
+from fulmar_core.actuators.pushing import Mount, Push, Pushing
 from fulmar_core.actuators.response import Response
 from fulmar_core.arrays import clip
 from fulmar_core.plausible_ranges import Plausible
 from fulmar_core.rotation import Array
 
 
-@dataclass(frozen=True)
-class Fan:
-    """One fan, in the body frame."""
+class Fan(Mount):
+    """One fan."""
 
-    name: str
-    position: Vector3  # where the force acts [m]
-    direction: Vector3  # of the force on the body, any length > 0 [-]
-
-    def __post_init__(self) -> None:
-        if np.linalg.norm(self.direction) < 1e-6:
-            raise ValueError(f"fan '{self.name}': 'direction' must not be zero.")
+    WHAT = "fan"
 
 
 @dataclass(frozen=True)
@@ -63,7 +54,7 @@ class Fans(Pushing):
     @functools.cached_property
     def pushes(self) -> tuple[Push, ...]:
         """Place and direction of each fan."""
-        return tuple(Push(each.name, each.position, unit(each.direction)) for each in self.fans)
+        return tuple(fan.push for fan in self.fans)
 
     @property
     def recipe(self) -> str:

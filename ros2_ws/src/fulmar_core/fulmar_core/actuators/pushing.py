@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 from abc import abstractmethod
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from array_api_compat import device
@@ -27,6 +28,26 @@ class Push:
     name: str
     position: Vector3  # where the force acts [m]
     direction: Vector3  # of the force on the body for a positive command, a unit vector [-]
+
+
+@dataclass(frozen=True)
+class Mount:
+    """Where one actuator sits and pushes, in the body frame, as a robot's file says it."""
+
+    name: str
+    position: Vector3  # where the force acts [m]
+    direction: Vector3  # of the force on the body, any length > 0 [-]
+
+    WHAT: ClassVar[str]  # in messages
+
+    def __post_init__(self) -> None:
+        if np.linalg.norm(self.direction) < 1e-6:
+            raise ValueError(f"{self.WHAT} '{self.name}': 'direction' must not be zero.")
+
+    @property
+    def push(self) -> Push:
+        """The same with a unit vector."""
+        return Push(self.name, self.position, _unit(self.direction))
 
 
 class Pushing(Actuators):
@@ -158,7 +179,7 @@ def wrench_columns(count: int) -> list[int]:
     return PLANAR if count == len(PLANAR) else list(range(WRENCH))
 
 
-def unit(vector: Vector3) -> Vector3:
+def _unit(vector: Vector3) -> Vector3:
     """A vector of length 1 along another one, which is not zero."""
     length = sum(part * part for part in vector) ** 0.5
     return vector[0] / length, vector[1] / length, vector[2] / length

@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from fulmar_core.actuators.pushing import Push, Pushing, Vector3, unit
+from fulmar_core.actuators.pushing import Mount, Push, Pushing
 from fulmar_core.actuators.response import Response
 from fulmar_core.arrays import array_namespace, clip
 from fulmar_core.attitude import Vector
@@ -17,17 +17,10 @@ from fulmar_core.rotation import Array
 Row = tuple[tuple[float, list[int], list[int]], ...]  # a weight, and the nozzles it counts for and against
 
 
-@dataclass(frozen=True)
-class Nozzle:
-    """One valve with its nozzle, in the body frame."""
+class Nozzle(Mount):
+    """One valve with its nozzle."""
 
-    name: str
-    position: Vector3  # where the force acts [m]
-    direction: Vector3  # of the force on the body, any length > 0 [-]
-
-    def __post_init__(self) -> None:
-        if np.linalg.norm(self.direction) < 1e-6:
-            raise ValueError(f"nozzle '{self.name}': 'direction' must not be zero.")
+    WHAT = "nozzle"
 
 
 @dataclass(frozen=True)
@@ -67,7 +60,7 @@ class Thrusters(Pushing):
     @functools.cached_property
     def pushes(self) -> tuple[Push, ...]:
         """Place and direction of each nozzle."""
-        return tuple(Push(each.name, each.position, unit(each.direction)) for each in self.nozzles)
+        return tuple(nozzle.push for nozzle in self.nozzles)
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -1,0 +1,36 @@
+"""The loop of a plant in real time, with a backend and a guard that note what they get."""
+
+from __future__ import annotations
+
+import threading
+from contextlib import nullcontext
+from types import SimpleNamespace
+
+import numpy as np
+
+from fulmar_core.backend import Sample
+from fulmar_core.robot import load_robot
+from fulmar_core.sensors.reading import Reading
+from fulmar_ros.plant_clock import SimulatedTime
+from fulmar_ros.plant_loops import RealtimeLoop
+from tests.states import planar_state
+
+ROBOT = load_robot("floating_platform")
+
+
+def test_the_guard_receives_the_newest_measured_state_for_safe_controllers_that_steer():
+    samples = [Sample({"odometry": Reading(planar_state(x, 0.0, 0.0))}, None) for x in (1.0, 2.0, 3.0)]
+    received = []
+
+    def output(_now_ns, state):
+        received.append(float(state.position_in_world[0]))
+        return ROBOT.actuators.safe_command
+
+    def ignore(*_arguments):
+        """Nobody subscribes."""
+
+    backend = SimpleNamespace(robot=ROBOT, step=lambda _command: samples[len(received)])
+    wires = SimpleNamespace(lock=nullcontext(), publish_sample=ignore, publish_applied=ignore)
+    loop = RealtimeLoop(backend, wires, SimpleNamespace(output=output), SimulatedTime(), rate=50.0)
+    loop.run(samples[0], 2, threading.Event())
+    assert np.allclose(received, [1.0, 2.0])
