@@ -190,7 +190,7 @@ def test_people_get_the_same_in_lines(fulmar):
     [
         (None, "cannot be read"),
         ("body: [", "not valid YAML"),
-        ("nmae: spacecraft_16", "unknown key 'nmae'. Did you mean 'name'?"),
+        ("names_: spacecraft_16", "unknown key 'names_'. Did you mean 'name'?"),
         ("name: [1]", "must be a single value"),
     ],
 )
