@@ -43,7 +43,7 @@ class Check:
 
 def held_out_evaluator(robot: Robot, task: Task, scenario: Scenario) -> Evaluator:
     """Evaluator in the training scenario and in the nominal one: a network may be good at either alone."""
-    worlds = (scenario, load_scenario("nominal"))
+    worlds = dict.fromkeys((scenario, load_scenario("nominal")))
 
     def evaluate(network: DeployedNetwork) -> tuple[float, float]:
         controller = NetworkController(network, robot, task, robot.timing.control_hz)

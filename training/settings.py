@@ -290,13 +290,13 @@ def load_training_settings(robot: Robot, task: Task, name: str | None = None) ->
         robot: The robot.
         task: The task.
         name: A file of `configs/training`, or a path to a YAML file; by default `<robot>_<task>`, if there is one,
-            else the one that the robot's family of actuators names, such as `thrusters`.
+            else the robot's own `recipe`, such as `thrusters`.
 
     Raises:
         ConfigError: No such file, a mistake in it, or an algorithm that cannot drive this robot.
     """
     own = f"{robot.name}_{task.name}"
-    name = name or (own if own in config_names("training") else robot.actuators.recipe)
+    name = name or (own if own in config_names("training") else robot.recipe)
     path = Path(name) if name.endswith((".yaml", ".yml")) else config_path("training", name)
     try:
         settings = load_config(TrainingSettings, path)

@@ -233,6 +233,11 @@ class Robot:
         free = not self.body.planar and self.hydrodynamics is None and isinstance(self.actuators, Pushing)
         return SpatialState if free else PlanarState
 
+    @property
+    def recipe(self) -> str:
+        """Training settings where a robot and task have none of their own: a file of `configs/training`."""
+        return self.actuators.recipe if self.state_type is PlanarState else "free_flyer"
+
     def __post_init__(self) -> None:
         if isinstance(self.actuators, Rolling) and self.actuators.track > 2.0 * self.body.radius:
             raise ValueError(
