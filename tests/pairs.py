@@ -1,4 +1,4 @@
-"""Robots at tasks: a few pairs in which each is there at least once are quick tests, all others are slow ones."""
+"""Robots at tasks of their space: a few pairs with each at least once are quick tests, all others are slow ones."""
 
 from __future__ import annotations
 
@@ -6,6 +6,21 @@ from collections.abc import Hashable, Iterable, Mapping
 from typing import Any
 
 import pytest
+
+
+def shared_space(robots: Mapping[str, Any], tasks: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Names of every robot with every task of the space that it moves in; `Task.check` refuses all other pairs.
+
+    Args:
+        robots: By name.
+        tasks: Same.
+    """
+    return [
+        (robot, task)
+        for robot in robots
+        for task in tasks
+        if robots[robot].state_type is tasks[task].state_type
+    ]
 
 
 def covering(pairs: Iterable[tuple[Hashable, Hashable]]) -> set[tuple[Hashable, Hashable]]:
@@ -31,13 +46,13 @@ def covering(pairs: Iterable[tuple[Hashable, Hashable]]) -> set[tuple[Hashable, 
 
 
 def each_pair(robots: Mapping[str, Any], tasks: Mapping[str, Any]) -> pytest.MarkDecorator:
-    """Give a test every robot with every task, as `robot` and `task`; those beside a covering choice are slow.
+    """Give a test every robot with every task of its space, as `robot` and `task`; a covering choice is quick.
 
     Args:
         robots: What the test receives, by name.
         tasks: Same.
     """
-    names = [(robot, task) for robot in robots for task in tasks]
+    names = shared_space(robots, tasks)
     quick = covering(names)
     return pytest.mark.parametrize(
         ("robot", "task"),
