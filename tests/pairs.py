@@ -7,20 +7,7 @@ from typing import Any
 
 import pytest
 
-
-def shared_space(robots: Mapping[str, Any], tasks: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Names of every robot with every task of the space that it moves in; `Task.check` refuses all other pairs.
-
-    Args:
-        robots: By name.
-        tasks: Same.
-    """
-    return [
-        (robot, task)
-        for robot in robots
-        for task in tasks
-        if robots[robot].state_type is tasks[task].state_type
-    ]
+from tests.spaces import shared_space
 
 
 def covering(pairs: Iterable[tuple[Hashable, Hashable]]) -> set[tuple[Hashable, Hashable]]:

@@ -1,0 +1,60 @@
+"""What tests need of each space: the plane and space have robots and tasks of their own, told apart by `state_type`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from fulmar_core.actuators.pushing import PLANAR, Pushing
+from fulmar_core.planar import PlanarState
+from fulmar_core.robot import Robot, load_robot
+from fulmar_core.spatial import SpatialState
+from fulmar_core.state import State
+from fulmar_core.tasks import Task, load_task
+from fulmar_core.teleop import OUT_OF_PLANE
+
+POSE_TASKS = {PlanarState: load_task("go_to_pose"), SpatialState: load_task("go_to_pose_3d")}
+SPACECRAFT = load_robot("spacecraft_16")
+
+
+def shared_space(robots: Mapping[str, Any], tasks: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Names of every robot with every task of the space that it moves in; `Task.check` refuses all other pairs.
+
+    Args:
+        robots: By name.
+        tasks: Same.
+    """
+    return [
+        (robot, task)
+        for robot in robots
+        for task in tasks
+        if robots[robot].state_type is tasks[task].state_type
+    ]
+
+
+def robot_for(task: Task, in_plane: Robot, in_space: Robot = SPACECRAFT) -> Robot:
+    """The one of two robots that moves in the space of a task."""
+    return in_plane if task.state_type is PlanarState else in_space
+
+
+def pose_task(robot: Robot) -> Task:
+    """The task of going to a pose in the space of a robot."""
+    return POSE_TASKS[robot.state_type]
+
+
+def at_target(task: Task, target: Any) -> State:
+    """Bodies at rest at the first targets of goals, shape (n, k); those that track velocities are at the origin."""
+    if task.goal_topic != "goal_velocity":
+        return task.state_type.resting(target)
+    origin = task.state_type.target_at((0.0,) * task.state_type.AXES)
+    return task.state_type.resting(np.broadcast_to(origin, np.shape(target)[:-1] + origin.shape))
+
+
+def pushes_within_its_plane(robot: Robot) -> bool:
+    """Whether a body in space has actuators that move it in the plane of its x and y axes and turn it there."""
+    assert isinstance(robot.actuators, Pushing)
+    wrenches = robot.actuators.wrench_per_newton
+    within = wrenches[~wrenches[:, OUT_OF_PLANE].any(axis=1)]
+    return bool(np.linalg.matrix_rank(within[:, PLANAR]) == len(PLANAR))
