@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from fulmar_core.robot import Robot
 from tests.spaces import shared_space
 
 
@@ -53,3 +54,9 @@ def each_pair(robots: Mapping[str, Any], tasks: Mapping[str, Any]) -> pytest.Mar
             for robot, task in names
         ],
     )
+
+
+def slow_if_stepped_finely(robot: Robot) -> tuple[pytest.MarkDecorator, ...]:
+    """Marks of a test that runs a robot for long: one with many physics steps to a control step is slow."""
+    fine = robot.timing.substeps(robot.timing.control_hz) > 20
+    return (pytest.mark.slow,) if fine else ()

@@ -10,12 +10,10 @@ import numpy as np
 from fulmar_core.actuators.pushing import PLANAR, Pushing
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot, load_robot
-from fulmar_core.spatial import SpatialState
 from fulmar_core.state import State
 from fulmar_core.tasks import Task, load_task
 from fulmar_core.teleop import OUT_OF_PLANE
 
-POSE_TASKS = {PlanarState: load_task("go_to_pose"), SpatialState: load_task("go_to_pose_3d")}
 SPACECRAFT = load_robot("spacecraft_16")
 
 
@@ -39,9 +37,9 @@ def robot_for(task: Task, in_plane: Robot, in_space: Robot = SPACECRAFT) -> Robo
     return in_plane if task.state_type is PlanarState else in_space
 
 
-def pose_task(robot: Robot) -> Task:
-    """The task of going to a pose in the space of a robot."""
-    return POSE_TASKS[robot.state_type]
+def task_for(robot: Robot, name: str) -> Task:
+    """The task of a name in the space of a robot: those in space end in _3d."""
+    return load_task(name if robot.state_type is PlanarState else f"{name}_3d")
 
 
 def at_target(task: Task, target: Any) -> State:

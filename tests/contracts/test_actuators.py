@@ -85,7 +85,7 @@ def test_a_body_in_space_whose_actuators_push_out_of_its_plane_is_not_driven():
     others = {name: robot for name, robot in ROBOTS.items() if name not in DRIVEN}
     assert set(others) == {"int_ball2"}
     for robot in others.values():
-        with pytest.raises(ConfigError, match="its actuators push out of it. Send it goals: fulmar goals"):
+        with pytest.raises(ConfigError, match=r"its actuators push out of it\. Send it goals: fulmar goals"):
             hand_mapping(robot)
 
 

@@ -16,7 +16,7 @@ from fulmar_core.sensors.star_tracker import StarTrackerSpec
 from fulmar_core.spatial import SpatialState
 from sim_nodes.mock_backend import MockBackend
 from tests.new_robots import robots_of_every_family
-from tests.spaces import SPACECRAFT, pose_task
+from tests.spaces import SPACECRAFT, task_for
 
 ROBOTS = robots_of_every_family()
 PLATFORM = ROBOTS["floating_platform"]
@@ -45,7 +45,9 @@ BUILDERS = {"mock": MockBackend, "mujoco": build_mujoco}
 
 
 def episode_of(robot, scenario="nominal", start=None, **world):
-    drawn = draw_episode(robot, pose_task(robot), load_scenario(scenario), seed=0, number=0).world
+    drawn = draw_episode(
+        robot, task_for(robot, "go_to_pose"), load_scenario(scenario), seed=0, number=0
+    ).world
     kind = robot.state_type
     return Episode(
         kind(*(np.asarray(value) for value in start or AT_REST[kind])),
