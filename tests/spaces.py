@@ -1,4 +1,4 @@
-"""What tests need of each space: the plane and space have robots and tasks of their own, told apart by `state_type`."""
+"""Robots and tasks of the plane and of space in tests, which `state_type` keeps apart."""
 
 from __future__ import annotations
 
