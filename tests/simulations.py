@@ -6,10 +6,10 @@ import numpy as np
 
 from fulmar_core.disturbances.scenario import Scenario, load_scenario
 from fulmar_core.paths import config_names
-from fulmar_core.planar import PlanarState
 from fulmar_core.robot import load_robot
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import load_task
+from tests.spaces import task_for
 
 ROBOTS = {name: load_robot(name) for name in config_names("robots")}
 PLATFORM, BASE = ROBOTS["floating_platform"], ROBOTS["turtlebot2"]
@@ -18,8 +18,11 @@ STILL = Scenario("nothing happens", sensor_noise=False, body="nominal")
 RANDOMISED = load_scenario("randomised")
 
 
-def build(scenario=STILL, robot=PLATFORM, task=POSE, *, worlds=5, seed=3, **kwargs):
-    return BatchSimulation(robot, task, scenario, worlds=worlds, seed=seed, **kwargs)
+def build(scenario=STILL, robot=PLATFORM, task=None, *, worlds=5, seed=3, **kwargs):
+    """Worlds of a robot, by default at the pose task of its space."""
+    return BatchSimulation(
+        robot, task or task_for(robot, "go_to_pose"), scenario, worlds=worlds, seed=seed, **kwargs
+    )
 
 
 def commands(simulation, steps, seed=1, worlds=None):
@@ -38,5 +41,5 @@ def run(simulation, steps, **kwargs):
 
 def differing(one, other):
     return {
-        name for name in PlanarState.COLUMNS if not np.array_equal(getattr(one, name), getattr(other, name))
+        name for name in type(one).COLUMNS if not np.array_equal(getattr(one, name), getattr(other, name))
     }

@@ -7,20 +7,24 @@ import re
 import numpy as np
 import pytest
 
+from fulmar_core.attitude import exponential
 from fulmar_core.controllers.disturbance_inputs import PUSH_TERMS, disturbance_terms
 from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.goal import Goal
+from fulmar_core.goal import Goal, no_obstacles
 from fulmar_core.observation import Observer
 from fulmar_core.paths import config_names
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import load_robot
 from fulmar_core.simulation import BatchSimulation
+from fulmar_core.spatial import SpatialState
 from fulmar_core.tasks import load_task
 from fulmar_core.tasks.go_to_position_with_obstacles import GoToPositionWithObstacles
 
 TASKS = config_names("tasks")
 UNITS = {"fine_distance": " m", "fine_heading_deg": "°", "fine_speed": " m/s", "fine_velocity": " m/s"} | {
-    "fine_yaw_rate": " rad/s"
+    "fine_yaw_rate": " rad/s",
+    "fine_angle": " rad",
+    "fine_rate": " rad/s",
 }
 RANGES = {
     "any": (-np.inf, np.inf),
@@ -28,6 +32,16 @@ RANGES = {
     "-1 to 1": (-1.0, 1.0),
     "-3 to 3": (-3.0, 3.0),
     "0 to 1": (0.0, 1.0),
+    "-π to π": (-np.pi, np.pi),
+}
+ROBOT_OF = {PlanarState: load_robot("leatherback"), SpatialState: load_robot("spacecraft_16")}
+SLIGHTLY = (0.2, 0.3, 0.4)  # rotation vector to a goal's attitude [rad]
+# No attitude makes all six entries of a rotation matrix positive; these turns make one each.
+TURNS = {
+    "rotation_to_goal_12": (0.0, 0.0, -0.5),
+    "rotation_to_goal_13": (0.0, 0.5, 0.0),
+    "rotation_to_goal_21": (0.0, 0.0, 0.5),
+    "rotation_to_goal_23": (-0.5, 0.0, 0.0),
 }
 
 
@@ -59,11 +73,11 @@ def test_the_table_has_exactly_the_terms_of_all_tasks(terms):
 
 @pytest.mark.parametrize("task", TASKS)
 def test_values_stay_in_the_stated_range(terms, task):
-    robot, rounding = load_robot("leatherback"), 1e-5
+    robot, rounding = ROBOT_OF[load_task(task).state_type], 1e-5
     worlds = BatchSimulation(robot, load_task(task), load_scenario("randomised"), worlds=64, seed=1)
     seen = []
     for _ in range(5):
-        worlds.step(np.full((64, 2), 0.5) * robot.actuators.scale)
+        worlds.step(np.full(worlds.command.shape, 0.5) * robot.actuators.scale)
         seen.append(np.asarray(worlds.observe()))
     values = np.vstack(seen)
     for name, column in zip(load_task(task).observation_names, values.T, strict=False):
@@ -74,6 +88,10 @@ def test_values_stay_in_the_stated_range(terms, task):
 
 def terms_on_one_side(task, side):
     """Terms of a robot at the origin with heading 0; everything is ahead and to one side (1 left, -1 right)."""
+    return (in_plane if task.state_type is PlanarState else in_space)(task, side)
+
+
+def in_plane(task, side):
     state = PlanarState(*(np.array([value]) for value in (0.0, 0.0, 0.0, 0.2, 0.1 * side, 0.3 * side)))
     ahead = [[[3.0, 2.0 * side, 0.5 * side], [4.0, 3.0 * side, 0.6 * side], [5.0, 4.0 * side, 0.7 * side]]]
     discs = np.array([[[1.0, 3.0 * side, 0.2], [0.5, 4.0 * side, 0.2], [2.0, 5.0 * side, 0.2]]])
@@ -83,6 +101,25 @@ def terms_on_one_side(task, side):
     return dict(
         zip(task.observation_names, (float(term[0]) for term in task.observe(state, goal)), strict=True)
     )
+
+
+def in_space(task, side):
+    """The same with everything above, too; rotations about x and z are mirrored with what they turn."""
+    turned = np.array([side, 1.0, side])
+    at = SpatialState(*np.array([[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.2, 0.1 * side, 0.3, *0.2 * turned]]).T)
+    places = np.array([[3.0, 2.0 * side, 1.0], [4.0, 3.0 * side, 1.5], [5.0, 4.0 * side, 2.0]])
+
+    def observed(turn):
+        aside = turned if task.goal_topic == "goal_velocity" else exponential(tuple(turned * turn))
+        targets = np.concatenate((places, np.tile(aside, (3, 1))), axis=-1)
+        goal = Goal(targets[None], np.zeros(1), no_obstacles(1))
+        return dict(zip(task.observation_names, task.observe(at, goal), strict=True))
+
+    shown = {
+        name: next((turn for end, turn in TURNS.items() if name.endswith(end)), SLIGHTLY)
+        for name in task.observation_names
+    }
+    return {name: float(observed(turn)[name][0]) for name, turn in shown.items()}
 
 
 @pytest.mark.parametrize("task", TASKS)

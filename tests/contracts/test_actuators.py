@@ -19,6 +19,7 @@ from fulmar_core.safety.watchdog import Watchdog
 from fulmar_core.teleop import Wish, hand_mapping
 from fulmar_core.topics import COMMAND, VELOCITY_COMMAND, command_wire
 from tests.new_robots import robots_of_every_family
+from tests.spaces import pushes_within_its_plane
 
 ROBOTS = robots_of_every_family()
 EACH = pytest.mark.parametrize("robot", ROBOTS.values(), ids=ROBOTS)
@@ -30,6 +31,8 @@ IN_PLANE = {name: robot for name, robot in ROBOTS.items() if robot.state_type is
 EACH_IN_PLANE = pytest.mark.parametrize("robot", IN_PLANE.values(), ids=IN_PLANE)
 PUSHED_IN_PLANE = {name: robot for name, robot in PUSHED.items() if name in IN_PLANE}
 EACH_PUSHED_IN_PLANE = pytest.mark.parametrize("robot", PUSHED_IN_PLANE.values(), ids=PUSHED_IN_PLANE)
+DRIVEN = IN_PLANE | {name: robot for name, robot in PUSHED.items() if pushes_within_its_plane(robot)}
+EACH_DRIVEN = pytest.mark.parametrize("robot", DRIVEN.values(), ids=DRIVEN)
 EACH_WHEELED = pytest.mark.parametrize("robot", WHEELED.values(), ids=WHEELED)
 SECOND_NS = 10**9
 # Seconds after commands end, beyond the longest ramp of the robots here.
@@ -67,7 +70,7 @@ def test_random_commands_are_what_the_hardware_can_do_and_use_every_actuator(rob
     assert (np.abs(commands).max(axis=0) > 0.5 * robot.actuators.scale).all()
 
 
-@EACH
+@EACH_DRIVEN
 def test_a_person_drives_it_ahead_and_round(robot):
     drive = hand_mapping(robot)
     assert drive(Wish()).tolist() == robot.actuators.safe_command.tolist()
@@ -76,6 +79,14 @@ def test_a_person_drives_it_ahead_and_round(robot):
     # A car turns while it goes.
     turning = moved(robot, still, drive(Wish(ahead=0.5, turn=1.0)), seconds=1.0)
     assert turning.yaw_rate > 0.02
+
+
+def test_a_body_in_space_whose_actuators_push_out_of_its_plane_is_not_driven():
+    others = {name: robot for name, robot in ROBOTS.items() if name not in DRIVEN}
+    assert set(others) == {"int_ball2"}
+    for robot in others.values():
+        with pytest.raises(ConfigError, match=r"its actuators push out of it\. Send it goals: fulmar goals"):
+            hand_mapping(robot)
 
 
 MIRRORED = ("fan_disc", "jetbot", "kingfisher", "leatherback", "turtlebot2")

@@ -13,13 +13,25 @@ from fulmar_core.episode import Episode, draw_episode
 from fulmar_core.goal import goal_at
 from fulmar_core.planar import PlanarState
 from fulmar_core.sensors.star_tracker import StarTrackerSpec
-from fulmar_core.tasks import load_task
+from fulmar_core.spatial import SpatialState
 from sim_nodes.mock_backend import MockBackend
 from tests.new_robots import robots_of_every_family
+from tests.spaces import SPACECRAFT, task_for
 
 ROBOTS = robots_of_every_family()
 PLATFORM = ROBOTS["floating_platform"]
-TASK = load_task("go_to_pose")
+AT_REST = {
+    PlanarState: (1.0, -2.0, 0.5, 0.0, 0.0, 0.0),
+    SpatialState: (1.0, -2.0, 0.5, 0.5, -0.1, 0.5, 0.7, *(0.0,) * 6),
+}
+ELSEWHERE = {
+    PlanarState: (9.0, 9.0, 3.0, 0.0, 0.0, 0.0),
+    SpatialState: (9.0, 9.0, 3.0, 1.0, *(0.0,) * 9),
+}
+PUSHED = {
+    PlanarState: {"force_x": 1.0, "torque": 0.1},
+    SpatialState: {"force": (1.0, 0.0, 0.0), "torque": (0.0, 0.0, 0.1)},
+}
 
 
 def build_mujoco(robot):
@@ -32,11 +44,14 @@ def build_mujoco(robot):
 BUILDERS = {"mock": MockBackend, "mujoco": build_mujoco}
 
 
-def episode_of(robot, scenario="nominal", start=(1.0, -2.0, 0.5, 0.0, 0.0, 0.0), **world):
-    drawn = draw_episode(robot, TASK, load_scenario(scenario), seed=0, number=0).world
+def episode_of(robot, scenario="nominal", start=None, **world):
+    drawn = draw_episode(
+        robot, task_for(robot, "go_to_pose"), load_scenario(scenario), seed=0, number=0
+    ).world
+    kind = robot.state_type
     return Episode(
-        PlanarState(*(np.asarray(value) for value in start)),
-        goal_at((0.0, 0.0, 0.0)),
+        kind(*(np.asarray(value) for value in start or AT_REST[kind])),
+        goal_at(kind.target_at((0.0,) * kind.AXES)),
         replace(drawn, **{name: np.asarray(value) for name, value in world.items()}),
     )
 
@@ -96,6 +111,8 @@ def test_odometry_is_near_the_truth(backend):
     assert np.abs(error).max() <= 6.0 * spec.position.std
     turn = sample.odometry.angular_velocity_in_body - sample.truth.angular_velocity_in_body
     assert np.abs(turn).max() <= 6.0 * spec.yaw_rate.std
+    measured, true = (q / np.linalg.norm(q) for q in (sample.odometry.quat_xyzw, sample.truth.quat_xyzw))
+    assert 2.0 * np.arccos(min(1.0, abs(measured @ true))) <= 6.0 * np.sqrt(3.0) * spec.heading.std + 1e-7
 
 
 def test_a_star_tracker_reports_at_its_own_rate_where_the_robot_has_one(build):
@@ -135,7 +152,8 @@ def test_the_same_seed_gives_the_same_samples_and_a_reset_forgets_everything(bac
         return np.array([sample.odometry.position_in_world for sample in samples])
 
     first = story()
-    backend.reset(episode_of(robot, start=(9.0, 9.0, 3.0, 0.0, 0.0, 0.0), force_x=1.0, torque=0.1), seed=5)
+    kind = robot.state_type
+    backend.reset(episode_of(robot, start=ELSEWHERE[kind], **PUSHED[kind]), seed=5)
     backend.step(-command_of(robot), 7)
     np.testing.assert_array_equal(first, story())
 
@@ -152,17 +170,18 @@ def test_it_moves_by_commands(backend):
     robot = backend.robot
     command = command_of(robot)
     if robot.actuators.one_way:  # all of them together push nowhere
-        ends = np.eye(len(command))
-        command = ends[0] + ends[-1]
-    begun = PlanarState.from_rigid(backend.reset(episode_of(robot), seed=1).truth)
-    state = PlanarState.from_rigid(backend.step(command, 100).truth)
-    assert np.hypot(state.x - begun.x, state.y - begun.y) > 0.1
+        command = (robot.actuators.wrench_per_newton[:, 0] > 0.1) * robot.actuators.scale
+    begun = backend.reset(episode_of(robot), seed=1).truth
+    ticks = round(2.0 / robot.timing.physics_dt)
+    moved = backend.step(command, ticks).truth.position_in_world - begun.position_in_world
+    assert np.linalg.norm(moved) > 0.1
 
 
 def test_without_a_command_it_stays(backend):
-    begun = PlanarState.from_rigid(backend.reset(episode_of(backend.robot), seed=1).truth)
-    state = PlanarState.from_rigid(backend.step(backend.robot.actuators.safe_command, 100).truth)
-    np.testing.assert_allclose([state.x, state.y, state.yaw], [begun.x, begun.y, begun.yaw], atol=1e-3)
+    begun = backend.reset(episode_of(backend.robot), seed=1).truth
+    after = backend.step(backend.robot.actuators.safe_command, 100).truth
+    kind = backend.robot.state_type
+    np.testing.assert_allclose(kind.from_rigid(after).pose, kind.from_rigid(begun).pose, atol=1e-3)
 
 
 def test_closing_twice_does_no_harm(backend):
@@ -190,3 +209,26 @@ def test_a_planar_robot_stays_in_its_plane(platform):
     truth = platform.step(command_of(PLATFORM), 50).truth
     np.testing.assert_allclose([truth.position_in_world[2], truth.velocity_in_world[2]], 0.0, atol=1e-12)
     np.testing.assert_allclose([*truth.quat_xyzw[:2], *truth.angular_velocity_in_body[:2]], 0.0, atol=1e-12)
+
+
+def test_without_thrust_a_spacecraft_glides_and_turns_on(build):
+    start = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.1, -0.2, 0.3, 0.0, 0.5, 0.0)
+    backend = build(SPACECRAFT)
+    backend.reset(episode_of(SPACECRAFT, start=start), seed=1)
+    truth = backend.step(np.zeros(16), 25).truth  # one second
+    np.testing.assert_allclose(truth.position_in_world, [0.1, -0.2, 0.3], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(truth.angular_velocity_in_body, [0.0, 0.5, 0.0], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(truth.quat_xyzw, [0.0, np.sin(0.25), 0.0, np.cos(0.25)], rtol=0, atol=1e-6)
+
+
+def test_a_spacecraft_obeys_the_mass_the_inertia_and_the_wrench_of_its_world(build):
+    inertia = (0.25, 0.25, 0.5, 0.0, 0.0, 0.0)
+    backend = build(SPACECRAFT)
+    heavy = episode_of(
+        SPACECRAFT, start=ELSEWHERE[SpatialState], mass=10.0, inertia=inertia, com=(0.0,) * 3,
+        force=(0.0, 0.0, 0.5), torque=(0.0, 0.0, 0.05),
+    )  # fmt: skip
+    backend.reset(heavy, seed=1)
+    truth = backend.step(np.zeros(16), 25).truth
+    np.testing.assert_allclose(truth.velocity_in_world, [0.0, 0.0, 0.05], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(truth.angular_velocity_in_body, [0.0, 0.0, 0.1], rtol=0, atol=1e-9)

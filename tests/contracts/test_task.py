@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, replace
+from dataclasses import asdict, fields, replace
 from typing import get_args
 
 import numpy as np
 import pytest
 
+from fulmar_core.attitude import normalised, plus, product, turn
+from fulmar_core.batch_dynamics import dynamics_of
 from fulmar_core.counter_rng import Draws
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.dynamics.contact import outline_of
@@ -17,17 +19,20 @@ from fulmar_core.observation import Observer
 from fulmar_core.paths import config_names
 from fulmar_core.planar import PlanarState
 from fulmar_core.simulation import BatchSimulation
+from fulmar_core.spatial import SpatialState, position_of, quat_of
+from fulmar_core.state import POSE, TWIST
 from fulmar_core.tasks import ShippedTask, load_task
-from fulmar_core.things import push_things
 from fulmar_core.topics import GOAL_WIRES
 from tests.new_robots import robots_of_every_family
 from tests.pairs import each_pair
+from tests.spaces import at_target
 
 TASKS = {name: load_task(name) for name in config_names("tasks")}
 ROBOTS = robots_of_every_family()
 RANDOMISED = load_scenario("randomised")
 EACH_PAIR, EACH_TASK = each_pair(ROBOTS, TASKS), pytest.mark.parametrize("task", TASKS.values(), ids=TASKS)
 COUNT = 50
+QUAT = ("qx", "qy", "qz", "qw")
 
 
 def draw(task, robot, *, training=False, count=COUNT):
@@ -38,15 +43,15 @@ def on_the_way(task, robot):
     """States and goals as they come along in an episode: some way off the start, with some targets done."""
     start, goal = draw(task, robot)
     rng = np.random.default_rng(3)
-    state = PlanarState(*(getattr(start, name) + rng.normal(size=COUNT) for name in PlanarState.COLUMNS))
+    state = start.mapped(lambda column: column + rng.normal(size=COUNT))
+    if isinstance(state, SpatialState):
+        state = replace(state, **dict(zip(QUAT, normalised(state.quat), strict=True)))
     done = rng.integers(0, goal.targets.shape[1], COUNT).astype(float)
     return start, state, replace(goal, done=done)
 
 
 def cast(value, convert):
-    if isinstance(value, Goal):
-        return value.mapped(convert)
-    return type(value)(*(convert(getattr(value, name)) for name in value.__slots__))
+    return value.mapped(convert)
 
 
 def test_every_kind_of_task_has_a_file():
@@ -57,19 +62,19 @@ def test_every_kind_of_task_has_a_file():
 @pytest.mark.parametrize("training", [False, True])
 def test_what_is_drawn_is_finite_at_rest_and_within_the_geofence(task, robot, training):
     start, goal = draw(task, robot, training=training, count=300)
-    for value in (
-        *(getattr(start, name) for name in PlanarState.COLUMNS),
-        *goal.arrays(),
-    ):
+    for value in (*start.columns(), *goal.arrays()):
         assert value.dtype == np.float64
         assert np.isfinite(value).all()
-    assert goal.targets.shape == (300, goal.targets.shape[1], 3)
+    assert type(start) is task.state_type
+    rigid = TWIST if task.goal_topic == "goal_velocity" else POSE
+    numbers = task.state_type.targets_of(np.ones(rigid)).size
+    assert goal.targets.shape == (300, goal.targets.shape[1], numbers)
     assert goal.obstacles.shape[0] == 300
     assert goal.obstacles.shape[2] >= 3
     assert goal.done.shape == (300,)
     assert {pose.shape for pose in goal.things.values()} <= {(300, 3)}
     assert {thing.name for thing in task.things} <= set(goal.things)
-    assert not any(getattr(start, name).any() for name in ("vx", "vy", "yaw_rate"))
+    assert all(np.array_equal(*pair) for pair in zip(start.columns(), start.stopped().columns(), strict=True))
     errors = task.errors(start, goal)
     if errors.position is not None:
         assert errors.position.max() < robot.limits.geofence
@@ -92,8 +97,7 @@ def test_it_sees_as_many_terms_as_it_has_names_and_no_name_twice(task, robot):
 @EACH_PAIR
 def test_at_its_target_itself_everything_is_finite(task, robot):
     _, goal = draw(task, robot)
-    x, y, yaw = np.moveaxis(goal.targets[:, 0], -1, 0)
-    state = PlanarState(x, y, yaw, x * 0.0, x * 0.0, x * 0.0)
+    state = at_target(task, goal.targets[:, 0])
     goal = goal.among(dict.fromkeys(goal.things, goal.targets[:, 0]))
     assert all(np.isfinite(term).all() for term in task.observe(state, goal))
     assert np.isfinite(task.reward(state, state, goal, goal)).all()
@@ -104,17 +108,14 @@ def everything(task, robot, before, after, goal):
     errors = task.errors(after, goal)
     ended = task.advance(goal, after, np.asarray(20.0) if after.x.ndim == 0 else after.x * 0.0 + 20.0)
     values = [*task.observe(after, goal), task.reward(before, after, goal, ended)]
-    values += [
-        error
-        for error in (errors.position, errors.heading, errors.velocity, errors.yaw_rate)
-        if error is not None
-    ]
+    values += [error for field in fields(errors) if (error := getattr(errors, field.name)) is not None]
     values += ended.arrays()
     values += [ended.current]
     for name in ("penalty", "collides"):
         extra = getattr(task, name, lambda *_: None)(after, goal, robot)
         values += [] if extra is None else [extra]
-    moved, slowed = push_things(task.things, goal.things, before, after, robot)
+    dynamics = dynamics_of(robot)
+    moved, slowed = dynamics.push_things(task.things, goal.things, before, after)
     values += [*moved.values(), slowed.vx, slowed.vy, task.reward(before, slowed, goal, goal.among(moved))]
     return values
 
@@ -159,9 +160,8 @@ def test_fifty_random_steps_stay_finite_with_worlds_that_begin_anew(task, robot)
             simulation.reset(rng.integers(0, 20, 3))
 
 
-@EACH_PAIR
-def test_moving_and_turning_the_whole_world_changes_nothing_that_is_seen(task, robot):
-    _, state, goal = on_the_way(task, robot)
+def carried_in_plane(state, goal, *, twists):
+    """The same seen in a world that was moved and turned; twists are in the body's frame."""
     turn, dx, dy = 2.0, 3.0, -1.0
     c, s = np.cos(turn), np.sin(turn)
 
@@ -171,19 +171,38 @@ def test_moving_and_turning_the_whole_world_changes_nothing_that_is_seen(task, r
     x, y = place(state.x, state.y)
     vx, vy = c * state.vx - s * state.vy, s * state.vx + c * state.vy
     moved = PlanarState(x, y, state.yaw + turn, vx, vy, state.yaw_rate)
-    if task.goal_topic == "goal_velocity":
-        elsewhere = goal
-    else:
-        targets = np.stack(
-            (*place(goal.targets[..., 0], goal.targets[..., 1]), goal.targets[..., 2] + turn), -1
-        )
-        centres = np.stack(place(goal.obstacles[..., 0], goal.obstacles[..., 1]), -1)
-        discs = np.concatenate((centres, goal.obstacles[..., 2:]), -1)
-        things = {
-            name: np.stack((*place(pose[:, 0], pose[:, 1]), pose[:, 2] + turn), -1)
-            for name, pose in goal.things.items()
-        }
-        elsewhere = Goal(targets, goal.done, discs, things)
+    if twists:
+        return moved, goal
+    targets = np.stack((*place(goal.targets[..., 0], goal.targets[..., 1]), goal.targets[..., 2] + turn), -1)
+    centres = np.stack(place(goal.obstacles[..., 0], goal.obstacles[..., 1]), -1)
+    discs = np.concatenate((centres, goal.obstacles[..., 2:]), -1)
+    things = {
+        name: np.stack((*place(pose[:, 0], pose[:, 1]), pose[:, 2] + turn), -1)
+        for name, pose in goal.things.items()
+    }
+    return moved, Goal(targets, goal.done, discs, things)
+
+
+def carried_in_space(state, goal, *, twists):
+    """The same in space, turned about no axis of the world."""
+    turned = tuple(map(np.asarray, (0.1, -0.7, 0.5, 0.5)))
+
+    def place(position):
+        return plus(turn(turned, position), (3.0, -1.0, 2.0))
+
+    quat, velocity = product(turned, state.quat), turn(turned, state.velocity)
+    moved = SpatialState(*place(state.position), *quat, *velocity, *state.rate)
+    if twists:
+        return moved, goal
+    target = (*place(position_of(goal.targets)), *product(turned, quat_of(goal.targets)))
+    return moved, replace(goal, targets=np.stack(target, axis=-1))
+
+
+@EACH_PAIR
+def test_moving_and_turning_the_whole_world_changes_nothing_that_is_seen(task, robot):
+    _, state, goal = on_the_way(task, robot)
+    carry = carried_in_plane if task.state_type is PlanarState else carried_in_space
+    moved, elsewhere = carry(state, goal, twists=task.goal_topic == "goal_velocity")
     for here, there in zip(task.observe(state, goal), task.observe(moved, elsewhere), strict=True):
         np.testing.assert_allclose(there, here, rtol=0, atol=1e-9)
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from fulmar_core.actuators.pushing import Pushing
 from fulmar_core.paths import config_names
 from fulmar_core.robot import load_robot
 from fulmar_core.topics import WIRES
@@ -51,3 +52,18 @@ def test_every_panel_of_a_layout_is_configured_and_placed(path):
     layout = json.loads(path.read_text())
     placed = {text for text in texts(layout["layout"]) if PANEL_OF.match(text)}
     assert placed == set(layout["configById"])
+
+
+@pytest.mark.parametrize("path", sorted(LAYOUTS.glob("*.json")), ids=lambda path: path.stem)
+def test_the_plots_of_efforts_have_every_actuator_by_its_name(path):
+    robot, panels = load_robot(path.stem), json.loads(path.read_text())["configById"]
+    for topic in ("command", "state"):
+        begins = f"/{path.stem}/actuators/{topic}.effort["
+        shown = {
+            line["value"]: line["label"]
+            for panel in panels.values()
+            for line in panel.get("paths", ())
+            if line["value"].startswith(begins)
+        }
+        if shown or isinstance(robot.actuators, Pushing):  # wheels have velocities and no efforts
+            assert shown == {f"{begins}{i}]": name for i, name in enumerate(robot.actuators.names)}

@@ -53,7 +53,7 @@ def broken_configs(tmp_path, monkeypatch):
         ),
         (
             ["evaluate", "spacecraft_16", "go_to_pose", "--controller", "pd"],
-            "'spacecraft_16' moves in space, 'go_to_pose' is a task in the plane. Choose one of: go_to_position_3d",
+            "task 'go_to_pose' is about motion in the plane, and robot 'spacecraft_16' moves in space",
         ),
         (
             ["evaluate", "spacecraft_16", "go_to_pose_3d", "--controller", "excite"],

@@ -11,10 +11,12 @@ from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.goal import Goal
 from fulmar_core.learning_step import learning_step
 from fulmar_core.paths import config_names
-from fulmar_core.planar import PlanarState, at_rest
+from fulmar_core.planar import at_rest
 from fulmar_core.robot import load_robot
 from fulmar_core.simulation import BatchSimulation
+from fulmar_core.state import State
 from fulmar_core.tasks import load_task
+from tests.spaces import robot_for
 
 BASE = load_robot("turtlebot2")
 POSITION, PUSH = load_task("go_to_position"), load_task("push_block")
@@ -97,24 +99,25 @@ def test_a_robot_that_leaves_its_block_behind_is_outside_too():
 def test_torch_rewards_as_numpy_does(name):
     torch = pytest.importorskip("torch")
     task = load_task(name)
-    simulation = BatchSimulation(BASE, task, load_scenario("randomised"), worlds=40, seed=2, dtype=np.float64)
+    robot = robot_for(task, BASE)
+    simulation = BatchSimulation(
+        robot, task, load_scenario("randomised"), worlds=40, seed=2, dtype=np.float64
+    )
     before, goal, previous = simulation.truth, simulation.goal, simulation.command
-    simulation.step(np.tile(BASE.actuators.scale, (40, 1)))
+    simulation.step(np.tile(robot.actuators.scale, (40, 1)))
     given = {
         "before": before, "after": simulation.truth, "goal": goal, "ended": simulation.goal,
         "previous": previous, "command": simulation.command,
     }  # fmt: skip
-    ours = learning_step(BASE, task, effort=0.1, **given)
+    ours = learning_step(robot, task, effort=0.1, **given)
     theirs = learning_step(
-        BASE, task, effort=0.1, **{key: in_torch(value, torch) for key, value in given.items()}
+        robot, task, effort=0.1, **{key: in_torch(value, torch) for key, value in given.items()}
     )
     np.testing.assert_allclose(theirs[0].numpy(), ours[0], rtol=0, atol=1e-9)
     np.testing.assert_array_equal(theirs[1].numpy(), ours[1])
 
 
 def in_torch(value, torch):
-    if isinstance(value, Goal):
+    if isinstance(value, (Goal, State)):
         return value.mapped(torch.as_tensor)
-    if isinstance(value, PlanarState):
-        return type(value)(*(torch.as_tensor(getattr(value, name)) for name in value.__slots__))
     return torch.as_tensor(value)

@@ -25,7 +25,8 @@ from fulmar_core.metrics import (
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
-from fulmar_core.trajectories import COLUMNS
+from fulmar_core.trajectories import COLUMNS, IN_SPACE
+from tests.spaces import robot_for
 
 POSE, POSITION = load_task("go_to_pose"), load_task("go_to_position")
 VELOCITIES, WAYPOINTS = load_task("track_velocities"), load_task("go_through_positions")
@@ -282,20 +283,26 @@ def test_waypoints_count_by_the_tolerance_and_not_by_the_radius_of_controllers()
     assert counter.update(state).done == 1.0
 
 
-@pytest.mark.parametrize("task", [POSE, WAYPOINTS], ids=lambda task: task.name)
+@pytest.mark.parametrize(
+    "task",
+    [POSE, WAYPOINTS, *map(load_task, ("go_to_pose_3d", "go_through_poses_3d"))],
+    ids=lambda task: task.name,
+)
 def test_a_whole_episode_noted_at_once_is_what_its_steps_are(task):
-    drawn = draw_episodes(PLATFORM, task, load_scenario("nominal"), seed=5, numbers=np.arange(1))[0]
+    robot, kind = robot_for(task, PLATFORM), task.state_type
+    drawn = draw_episodes(robot, task, load_scenario("nominal"), seed=5, numbers=np.arange(1))[0]
     rng = np.random.default_rng(5)
-    truths = [PlanarState(*np.cumsum(row)) for row in rng.normal(size=(12, 6))]
-    commands = list(rng.integers(0, 2, (12, 8)).astype(float))
+    truths = [kind(*np.cumsum(row)) for row in rng.normal(size=(12, len(kind.COLUMNS)))]
+    commands = list(rng.integers(0, 2, (12, len(robot.actuators.names))).astype(float))
     counter = TargetCounter(task, drawn.goal, DT)
     goals = [counter.update(truth) for truth in truths]
-    single, whole = (TrajectoryLog(PLATFORM, task, DT) for _ in range(2))
+    single, whole = (TrajectoryLog(robot, task, DT) for _ in range(2))
     for truth, goal, command in zip(truths, goals, commands, strict=True):
         single.add(truth, goal, command)
     whole.add_episode(truths, goals, commands)
     one, other = single.trajectories(), whole.trajectories()
-    for name in COLUMNS:
+    assert set(one.columns) == set(COLUMNS) - (set(IN_SPACE) if kind is PlanarState else set())
+    for name in one.columns:
         left, right = getattr(one, name), getattr(other, name)
         assert left.dtype == right.dtype
         np.testing.assert_array_equal(left, right, err_msg=name)

@@ -15,10 +15,13 @@ from fulmar_core.errors import ConfigError
 from fulmar_core.health.filters import HealthSettings
 from fulmar_core.observation import Observer
 from fulmar_core.paths import config_names
+from fulmar_core.planar import PlanarState
 from fulmar_core.robot import load_robot
 from fulmar_core.rollout import roll_out_in_backends, roll_out_in_batch
 from fulmar_core.tasks import load_task
 from sim_nodes.mock_backend import MockBackend
+from tests.pairs import slow_if_stepped_finely
+from tests.spaces import shared_space
 
 ROBOT, TASK = load_robot("floating_platform"), load_task("go_to_pose")
 IDEAL, NOMINAL = load_scenario("ideal"), load_scenario("nominal")
@@ -167,10 +170,18 @@ def test_an_episode_shorter_than_a_control_step_is_refused_by_name():
         roll_out_in_backends(controller, lambda: MockBackend(ROBOT), task, NOMINAL, episodes=2, seed=1)
 
 
-@pytest.mark.parametrize("name", config_names("tasks"))
-@pytest.mark.parametrize("robot", ["turtlebot2", "modular_freeflyer"])
+ALIKE = {name: load_robot(name) for name in ("turtlebot2", "modular_freeflyer", "spacecraft_16", "int_ball2")}
+
+
+@pytest.mark.parametrize(
+    ("robot", "name"),
+    [
+        pytest.param(robot, name, marks=slow_if_stepped_finely(ALIKE[robot]))
+        for robot, name in shared_space(ALIKE, {name: load_task(name) for name in config_names("tasks")})
+    ],
+)
 def test_episodes_go_alike_in_the_batch_and_one_by_one(robot, name):
-    robot, task = load_robot(robot), replace(load_task(name), episode_s=8.0)
+    robot, task = ALIKE[robot], replace(load_task(name), episode_s=8.0)
     # Errors magnified as much as this task's make rounding grow past any tolerance at the usual boldness.
     boldness = 0.15 if name == "drift_track_velocities" else 0.3
     controller = Habit(robot, task, boldness=boldness)
@@ -178,7 +189,9 @@ def test_episodes_go_alike_in_the_batch_and_one_by_one(robot, name):
     alone = roll_out_in_backends(
         controller, lambda: MockBackend(robot, things=task.things), task, IDEAL, episodes=3, seed=5
     )
-    for column in ("x", "y", "position_error", "velocity_error", "goals", "touching", "outside", "shares"):
+    in_space = () if task.state_type is PlanarState else ("z", "attitude_error", "rate_error")
+    columns = ("x", "y", "position_error", "velocity_error", "goals", "touching", "outside", "shares")
+    for column in (*columns, *in_space):
         one, other = (np.asarray(getattr(run, column), dtype=float) for run in (batch, alone))
         # The batch is in single precision; and this controller pulls nothing together.
         np.testing.assert_allclose(one, other, rtol=0, atol=1e-3, err_msg=column)

@@ -11,6 +11,7 @@ from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
 from fulmar_core.paths import config_names
+from fulmar_core.planar import PlanarState
 from fulmar_core.robot import load_robot
 from fulmar_core.teleop import (
     JOY_LASTS_NS,
@@ -22,9 +23,16 @@ from fulmar_core.teleop import (
     Wish,
     hand_mapping,
 )
+from tests.spaces import pushes_within_its_plane
 
 ROBOTS = pytest.mark.parametrize(
-    "robot", [load_robot(name) for name in config_names("robots")], ids=lambda r: r.name
+    "robot",
+    [
+        robot
+        for robot in map(load_robot, config_names("robots"))
+        if robot.state_type is PlanarState or pushes_within_its_plane(robot)
+    ],
+    ids=lambda r: r.name,
 )
 CRAFT = load_robot("spacecraft_16")
 BY_HAND = hand_mapping(CRAFT)

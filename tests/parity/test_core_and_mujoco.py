@@ -17,9 +17,12 @@ from fulmar_core.planar import PlanarState
 from fulmar_core.robot import load_robot
 from fulmar_core.rollout import roll_out_in_backends, roll_out_in_batch
 from fulmar_core.simulation import BatchSimulation
+from fulmar_core.spatial import SpatialState
 from fulmar_core.tasks import load_task
 from sim_nodes.mock_backend import MockBackend
 from tests.new_robots import new_robot
+from tests.pairs import slow_if_stepped_finely
+from tests.spaces import SPACECRAFT, task_for
 
 mujoco = pytest.importorskip("mujoco")
 
@@ -31,6 +34,7 @@ BOAT = load_robot("kingfisher")
 FANS = new_robot("fan_disc")
 POSE, IDEAL = load_task("go_to_pose"), load_scenario("ideal")
 TWO_PI = 2.0 * np.pi
+ODOMETRY = {PlanarState: ("x", "vy", "yaw_rate"), SpatialState: SpatialState.COLUMNS}
 
 
 def world_of(robot, **changes):
@@ -166,13 +170,18 @@ class Swaying:
         return np.sin(0.5 * self.k / self.control_hz + 1.3 * n + 0.3 * episodes) * self.robot.actuators.scale
 
 
-EVERY_ROBOT = ["floating_platform", "modular_freeflyer", "kingfisher", "turtlebot2", "jetbot", "leatherback"]
+EVERY_ROBOT = [
+    pytest.param(name, marks=slow_if_stepped_finely(load_robot(name)))
+    for name in config_names("robots")
+    if name != "floating_platform_roboran"  # the platform with other numbers
+]
 
 
 @pytest.mark.parametrize("name", EVERY_ROBOT)
 def test_failures_noise_delays_and_pushes_are_the_batch_s_own_in_every_backend(name):
     """The mock moves as the batch does, so any difference would be one of actuators, pushes or counters."""
-    robot, task = load_robot(name), replace(load_task("go_to_position"), episode_s=12.0)
+    robot = load_robot(name)
+    task = replace(task_for(robot, "go_to_position"), episode_s=12.0)
     given = {"robot": robot, "task": task, "scenario": load_scenario("randomised"), "episodes": 5, "seed": 3}
     batch = roll_out_in_batch(Swaying(robot), **given)
     del given["robot"]
@@ -183,10 +192,17 @@ def test_failures_noise_delays_and_pushes_are_the_batch_s_own_in_every_backend(n
 
 @pytest.mark.parametrize(
     ("name", "atol"),
-    [("floating_platform", 0.02), ("kingfisher", 0.01), ("turtlebot2", 0.1), ("jetbot", 0.2)],
+    [
+        ("floating_platform", 0.02),
+        ("kingfisher", 0.01),
+        ("turtlebot2", 0.1),
+        ("jetbot", 0.2),
+        ("spacecraft_16", 5e-3),
+    ],
 )
 def test_mujoco_moves_under_every_disturbance_as_the_batch_does(name, atol):
-    robot, task = load_robot(name), replace(load_task("go_to_position"), episode_s=8.0)
+    robot = load_robot(name)
+    task = replace(task_for(robot, "go_to_position"), episode_s=8.0)
     given = {"task": task, "scenario": load_scenario("randomised"), "episodes": 5, "seed": 3}
     batch = roll_out_in_batch(Swaying(robot), robot, **given)
     ours = roll_out_in_backends(Swaying(robot), lambda: MujocoBackend(robot), **given)
@@ -236,23 +252,25 @@ class Closed(Swaying):
         return np.zeros((len(inputs.previous), len(self.robot.actuators.names)))
 
 
+@pytest.mark.parametrize("robot", [PLATFORM, SPACECRAFT], ids=lambda robot: robot.name)
 @pytest.mark.parametrize("scenario", ["nominal", "randomised", "drift_velocity_noise_4", "lab_mocap"])
-def test_odometry_errs_in_mujoco_as_in_the_batch_number_by_number(scenario):
-    scenario = load_scenario(scenario)
-    simulation = BatchSimulation(PLATFORM, POSE, scenario, worlds=3, seed=4, dtype=np.float64)
-    backends = [MujocoBackend.of(PLATFORM, POSE, scenario) for _ in range(3)]
+def test_odometry_errs_in_mujoco_as_in_the_batch_number_by_number(scenario, robot):
+    scenario, task, kind = load_scenario(scenario), task_for(robot, "go_to_pose"), robot.state_type
+    simulation = BatchSimulation(robot, task, scenario, worlds=3, seed=4, dtype=np.float64)
+    backends = [MujocoBackend.of(robot, task, scenario) for _ in range(3)]
     samples = [
-        backend.reset(draw_episode(PLATFORM, POSE, scenario, seed=4, number=i), seed=4, number=i)
+        backend.reset(draw_episode(robot, task, scenario, seed=4, number=i), seed=4, number=i)
         for i, backend in enumerate(backends)
     ]
     for _ in range(20):
         for i, sample in enumerate(samples):
-            measured = PlanarState.from_rigid(sample.odometry)
-            assert measured.x == pytest.approx(simulation.measured.x[i], abs=1e-3)
-            assert measured.vy == pytest.approx(simulation.measured.vy[i], abs=1e-3)
-            assert measured.yaw_rate == pytest.approx(simulation.measured.yaw_rate[i], abs=1e-3)
-        simulation.step(np.zeros((3, 8)))
-        samples = [backend.step(np.zeros(8), 10) for backend in backends]
+            measured = kind.from_rigid(sample.odometry)
+            for name in ODOMETRY[kind]:
+                expected = getattr(simulation.measured, name)[i]
+                assert getattr(measured, name) == pytest.approx(expected, abs=1e-3), name
+        closed = np.zeros_like(simulation.command)
+        simulation.step(closed)
+        samples = [backend.step(closed[0], simulation.substeps) for backend in backends]
 
 
 class Reflex(Swaying):

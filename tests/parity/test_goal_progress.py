@@ -5,12 +5,14 @@ All four get the same measurements here: a robot that is carried from target to 
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from fulmar_core import rollout
+from fulmar_core.attitude import exponential, normalised, plus, product
 from fulmar_core.controller_settings import ControllerSettings
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import draw_episodes
@@ -23,24 +25,31 @@ from fulmar_core.safety.fallback import ControllerSwitch, Standby
 from fulmar_core.safety.input_gate import Measurement
 from fulmar_core.sensors.reading import Reading
 from fulmar_core.simulation import BatchSimulation
+from fulmar_core.spatial import SpatialState
+from fulmar_core.state import State
 from fulmar_core.tasks import load_task
 from sim_nodes.mock_backend import MockBackend
+from tests.spaces import robot_for
 from tests.states import received_targets
 
-ROBOT, SCENARIO = load_robot("turtlebot2"), load_scenario("nominal")
+BASE, SCENARIO = load_robot("turtlebot2"), load_scenario("nominal")
 SEED, EPISODES, STEPS, STRIDE = 3, 3, 120, 0.12  # m a step
-DT = 1.0 / ROBOT.timing.control_hz
 S = 1_000_000_000
 
 
+def robot_of(task):
+    return robot_for(task, BASE)
+
+
 def drawn(task):
-    return draw_episodes(ROBOT, task.fitted(ROBOT), SCENARIO, seed=SEED, numbers=np.arange(EPISODES))
+    robot = robot_of(task)
+    return draw_episodes(robot, task.fitted(robot), SCENARIO, seed=SEED, numbers=np.arange(EPISODES))
 
 
 def short(task):
     """The task in an episode in which several targets have their turn."""
     hold = {"hold_s": 3.0} if task.goal_topic == "goal_velocity" else {}
-    return replace(task, episode_s=STEPS * DT, **hold)
+    return replace(task, episode_s=STEPS * robot_of(task).timing.control_s, **hold)
 
 
 TASKS = {name: short(load_task(name)) for name in config_names("tasks")}
@@ -54,6 +63,32 @@ def task(request):
 
 def measurements(task):
     """Odometry from target to target, of each episode and step, in single precision as the batch has it."""
+    series = in_plane(task) if task.state_type is PlanarState else in_space(task)
+    return series.mapped(lambda column: column.astype(np.float32))
+
+
+def in_space(task):
+    """Places and attitudes in turn, with noise, shapes (STEPS, EPISODES)."""
+    episode, rng = drawn(task), np.random.default_rng(5)
+    poses = np.tile(SpatialState.target_at((0.0, 0.0, 0.0)), (STEPS, EPISODES, 1))
+    if task.goal_topic != "goal_velocity":
+        for world in range(EPISODES):
+            targets = episode.goal.targets[world]
+            way = np.vstack((episode.start.pose[world], *(targets for _ in range(3))))
+            for before, now in itertools.pairwise(way):
+                now[3:] *= np.sign(before[3:] @ now[3:])  # q and -q are one attitude
+            along = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(way[:, :3], axis=0), axis=1)))
+            poses[:, world] = np.stack(
+                [np.interp(STRIDE * np.arange(STEPS), along, column) for column in way.T], axis=-1
+            )
+    aside, turned = rng.normal(0.0, (0.06, 0.05), (3, STEPS, EPISODES, 2)).transpose(3, 0, 1, 2)
+    still = SpatialState.resting(poses)
+    quat = product(normalised(still.quat), exponential(tuple(turned)))
+    return SpatialState(*plus(still.position, tuple(aside)), *quat, *still.velocity, *still.rate)
+
+
+def in_plane(task):
+    """Places and headings in turn, with noise, shapes (STEPS, EPISODES)."""
     episode, rng = drawn(task), np.random.default_rng(5)
     shape = (STEPS, EPISODES)
     columns = {name: np.zeros(shape) for name in PlanarState.COLUMNS}
@@ -69,17 +104,14 @@ def measurements(task):
             columns["yaw"][:, world] = np.interp(place, along, np.unwrap(way[:, 2]))
     noise = {"x": 0.06, "y": 0.06, "yaw": 0.1}
     return PlanarState(
-        *(
-            (columns[name] + rng.normal(0.0, noise.get(name, 0.0), shape)).astype(np.float32)
-            for name in PlanarState.COLUMNS
-        )
+        *(columns[name] + rng.normal(0.0, noise.get(name, 0.0), shape) for name in PlanarState.COLUMNS)
     )
 
 
 class Replayed(BatchSimulation):
     """A batch in which the measurements are given, whatever happens."""
 
-    series: PlanarState
+    series: State
 
     def _measure(self):
         super()._measure()
@@ -89,8 +121,8 @@ class Replayed(BatchSimulation):
 class ReplayedBackend(MockBackend):
     """A simulator whose measurements are given."""
 
-    def __init__(self, series):
-        super().__init__(ROBOT)
+    def __init__(self, robot, series):
+        super().__init__(robot)
         self._series, self._number, self._control_step = series, 0, 0
 
     def reset(self, episode, *, seed, number=0):
@@ -103,17 +135,17 @@ class ReplayedBackend(MockBackend):
 
     def _given(self, sample):
         step = min(self._control_step, STEPS - 1)
-        seen = Reading(exact(self._series[step, self._number]).to_rigid())
+        seen = Reading(self._series[step, self._number].in_float64().to_rigid())
         return replace(sample, readings={**sample.readings, "odometry": seen})
 
 
 class Recorder:
     """Stands, and keeps the targets that it is shown."""
 
-    name, control_hz, estimator = "recorder", ROBOT.timing.control_hz, None
+    name, estimator = "recorder", None
 
-    def __init__(self):
-        self.targets = []
+    def __init__(self, robot):
+        self.control_hz, self.targets = robot.timing.control_hz, []
 
     def reset(self): ...
 
@@ -122,13 +154,9 @@ class Recorder:
         return np.zeros_like(inputs.previous)
 
 
-def exact(state):
-    return PlanarState(*(np.asarray(getattr(state, name), dtype=float) for name in PlanarState.COLUMNS))
-
-
 def in_training(task, series, monkeypatch):
     monkeypatch.setattr(Replayed, "series", series, raising=False)
-    simulation = Replayed(ROBOT, task, SCENARIO, worlds=EPISODES, seed=SEED)
+    simulation = Replayed(robot_of(task), task, SCENARIO, worlds=EPISODES, seed=SEED)
     targets = []
     for _ in range(STEPS):
         targets.append(np.array(simulation.goal.current))
@@ -139,15 +167,17 @@ def in_training(task, series, monkeypatch):
 def in_the_batch(task, series, monkeypatch):
     monkeypatch.setattr(Replayed, "series", series, raising=False)
     monkeypatch.setattr(rollout, "BatchSimulation", Replayed)
-    recorder = Recorder()
-    rollout.roll_out_in_batch(recorder, ROBOT, task, SCENARIO, episodes=EPISODES, seed=SEED)
+    robot = robot_of(task)
+    recorder = Recorder(robot)
+    rollout.roll_out_in_batch(recorder, robot, task, SCENARIO, episodes=EPISODES, seed=SEED)
     return recorder.targets
 
 
 def in_simulators(task, series, monkeypatch):
-    recorder = Recorder()
+    robot = robot_of(task)
+    recorder = Recorder(robot)
     rollout.roll_out_in_backends(
-        recorder, lambda: ReplayedBackend(series), task, SCENARIO, episodes=EPISODES, seed=SEED
+        recorder, lambda: ReplayedBackend(robot, series), task, SCENARIO, episodes=EPISODES, seed=SEED
     )
     return recorder.targets
 
@@ -161,11 +191,11 @@ class NoEstop:
 
 def in_the_node(task, series, monkeypatch):
     """As the node: a goal that came on a wire, velocities each with the stamp of its time, odometry one by one."""
-    targets = []
+    targets, robot = [], robot_of(task)
     for world in range(EPISODES):
-        recorder, goal = Recorder(), goal_in_float64(drawn(task).goal)[world]
+        recorder, goal = Recorder(robot), goal_in_float64(drawn(task).goal)[world]
         guard = GuardedLoop(
-            ROBOT,
+            robot,
             task,
             ControllerSettings(lockstep=True),
             ControllerSwitch(Standby(recorder, "{}", "")),
@@ -179,8 +209,8 @@ def in_the_node(task, series, monkeypatch):
         else:
             guard.take_goal(received_targets(goal, task), 1, S)
         for step in range(STEPS):
-            now_ns = round(S * (1.0 + step * DT))
-            seen = Measurement(now_ns, "odom", "base_link", exact(series[step, world]).to_rigid())
+            now_ns = round(S * (1.0 + step * robot.timing.control_s))
+            seen = Measurement(now_ns, "odom", "base_link", series[step, world].in_float64().to_rigid())
             assert guard.take(seen, now_ns)
             decision, inputs = guard.begin_step(seen, now_ns)
             assert decision.may_act, decision.reason
@@ -202,3 +232,4 @@ def test_goals_advance_at_the_same_step_everywhere(task, monkeypatch):
 
 def test_every_task_with_several_targets_is_compared():
     assert {"go_through_positions", "go_through_poses", "race_gates", "track_velocities"} <= set(TASKS)
+    assert {"go_through_positions_3d", "go_through_poses_3d", "track_velocities_3d"} <= set(TASKS)

@@ -14,7 +14,8 @@ from fulmar_core.robot import load_robot
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import load_task
 from tests.new_robots import new_robot
-from tests.pairs import covering
+from tests.pairs import covering, slow_if_stepped_finely
+from tests.spaces import robot_for
 
 torch = pytest.importorskip("torch")
 
@@ -41,8 +42,7 @@ def trajectory(robot, task, library, dtype, device=None):
         simulation.step(command if library is np else torch.as_tensor(command, device=device))
         if k % 17 == 9:
             simulation.reset([1, 3, 5 + k % 4])
-        columns = [getattr(simulation.truth, name) for name in PlanarState.COLUMNS]
-        for values in (*columns, simulation.observe()):
+        for values in (*simulation.truth.columns(), simulation.observe()):
             if library is not np:
                 assert values.dtype == kind
                 values = values.cpu().numpy()
@@ -60,12 +60,27 @@ def assert_alike(robot, task, dtype, device):
     np.testing.assert_allclose(theirs, ours, rtol=0, atol=close)
 
 
+def busiest(robot):
+    """The task of the robot's space that computes most."""
+    in_plane = robot.state_type is PlanarState
+    return load_task("go_to_position_with_obstacles" if in_plane else "go_through_poses_3d")
+
+
 @pytest.mark.parametrize(
     ("name", "dtype"),
-    [pytest.param(*case, marks=() if case in covering(CASES) else pytest.mark.slow) for case in CASES],
+    [
+        pytest.param(
+            *case,
+            marks=slow_if_stepped_finely(load_robot(case[0]))
+            if case in covering(CASES)
+            else pytest.mark.slow,
+        )
+        for case in CASES
+    ],
 )
 def test_torch_moves_every_robot_as_numpy_does(name, dtype):
-    assert_alike(load_robot(name), load_task("go_to_position_with_obstacles"), dtype, "cpu")
+    robot = load_robot(name)
+    assert_alike(robot, busiest(robot), dtype, "cpu")
 
 
 @pytest.mark.parametrize("dtype", CLOSE)
@@ -75,7 +90,8 @@ def test_torch_moves_fans_as_numpy_does(dtype):
 
 @pytest.mark.parametrize("name", TASKS)
 def test_torch_plays_every_task_as_numpy_does(name):
-    assert_alike(load_robot("leatherback"), load_task(name), "float64", "cpu")
+    task = load_task(name)
+    assert_alike(robot_for(task, load_robot("leatherback")), task, "float64", "cpu")
 
 
 @pytest.mark.skipif(
@@ -84,4 +100,5 @@ def test_torch_plays_every_task_as_numpy_does(name):
 @pytest.mark.parametrize("dtype", CLOSE)
 @pytest.mark.parametrize("name", ROBOTS)
 def test_a_graphics_card_moves_every_robot_as_numpy_does(name, dtype):
-    assert_alike(load_robot(name), load_task("go_to_position_with_obstacles"), dtype, "cuda")
+    robot = load_robot(name)
+    assert_alike(robot, busiest(robot), dtype, "cuda")

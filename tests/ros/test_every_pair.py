@@ -24,7 +24,6 @@ from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import draw_episode, episode_steps
 from fulmar_core.observation import Observer
 from fulmar_core.paths import config_names
-from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.rollout import roll_out_in_backends
 from fulmar_core.tasks import Task, load_task
@@ -34,9 +33,10 @@ from fulmar_ros.runtime import spinning
 from sim_nodes.mujoco_backend import MujocoBackend
 from sim_nodes.sim_node import make_backend
 from tests.conftest import RosDomain
+from tests.spaces import robot_for, task_for
 
 SEED = 5
-LASTS_S = {"track_velocities": 14.0}  # long enough for a second velocity
+LASTS_S = {"track_velocities": 14.0, "track_velocities_3d": 14.0}  # long enough for a second velocity
 BRIEFLY_S = 6.0  # short enough to leave no geofence and to touch no obstacle
 # A second robot of a family, and a second task of a kind with other figures, bring nothing new onto the wires.
 ALIKE = {
@@ -126,8 +126,7 @@ def check_pair(robot: Robot, task: Task, make: Callable[[Robot, Task], Controlle
 
             def on_step(sample: Sample, command: np.ndarray, way: list[Any] = ways[number]) -> None:
                 assert sample.truth is not None
-                truth = PlanarState.from_rigid(sample.truth)
-                way.append((float(truth.x), float(truth.y), *command))
+                way.append((*sample.truth.position_in_world, *command))
 
             plant.run_episode(episode, number=number, seed=SEED, steps=steps, on_step=on_step)
     alone = roll_out_in_backends(
@@ -143,20 +142,25 @@ def check_pair(robot: Robot, task: Task, make: Callable[[Robot, Task], Controlle
         assert np.ptp(way[:, :2], axis=0).max() > 0.02, "it stood still: the test shows nothing"
         np.testing.assert_allclose(way[:, 0], alone.x[number, :steps], atol=1e-4)
         np.testing.assert_allclose(way[:, 1], alone.y[number, :steps], atol=1e-4)
-        share = np.abs(way[:, 2:]) / robot.actuators.scale
+        if alone.z is not None:
+            np.testing.assert_allclose(way[:, 2], alone.z[number, :steps], atol=1e-4)
+        share = np.abs(way[:, 3:]) / robot.actuators.scale
         np.testing.assert_allclose(share.mean(axis=1), alone.effort[number, :steps], atol=1e-4)
 
 
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_every_robot_goes_the_same_way_over_the_wires_as_without_them(robot: str) -> None:
     """To a position; on its own command wire, with its own names, rate and slew."""
-    check_pair(load_robot(robot), load_task("go_to_position"))
+    check_pair(load_robot(robot), task_for(load_robot(robot), "go_to_position"))
 
 
-@pytest.mark.parametrize("task", [task for task in TASKS if task.values != ("go_to_position",)])
-def test_every_task_comes_over_the_wires_as_it_does_without_them(task: str) -> None:
-    """Poses, waypoints, gates, velocities that change, obstacles and the block; with wheels on `cmd_vel`."""
-    check_pair(load_robot("turtlebot2"), load_task(task))
+@pytest.mark.parametrize(
+    "name", [task for task in TASKS if task.values[0] not in ("go_to_position", "go_to_position_3d")]
+)
+def test_every_task_comes_over_the_wires_as_it_does_without_them(name: str) -> None:
+    """Poses, waypoints, gates, velocities that change, obstacles and the block; with wheels on `cmd_vel`, or valves."""
+    task = load_task(name)
+    check_pair(robot_for(task, load_robot("turtlebot2")), task)
 
 
 def test_a_policy_with_memory_goes_the_same_way_over_the_wires_as_without_them(

@@ -11,18 +11,24 @@ from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import Episode, draw_episode
 from fulmar_core.goal import goal_at
 from fulmar_core.planar import PlanarState
-from fulmar_core.tasks import load_task
+from tests.spaces import task_for
 
 
 @pytest.fixture(scope="session")
 def episode():
-    """Builds an episode: place and motion of the start, obstacles, things, and numbers of the world by name."""
-    task, ideal = load_task("go_to_pose"), load_scenario("ideal")
+    """Builds an episode: place and motion of the start, obstacles, things, and numbers of the world by name.
+
+    A start has the columns of the robot's own state, or for any robot those of one in the plane.
+    """
+    ideal = load_scenario("ideal")
 
     def build(robot, *, start=(0.0,) * 6, obstacles=None, things=None, **world):
-        goal = goal_at((0.0, 0.0, 0.0), obstacles=obstacles)
+        kind, task = robot.state_type, task_for(robot, "go_to_pose")
+        own = kind if len(start) == len(kind.COLUMNS) else PlanarState
+        begun = own(*(np.asarray(float(value)) for value in start))
+        goal = goal_at(kind.target_at((0.0,) * kind.AXES), obstacles=obstacles)
         return Episode(
-            PlanarState(*(np.asarray(float(value)) for value in start)),
+            begun if own is kind else kind.from_rigid(begun.to_rigid()),
             goal.among({name: np.array(pose) for name, pose in (things or {}).items()}),
             replace(
                 draw_episode(robot, task, ideal, seed=0, number=0).world,

@@ -14,6 +14,7 @@ from fulmar_core.paths import config_names
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import load_robot
 from fulmar_core.sensors.star_tracker import StarTrackerSpec
+from fulmar_core.spatial import SpatialState
 
 mujoco = pytest.importorskip("mujoco")
 
@@ -22,6 +23,10 @@ from sim_nodes.mujoco_backend import MujocoBackend  # noqa: E402
 ROBOT = load_robot("floating_platform")
 EVERY = config_names("robots")
 CLOSED = np.zeros(8)
+OTHER_WORLD = {
+    PlanarState: {"force_x": 1.0, "torque": 0.1, "com_x": 0.01, "drag": 1.1},
+    SpatialState: {"force": (1.0, 0.0, 0.0), "torque": (0.0, 0.0, 0.1), "com": (0.01, 0.0, 0.0)},
+}
 
 
 @pytest.fixture
@@ -30,7 +35,9 @@ def quiet():
 
 
 def moving(robot):
-    """A start that moves as the robot can: on wheels, along its heading."""
+    """A start that moves as the robot can: on wheels, along its heading; in space, every way."""
+    if robot.state_type is SpatialState:
+        return 1.0, -2.0, 0.5, 0.5, -0.1, 0.5, 0.7, 0.2, 0.1, -0.1, 0.3, -0.2, 0.1
     ahead, left = (0.2, 0.0) if isinstance(robot.actuators, Rolling) else (0.2, 0.1)
     turn = 0.0 if robot.actuators.kind == "ackermann" else 0.3
     yaw = 0.7
@@ -54,8 +61,10 @@ def test_a_reset_puts_every_robot_where_it_was_asked_to_be(name, episode):
     start = moving(robot)
     sample = MujocoBackend(robot, sensor_noise=False).reset(episode(robot, start=start), seed=0)
     for part in (sample.truth, sample.odometry):
-        state = PlanarState.from_rigid(part)
-        np.testing.assert_allclose([getattr(state, c) for c in PlanarState.COLUMNS], start, rtol=0, atol=1e-6)
+        state = robot.state_type.from_rigid(part)
+        np.testing.assert_allclose(state.columns(), start, rtol=0, atol=1e-6)
+        if robot.state_type is SpatialState:
+            continue
         assert part.position_in_world[2] == pytest.approx(0.0, abs=1e-9)
         np.testing.assert_allclose(
             part.quat_xyzw[:2], 0.0, atol=2e-3
@@ -74,13 +83,14 @@ def test_nothing_jumps_after_a_reset(name, episode):
 
 
 @pytest.mark.parametrize("name", EVERY)
-def test_at_rest_the_inertial_unit_reads_plus_g(name, episode):
+def test_at_rest_the_inertial_unit_reads_plus_g_and_in_space_nothing(name, episode):
     robot = load_robot(name)
     backend = MujocoBackend(robot, sensor_noise=False)
     backend.reset(episode(robot, start=(1.0, 2.0, 0.7, 0.0, 0.0, 0.0)), seed=0)
     sample = backend.step(robot.actuators.safe_command, 50)
     # A chassis that leans by a thousandth feels a thousandth of g along its axis.
-    np.testing.assert_allclose(sample.imu.specific_force, [0.0, 0.0, GRAVITY], rtol=0, atol=0.02)
+    weight = 0.0 if robot.state_type is SpatialState else GRAVITY
+    np.testing.assert_allclose(sample.imu.specific_force, [0.0, 0.0, weight], rtol=0, atol=0.02)
     np.testing.assert_allclose(sample.imu.angular_velocity, 0.0, atol=1e-3)
 
 
@@ -112,9 +122,7 @@ def test_a_reset_forgets_the_command_and_the_world_of_before(name, episode):
         return backend.step(0.5 * robot.actuators.scale, 10).truth.position_in_world
 
     first = story()
-    backend.reset(
-        episode(robot, mass=1.1 * robot.body.mass, force_x=1.0, torque=0.1, com_x=0.01, drag=1.1), seed=0
-    )
+    backend.reset(episode(robot, mass=1.1 * robot.body.mass, **OTHER_WORLD[robot.state_type]), seed=0)
     backend.step(-0.5 * robot.actuators.scale, 30)
     np.testing.assert_array_equal(story(), first)
 
