@@ -131,7 +131,10 @@ def test_goals_of_a_file_are_taken_one_after_another_inside_a_box(
 @pytest.mark.parametrize(
     ("command", "words"),
     [
-        ("run spacecraft_16 --task go_to_pose --lockstep", "robot 'spacecraft_16' moves in space"),
+        ("run spacecraft_16 --task go_to_pose --lockstep", "moves in space. Did you mean 'go_to_pose_3d'?"),
+        ("run floating_platform --task go_to_pose_3d", "in the plane. Did you mean 'go_to_pose'?"),
+        ("evaluate spacecraft_16 go_to_pose", "moves in space. Did you mean 'go_to_pose_3d'?"),
+        ("evaluate spacecraft_16 push_block --controller lqr", "`fulmar list tasks` shows others."),
         ("evaluate floating_platform go_to_pose_3d", "'floating_platform' moves in the plane"),
         ("train spacecraft_16 go_to_position", "robot 'spacecraft_16' moves in space"),
         ("up mujoco_lqr --robot spacecraft_16 --controller external", "task 'go_to_pose' is about motion in"),
