@@ -151,3 +151,22 @@ def test_what_belongs_to_the_other_space_is_one_line_before_anything_starts(
     assert words in done.stderr
     assert len(done.stderr.strip().splitlines()) == 1
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("controller", ["lqr", "pd"])
+def test_a_law_follows_a_target_that_moves_in_lock_step(
+    controller: str, ros_domain: RosDomain, tmp_path: Path
+) -> None:
+    asked = ("run", "spacecraft_16", "--goals", "upright_circle", "--controller", controller, "--lockstep")
+    done = fulmar(*asked, "--seed", "2", "--record", "bag", "--json", env=ros_domain.env, cwd=tmp_path)
+    summary = json_of(done.stdout)
+    assert summary["success"], done.stderr
+    assert summary["task"] == "go_to_pose_3d"
+    assert summary["goals_progress"] == "1 of 1 rounds"
+    assert summary["tracking_error_m"] < 0.02
+    assert summary["tracking_error_deg"] < 1.5
+    assert summary["path_error_m"] < 0.02
+    done = fulmar(
+        "bag", "rerun", "bag", "--controller", controller, "--json", env=ros_domain.env, cwd=tmp_path
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
