@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from fulmar_core.controllers.classical import LAWS, check_pair, families_of, is_in_space, load_classical
+from fulmar_core.controllers.classical import LAWS, check_pair, families_of, load_classical
 from fulmar_core.controllers.controller import Controller
 from fulmar_core.controllers.excite import TASKS as EXCITE_TASKS
-from fulmar_core.controllers.excite import Excite
+from fulmar_core.controllers.excite import Excite, excite_of
 from fulmar_core.errors import BundleError, ConfigError, UnknownNameError
 from fulmar_core.own_class import is_own, load_class
 from fulmar_core.policy_bundle import PASSPORT
@@ -76,19 +76,15 @@ def _law(title: str, law: str | None) -> ControllerEntry:
 
 
 def _load_excite(robot: Robot, task: Task, choice: Choice) -> Controller:
-    return Excite(robot, task, control_hz=choice.control_hz)
+    return excite_of(robot, task, control_hz=choice.control_hz)
 
 
 def _check_excite(robot: Robot, task: Task) -> None:
-    if is_in_space(robot):
-        raise ConfigError(
-            f"controller 'excite' is for robots in the plane; '{robot.name}' floats in space. "
-            "Use --controller lqr or pd."
-        )
-    if task.kind not in EXCITE_TASKS:
+    tasks = EXCITE_TASKS[robot.state_type]
+    if task.kind not in tasks:
         raise ConfigError(
             f"controller 'excite' stays around one place, '{task.name}' has none. "
-            f"Use --task with one of: {', '.join(EXCITE_TASKS)}."
+            f"Use --task with one of: {', '.join(tasks)}."
         )
 
 

@@ -16,7 +16,7 @@ TORQUE_SITE = "torque"  # where the torque of the surroundings acts
 class FreeFlyer(Floater):
     """One body on a free joint, without gravity, under forces at fixed places and a push of the surroundings.
 
-    Three more actuators apply the constant torque of an episode, which turns with the body.
+    Three more actuators apply the torque of an episode about the body's axes: a constant one, and that of an orbit.
     """
 
     def __init__(self, robot: Robot) -> None:
@@ -56,5 +56,6 @@ class FreeFlyer(Floater):
         outside: tuple[float, ...],
     ) -> None:
         """Set thrusts and the push of the surroundings; see `RobotModel.drive`."""
-        data.ctrl[:] = *(self._actuators.thrusts(applied) * gain), *self._torque
-        data.xfrc_applied[self._body, :3] = outside
+        torque = self._torque + outside[3:] if len(outside) > 3 else self._torque
+        data.ctrl[:] = *(self._actuators.thrusts(applied) * gain), *torque
+        data.xfrc_applied[self._body, :3] = outside[:3]

@@ -144,3 +144,31 @@ def test_a_turn_rate_beyond_the_limit_is_refused_whatever_its_axis(plan, tmp_pat
     )
     with pytest.raises(ConfigError, match="ask for 424"):
         plan(**SPACE | {"task": "track_velocities_3d"}, goals=str(tmp_path / "fast.yaml"))
+
+
+def test_a_target_that_moves_starts_where_it_begins_and_lasts_as_long_as_it_moves(plan):
+    request = plan(**SPACE, goals="helix")
+    assert task_of_goals("helix") == "go_to_pose_3d"
+    assert request.plan.start[:3] == pytest.approx((1.0, 0.0, -0.5))
+    assert request.plan.duration_s == pytest.approx(
+        2.0 * math.hypot(2.0 * math.pi, 0.5) / 0.1 + 10.0, rel=1e-3
+    )
+
+
+HELIX = "kind: trajectory\ntitle: t\nspeed: {}\nfacing: {}\npath: {{kind: helix, radius: 1, pitch: 9, turns: 1}}\n"
+
+
+@pytest.mark.parametrize(
+    ("values", "change", "words"),
+    [
+        ((0.3, "along_path"), {}, "at 5 Hz by more than the task's tolerance in a control step: at most 0.25 m/s"),
+        ((0.1, "any"), {}, "Leave --task out: they are for 'go_to_position_3d'"),
+        ((0.1, "fixed"), {"guards": {"area": (-2.0, 2.0, -2.0, 2.0, -1.0, 1.0)}}, "z = -4.5 m lies outside"),
+        ((0.1, "sideways"), {}, "'facing' = 'sideways'"),
+    ],
+)  # fmt: skip
+def test_a_target_that_cannot_be_followed_is_refused(values, change, words, plan, tmp_path):
+    (tmp_path / "fast.yaml").write_text(HELIX.format(*values))
+    with pytest.raises(ConfigError) as caught:
+        plan(**SPACE | {"controller": STILL} | change, goals=str(tmp_path / "fast.yaml"))
+    assert words in str(caught.value)

@@ -125,6 +125,34 @@ def test_an_inertia_that_no_body_has_is_one_problem(fulmar, tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("inertia", "words"),
+    [
+        ([-0.2, 0.2, 0.2], "xx, yy and zz must be greater than 0"),
+        ([0.0, 0.2, 0.2], "xx, yy and zz must be greater than 0"),
+        ([0.2, 0.2, 0.2, 0.3, 0.0, 0.0], "has principal moments of -0.1, 0.2, 0.5 kg·m²"),
+        ([0.2, 0.2], "needs three or six values"),
+    ],
+)
+def test_what_is_no_inertia_at_all_is_one_problem_with_what_was_found(fulmar, tmp_path, inertia, words):
+    path = altered(tmp_path, body__inertia=inertia)
+    code, found = checked(fulmar, path)
+    assert (code, found["passed"], found["wrench"]) == (1, False, None)
+    (problem,) = found["problems"]
+    assert str(path) in problem
+    assert words in problem
+    assert "\n" not in problem
+    assert not fulmar("check", "robot", str(path))[2]
+
+
+def test_a_gyroscope_that_cannot_see_what_the_gates_reject_is_one_problem(fulmar, tmp_path):
+    path = altered(tmp_path, sensors__imu__gyroscope={"limit": 4.0})
+    code, found = checked(fulmar, path)
+    assert code == 1
+    (problem,) = found["problems"]
+    assert "'limits.yaw_rate' = 6 rad/s must be below the gyroscope's range, 4 rad/s" in problem
+
+
+@pytest.mark.parametrize(
     ("key", "value", "words"),
     [
         ("body__radius", 310.0, "Is it in mm?"),

@@ -53,11 +53,12 @@ def broken_configs(tmp_path, monkeypatch):
         ),
         (
             ["evaluate", "spacecraft_16", "go_to_pose", "--controller", "pd"],
-            "task 'go_to_pose' is about motion in the plane, and robot 'spacecraft_16' moves in space",
+            "'go_to_pose' is about motion in the plane, and robot 'spacecraft_16' moves in space. Did you mean "
+            "'go_to_pose_3d'?",
         ),
         (
-            ["evaluate", "spacecraft_16", "go_to_pose_3d", "--controller", "excite"],
-            "'excite' is for robots in the plane; 'spacecraft_16' floats in space",
+            ["evaluate", "spacecraft_16", "track_velocities_3d", "--controller", "excite"],
+            "'track_velocities_3d' has none. Use --task with one of: go_to_position_3d, go_to_pose_3d.",
         ),
         ([*RUN, "--backend", "gazebo"], "unknown backend 'gazebo'. Known: hardware, mock, mujoco."),
         (["run", "jetbot", "--backend", "hardware"], "there is no hardware driver for 'jetbot'"),

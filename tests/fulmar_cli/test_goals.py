@@ -15,8 +15,8 @@ from fulmar_core.paths import config_names
 from fulmar_ros.goal_node import GoalSettings
 
 
-def call(name=None, robot=None, as_path=False, pose=None):
-    return goals(name, robot=robot, as_path=as_path, control_hz=10.0, pose=pose)
+def call(name=None, robot=None, as_path=False, pose=None, area=None):
+    return goals(name, robot=robot, as_path=as_path, control_hz=10.0, pose=pose, area=area)
 
 
 def test_without_a_name_every_file_is_listed_with_its_title(capsys):
@@ -74,3 +74,19 @@ def test_the_node_knows_every_parameter_it_is_given():
     spec = goals_spec("turtlebot2", "circle")
     assert spec.namespace == "/turtlebot2"
     assert set(spec.parameters) <= {field.name for field in fields(GoalSettings)}
+
+
+@pytest.mark.parametrize(
+    ("robot", "pose", "area", "words"),
+    [
+        ("spacecraft_16", "1,0,2", "-2,2,-2,2,-1,1", "z = 2 m lies outside the area of"),
+        ("spacecraft_16", "1,0,2", "-2,2,-2,2", "where an area has 6 sides"),
+        ("floating_platform", "3,0", "-2,2,-2,2", "x = 3 m, y = 0 m lies outside the area of"),
+        ("floating_platform", "1,0", "-2,2,-2,2,-1,1", "where an area has 4 sides"),
+        ("floating_platform", "1,0", "2,-2,-2,2", "--area = '2,-2,-2,2'"),
+    ],
+)
+def test_a_goal_outside_of_the_area_is_not_sent(robot, pose, area, words):
+    with pytest.raises(ConfigError) as caught:
+        call(robot=robot, pose=pose, area=area)
+    assert words in str(caught.value)

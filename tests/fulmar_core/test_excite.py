@@ -5,41 +5,33 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fulmar_core.controllers.excite import Excite
+from fulmar_core.controllers.excite import Excite, excite_of
 from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.errors import ConfigError
 from fulmar_core.paths import config_names
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import load_robot
 from fulmar_core.simulation import BatchSimulation
+from fulmar_core.spatial import SpatialState
 from fulmar_core.tasks import load_task
-from policy_server.controllers import CONTROLLERS
-from tests.inputs import inputs_of
-from tests.spaces import task_for
+from tests.inputs import inputs_of, some_of
 
-TASK = load_task("go_to_position")
+TASKS = {PlanarState: "go_to_position", SpatialState: "go_to_pose_3d"}
 
 
 def commands_of(name, *, seconds=90.0, worlds=4):
     robot = load_robot(name)
-    simulation = BatchSimulation(robot, TASK, load_scenario("nominal"), worlds=worlds, seed=3)
-    controller = Excite(robot, TASK)
+    task = load_task(TASKS[robot.state_type])
+    simulation = BatchSimulation(robot, task, load_scenario("nominal"), worlds=worlds, seed=3)
+    controller = excite_of(robot, task)
     commands, far = [], 0.0
     for _ in range(round(seconds * controller.control_hz)):
         simulation.step(controller.act(inputs_of(simulation)))
         commands.append(simulation.command[0])
-        goal = simulation.goal.current
-        far = max(
-            far, float(np.hypot(simulation.truth.x - goal[:, 0], simulation.truth.y - goal[:, 1]).max())
-        )
+        far = max(far, float(simulation.truth.distance_to(simulation.goal.current).max()))
     return robot, np.array(commands), far
 
 
-ROBOTS = {name: load_robot(name) for name in config_names("robots")}
-IN_PLANE = [name for name, robot in ROBOTS.items() if robot.state_type is PlanarState]
-
-
-@pytest.mark.parametrize("name", IN_PLANE)
+@pytest.mark.parametrize("name", config_names("robots"))
 def test_a_robot_stays_inside_its_geofence_and_uses_all_of_its_actuators(name):
     robot, commands, far = commands_of(name)
     assert far < robot.limits.geofence
@@ -59,7 +51,24 @@ def test_a_task_without_one_place_is_refused():
         Excite(load_robot("floating_platform"), load_task("track_velocities"))
 
 
-@pytest.mark.parametrize("name", [name for name in ROBOTS if name not in IN_PLANE])
-def test_robots_in_space_are_refused(name):
-    with pytest.raises(ConfigError, match=f"is for robots in the plane; '{name}' floats in space"):
-        CONTROLLERS["excite"].check(ROBOTS[name], task_for(ROBOTS[name], "go_to_position"))
+def test_a_spacecraft_turns_about_every_axis_by_less_than_a_quarter_turn_a_step_and_stays_in_its_room():
+    """What identification needs: between two poses, 0.2 s apart, the shorter way round is the true one."""
+    robot, task = load_robot("spacecraft_16"), load_task("go_to_pose_3d")
+    simulation = BatchSimulation(robot, task, load_scenario("nominal"), worlds=4, seed=3, training=True)
+    controller, rates, far = excite_of(robot, task), [], []
+    for _ in range(round(180.0 * controller.control_hz)):
+        simulation.step(controller.act(inputs_of(simulation)))
+        rates.append(np.stack(simulation.truth.rate, axis=-1))
+        far.append(simulation.truth.distance_to(simulation.goal.current))
+    rates = np.array(rates)
+    assert (np.sqrt(np.mean(rates**2, axis=(0, 1))) > 0.08).all()
+    assert np.linalg.norm(rates, axis=-1).max() < 1.5
+    assert np.max(far[round(120.0 * controller.control_hz) :]) < 0.5 * robot.limits.geofence
+
+
+def test_a_row_in_space_does_not_depend_on_its_neighbours():
+    robot, task = load_robot("spacecraft_16"), load_task("go_to_pose_3d")
+    simulation = BatchSimulation(robot, task, load_scenario("nominal"), worlds=3, seed=3)
+    inputs = inputs_of(simulation)
+    together = excite_of(robot, task).act(inputs)
+    assert np.array_equal(excite_of(robot, task).act(some_of(inputs, slice(1, 2))), together[1:2])

@@ -9,9 +9,19 @@ import numpy as np
 import pytest
 
 from fulmar_core.errors import ConfigError, UnknownNameError
-from fulmar_core.goal_files import FollowedPath, HeldVelocity, Poses, Positions, Velocities, load_goals
+from fulmar_core.goal_files import (
+    FollowedPath,
+    HeldVelocity,
+    Poses,
+    Positions,
+    Trajectory,
+    Velocities,
+    load_goals,
+)
 from fulmar_core.paths import config_names
+from fulmar_core.planar import PlanarState
 from fulmar_core.references import PATHS
+from fulmar_core.references.in_space import SPACE_PATHS
 
 SIZES = {
     "circle": "radius: 1.0",
@@ -50,20 +60,23 @@ def test_every_shipped_file_can_be_read_and_has_a_title(name):
     if isinstance(goals, FollowedPath):
         assert goals.planner().points.shape == (3600, 2)
     else:
-        assert goals.targets().shape[1] == 3
+        assert goals.targets().shape[1] == (3 if goals.form is PlanarState else 7)
 
 
 def test_every_kind_of_path_ships_in_a_file():
     shipped = [load_goals(name) for name in config_names("goals")]
     assert {goals.path.kind for goals in shipped if isinstance(goals, FollowedPath)} == set(PATHS)
+    assert {goals.path.kind for goals in shipped if isinstance(goals, Trajectory)} == set(SPACE_PATHS)
 
 
 def test_docs_state_of_every_kind_of_goal_and_path_and_of_all_their_entries():
     text = (Path(__file__).parents[2] / "docs/goals.md").read_text(encoding="utf-8")
-    kinds = (Positions, Poses, HeldVelocity, FollowedPath, *PATHS.values())
+    kinds = (Positions, Poses, HeldVelocity, FollowedPath, Trajectory, *PATHS.values(), *SPACE_PATHS.values())
     entries = {field.name for kind in kinds for field in fields(kind)} - {"title"}
     assert {
-        name for name in entries | set(PATHS) if f"`{name}`" not in text and f"{name}:" not in text
+        name
+        for name in entries | set(PATHS) | set(SPACE_PATHS)
+        if f"`{name}`" not in text and f"{name}:" not in text
     } == set()
 
 

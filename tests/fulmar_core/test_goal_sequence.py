@@ -11,7 +11,7 @@ from fulmar_core.errors import ConfigError
 from fulmar_core.goal_files import FollowedPath, HeldVelocity, Poses, Positions, Velocities, load_goals
 from fulmar_core.goal_sequence import goal_sequence
 from fulmar_core.paths import config_names
-from fulmar_core.planar import at_rest
+from fulmar_core.planar import PlanarState, at_rest
 from fulmar_core.references.curves import Circle
 from fulmar_core.robot import load_robot
 from fulmar_core.topics import GOAL_WIRES
@@ -43,12 +43,20 @@ def drive(sequence, robot_moves_sideways: bool, *, seconds: float, start=(1.2, 0
 
 
 @pytest.mark.parametrize("name", config_names("goals"))
-@pytest.mark.parametrize("robot", ["floating_platform", "kingfisher", "turtlebot2", "leatherback"])
-def test_every_shipped_file_begins_with_a_goal_for_every_family(name, robot):
-    sequence = goal_sequence(load_goals(name), load_robot(robot))
-    goal = sequence.step(at(0.1, 0.2), 0.0)
+@pytest.mark.parametrize(
+    "robot", ["floating_platform", "kingfisher", "turtlebot2", "leatherback", "spacecraft_16"]
+)
+def test_every_shipped_file_begins_with_a_goal_for_every_family_of_its_space(name, robot):
+    file, the_robot = load_goals(name), load_robot(robot)
+    form = file.form
+    if form is not the_robot.state_type:
+        with pytest.raises(ConfigError, match=f"is in {form.WORLD}"):
+            goal_sequence(file, the_robot)
+        return
+    sequence = goal_sequence(file, the_robot)
+    goal = sequence.step(form.resting(form.target_at((0.1, 0.2, 0.3))), 0.0)
     assert sequence.topic in GOAL_WIRES
-    assert goal.targets.shape == (1, 3) and np.isfinite(goal.targets).all()
+    assert goal.targets.shape == (1, 3 if form is PlanarState else 7) and np.isfinite(goal.targets).all()
     assert not sequence.done
 
 

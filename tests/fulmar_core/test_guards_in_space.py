@@ -16,6 +16,8 @@ from fulmar_core.safety.arbiter import Mode
 from fulmar_core.safety.fallback import ControllerSwitch, Standby
 from fulmar_core.safety.geofence import OUT_OF_BOUNDS
 from fulmar_core.safety.input_gate import Measurement
+from fulmar_core.sensors.imu import SimulatedImu
+from fulmar_core.sensors.kind import Truth
 from fulmar_core.spatial import SpatialState
 from fulmar_core.state import RigidBodyState
 from fulmar_core.tasks import load_task
@@ -54,10 +56,10 @@ class Bench:
         self.now_ns += 1
         return self.guard.take_goal(pose[None], self.now_ns, self.now_ns)
 
-    def step(self, *place, rate=(0.0, 0.0, 0.0)):
+    def step(self, *place, rate=(0.0, 0.0, 0.0), quat=(0.5, 0.5, 0.5, 0.5)):
         """Receive odometry and do a control step: the decision, and the command."""
         self.now_ns += STEP_NS
-        state = RigidBodyState(np.array(place), np.array([0.5, 0.5, 0.5, 0.5]), np.zeros(3), np.array(rate))
+        state = RigidBodyState(np.array(place), np.array(quat), np.zeros(3), np.array(rate))
         self.guard.take(Measurement(self.now_ns, "odom", "base_link", state), self.now_ns)
         decision, inputs = self.guard.begin_step(self.guard.newest, self.now_ns)
         return decision, None if inputs is None else self.guard.act(inputs).command[0]
@@ -82,6 +84,39 @@ def test_tumbling_beyond_the_limit_is_answered_by_the_safe_command_and_its_reaso
         decision.reason == f"odom turn rate {np.linalg.norm(rate):.2f} rad/s is beyond the possible 6 rad/s"
     )
     assert bench.step(0.0, 0.0, 0.0)[1] is not None
+
+
+@pytest.mark.parametrize(
+    ("quat", "reason"),
+    [
+        ((0.5, 0.5, 0.5, 0.6), "odom quaternion has norm 1.054, must be 1"),
+        ((0.0, 0.0, 0.0, 0.0), "odom quaternion has norm 0.000, must be 1"),
+    ],
+)
+def test_an_attitude_without_unit_length_is_answered_by_the_safe_command_and_its_reason(quat, reason):
+    bench = Bench()
+    bench.give(1.0, 0.0, 0.0)
+    assert bench.step(0.0, 0.0, 0.0)[1] is not None
+    decision, command = bench.step(0.0, 0.0, 0.0, quat=quat)
+    assert command is None
+    assert decision.reason == reason
+    assert bench.step(0.0, 0.0, 0.0)[1] is not None
+
+
+def test_a_tumble_that_fills_the_gyroscope_s_range_never_passes_the_gate():
+    """What a saturated gyroscope reads lies beyond what the gate takes for possible, whatever the true rate."""
+    unit = SimulatedImu(CRAFT.sensors.imu, noisy=True)
+    unit.reset(0, 0)
+    tumble = RigidBodyState(
+        np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0]), np.zeros(3), np.array([0.0, -30.0, 0.1])
+    )
+    reading = unit.measure(Truth(tumble, np.zeros(3)), 0.0).value.angular_velocity
+    assert reading[1] == -CRAFT.sensors.imu.gyroscope_range
+    bench = Bench()
+    bench.give(1.0, 0.0, 0.0)
+    decision, command = bench.step(0.0, 0.0, 0.0, rate=tuple(reading))
+    assert command is None
+    assert decision.reason == "odom turn rate 8.73 rad/s is beyond the possible 6 rad/s"
 
 
 def test_the_geofence_is_a_sphere():

@@ -345,3 +345,66 @@ def test_no_law_no_excitation_and_no_shipped_bundle_knows_it(own):
         controller_entry("classical").check(ROBOT, task)
     with pytest.raises(ConfigError, match=r"'own_0:Mine' has none"):
         controller_entry("excite").check(ROBOT, task)
+
+
+IN_SPACE = """
+    goal_topic, episode_s, tolerance = "goal_point", 4.0, Tolerance(position=0.1, hold_s=1.0)
+    observation_names = ("distance",)
+    def draw(self, draws, robot, *, training):
+        start = SpaceStart((1.0, 2.0), (0.0, 2.0), 1.0)
+        state, target = start.draw_in_space(draws, training=training)
+        return state, goals_at(target)
+    def observe(self, state, goal): return (self.errors(state, goal).position,)
+    def errors(self, state, goal): return place_errors(state, goal.current, attitude=False)
+    def reward(self, before, after, goal, ended): return -self.errors(after, goal).position
+"""
+OF_SPACE = (
+    "from fulmar_core.spatial import SpatialState\n"
+    "from fulmar_core.tasks.space_terms import SpaceStart, place_errors\n"
+)
+
+
+def test_a_task_in_space_learns_and_is_evaluated_as_the_shipped_ones(own):
+    craft, task = (
+        load_robot("spacecraft_16"),
+        load_task(own("    state_type = SpatialState", members=IN_SPACE, head=OF_SPACE)),
+    )
+    task.check(craft)
+    simulation = BatchSimulation(craft, task, NOMINAL, worlds=4, seed=1, training=True)
+    reward, over, observed = observed_step(simulation, np.zeros((4, 16), dtype=np.float32), effort=0.0)
+    assert reward.shape == over.shape == (4,)
+    assert np.isfinite(observed).all()
+    assert np.asarray(reward) == pytest.approx(
+        -np.asarray(simulation.truth.distance_to(simulation.goal.current))
+    )
+    still = Still()
+    still.control_hz = craft.timing.control_hz
+    found = roll_out_in_batch(still, craft, task, IDEAL, episodes=2, seed=1)
+    assert found.position_error.shape == (2, 20)
+    assert (found.position_error[:, -1] > 0.9).all()
+    with pytest.raises(
+        ConfigError, match="is about motion in space, and robot 'turtlebot2' moves in the plane"
+    ):
+        task.check(ROBOT)
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        ("    state_type = SpatialState\n    things = 1", "things = 1 must be"),
+        ("    state_type = 'space'", "state_type = 'space' must be fulmar_core.planar.PlanarState or"),
+    ],
+)
+def test_a_state_type_that_is_none_is_one_line(own, more, words):
+    with pytest.raises(ConfigError) as caught:
+        load_task(own(more, members=IN_SPACE, head=OF_SPACE))
+    assert words in str(caught.value)
+
+
+def test_a_task_in_space_without_its_state_type_says_what_is_missing(own):
+    task = load_task(own("    state_type = PlanarState", members=IN_SPACE, head=OF_SPACE + PLANAR))
+    with pytest.raises(TaskError, match="a task in space says state_type = SpatialState"):
+        task.check(ROBOT)
+
+
+PLANAR = "from fulmar_core.planar import PlanarState\n"

@@ -22,6 +22,7 @@ from fulmar_core.disturbances.scenario import (
     draw_world,
     load_scenario,
 )
+from fulmar_core.disturbances.spatial_world import draw_spatial_world
 from fulmar_core.disturbances.world import FIELDS
 from fulmar_core.errors import ConfigError, UnknownNameError
 from fulmar_core.holdability import uncontrollable_losses
@@ -106,6 +107,7 @@ ENTRIES = {
     "sensing.yaw_rate_noise": (STILL, {"sensing": Sensing(yaw_rate_noise=(0.0, 0.1))}, {"yaw_rate_noise"}),
     "bearing_late_s": (STILL, {"bearing_late_s": (1.0, 2.0)}, set()),  # of simulated plants, not of worlds
     "held_s": (STILL, {"held_s": (1.0, 2.0)}, set()),
+    "orbit_rate": (STILL, {"orbit_rate": 0.001}, set()),  # of worlds in space
 }  # fmt: skip
 PARTS = {
     "push": Push,
@@ -377,3 +379,16 @@ def test_an_old_name_of_a_scenario_works_and_warns(caplog):
     (record,) = caplog.records
     assert old in record.getMessage()
     assert new in record.getMessage()
+
+
+def test_an_orbit_is_that_of_every_world_in_space_and_off_by_default():
+    craft, found = load_robot("spacecraft_16"), []
+    for scenario in (STILL, replace(STILL, orbit_rate=0.001)):
+        draws = Draws(7, np.arange(3), np.zeros(3), WORLD)
+        found.append(draw_spatial_world(craft, scenario, draws))
+    assert found[0].orbit_rate.tolist() == [0.0] * 3
+    assert found[1].orbit_rate.tolist() == [0.001] * 3
+    names = [name for name in found[0].names() if not np.array_equal(*(getattr(w, name) for w in found))]
+    assert names == ["orbit_rate"]
+    with pytest.raises(ValueError, match=r"'orbit_rate' = -0\.001 rad/s must not be negative"):
+        replace(STILL, orbit_rate=-0.001)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fulmar_core.attitude import angle_between
+from fulmar_core.attitude import angle_between, turn_back
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import draw_episode
 from fulmar_core.robot import load_robot
@@ -88,3 +88,52 @@ def test_the_batch_flies_as_one_body_does(robot):
     # The batch is float32: rounding, grown over 10 s.
     np.testing.assert_allclose(np.array(simulation.truth.position)[:, 1], alone.position, rtol=0, atol=2e-3)
     np.testing.assert_allclose(np.array(simulation.truth.rate)[:, 1], alone.rate, rtol=0, atol=2e-4)
+
+
+ORBIT = replace(
+    load_scenario("ideal"), orbit_rate=0.05
+)  # forty times that of a low one: it shows within seconds
+
+
+def tipped(robot, scenario):
+    """An episode that begins at rest, aside of every equilibrium."""
+    episode = draw_episode(robot, POSE, scenario, seed=3, number=1)
+    pose = SpatialState.target_at((0.0, 0.0, 0.0, 25.0, 35.0, 10.0))
+    return replace(episode, start=SpatialState.resting(pose))
+
+
+@pytest.mark.parametrize("robot", [BALL, PROBE], ids=lambda robot: robot.name)
+def test_the_gravity_gradient_of_an_orbit_turns_a_body_alike(robot):
+    episode, still = tipped(robot, ORBIT), np.zeros((100, len(robot.actuators.names)))
+    ours, theirs = (
+        flown(simulator, episode, still)
+        for simulator in (MockBackend(robot), MujocoBackend(robot, sensor_noise=False))
+    )
+    rate, turn = parts(ours)[2], parts(theirs)[2]
+    np.testing.assert_allclose(turn, rate, rtol=0, atol=1e-9)
+    assert max(angle_between(a.quat, b.quat) for a, b in zip(ours, theirs, strict=True)) < 1e-6
+    without = flown(MockBackend(robot), tipped(robot, load_scenario("ideal")), still)
+    assert not np.any(parts(without)[2])  # off by default
+    # Euler's equation at rest, over the first step: ω̇ = J⁻¹ · 3 n² u × J u, with u the world's vertical in the body.
+    inertia, start = robot.body.inertia_matrix, episode.start
+    up = np.array(turn_back(start.quat, (0.0, 0.0, 1.0)))
+    expected = np.linalg.solve(inertia, 3.0 * 0.05**2 * np.cross(up, inertia @ up)) * robot.timing.control_s
+    np.testing.assert_allclose(rate[0], expected, rtol=1e-3, atol=1e-12)
+    assert np.linalg.norm(rate[-1]) > 20.0 * np.linalg.norm(rate[0])
+
+
+def test_a_sphere_does_not_feel_the_gravity_gradient():
+    still = np.zeros((20, 16))
+    assert np.abs(parts(flown(MockBackend(SPACECRAFT), tipped(SPACECRAFT, ORBIT), still))[2]).max() < 1e-15
+
+
+@pytest.mark.parametrize("robot", [BALL, PROBE], ids=lambda robot: robot.name)
+def test_the_batch_turns_in_orbit_as_one_body_does(robot):
+    simulation = BatchSimulation(robot, POSE, ORBIT, worlds=2, seed=3, dtype=np.float64)
+    still = np.zeros((25, len(robot.actuators.names)))
+    for command in still:
+        simulation.step(np.tile(command, (2, 1)))
+    alone = flown(MockBackend(robot), draw_episode(robot, POSE, ORBIT, seed=3, number=1), still)[-1]
+    np.testing.assert_allclose(np.array(simulation.truth.rate)[:, 1], alone.rate, rtol=0, atol=1e-12)
+    calm = draw_episode(robot, POSE, load_scenario("ideal"), seed=3, number=1)
+    assert np.linalg.norm(np.subtract(flown(MockBackend(robot), calm, still)[-1].rate, alone.rate)) > 1e-4

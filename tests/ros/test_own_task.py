@@ -39,9 +39,13 @@ class Measures(Circle):
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """The files of the page, in the current folder."""
-    task, controller, gate = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+    task, controller, gate, *in_space = re.findall(
+        r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL
+    )
     (tmp_path / "my_task.py").write_text(task + gate)
     (tmp_path / "my_orbit.py").write_text(controller)
+    for name, text in zip(("my_inspection.py", "my_look.py"), in_space, strict=True):
+        (tmp_path / name).write_text(text)
     with own_folder(tmp_path, monkeypatch):
         yield tmp_path
 
@@ -136,3 +140,38 @@ def test_a_task_that_fails_on_the_way_ends_its_run_with_one_line_and_a_robot_tha
     commanded = read_run(folder / "bag").commanded.effort
     assert commanded.any()
     assert not commanded[-1].any()
+
+
+def test_the_task_in_space_of_the_page_is_done_by_a_controller_and_learned(
+    ros_domain: RosDomain, folder: Path
+) -> None:
+    asked = ("evaluate", "spacecraft_16", "my_inspection:Inspect", "--episodes", "8", "--seed", "3", "--json")
+    found = {}
+    for through in ("batch", "mujoco"):
+        words = (*asked, "--controller", "my_look:Look", "--through", through)
+        done = CliRunner().invoke(app, words, catch_exceptions=False)
+        assert done.exit_code == 0, done.output
+        found[through] = json_of(done.stdout)
+    assert found["mujoco"]["task"] == "my_inspection:Inspect"
+    assert found["mujoco"]["success_rate"] >= 0.75
+    assert found["batch"]["success_rate"] >= 0.75
+    train = ("train", "spacecraft_16", "my_inspection:Inspect", "--time-limit", "5", "--out", "trained")
+    for words in (train, ("export", "trained", "--out", "bundle")):
+        done = fulmar(*words, env=ros_domain.env, cwd=folder)
+        assert done.returncode == 0, done.stderr
+    learned = (*asked, "--policy", "bundle", "--through", "batch")
+    done = CliRunner().invoke(app, learned, catch_exceptions=False)
+    assert done.exit_code == 0, done.output
+    assert json_of(done.stdout)["controller"] == "policy"
+    run = (
+        "run",
+        "spacecraft_16",
+        "--task",
+        "my_inspection:Inspect",
+        "--policy",
+        "bundle",
+        "--goal",
+        "1,0,0.5",
+    )
+    done = fulmar(*run, "--lockstep", "--duration", "3", "--json", env=ros_domain.env, cwd=folder)
+    assert json_of(done.stdout)["failure"] is None, done.stderr

@@ -131,7 +131,10 @@ def test_goals_of_a_file_are_taken_one_after_another_inside_a_box(
 @pytest.mark.parametrize(
     ("command", "words"),
     [
-        ("run spacecraft_16 --task go_to_pose --lockstep", "robot 'spacecraft_16' moves in space"),
+        ("run spacecraft_16 --task go_to_pose --lockstep", "moves in space. Did you mean 'go_to_pose_3d'?"),
+        ("run floating_platform --task go_to_pose_3d", "in the plane. Did you mean 'go_to_pose'?"),
+        ("evaluate spacecraft_16 go_to_pose", "moves in space. Did you mean 'go_to_pose_3d'?"),
+        ("evaluate spacecraft_16 push_block --controller lqr", "`fulmar list tasks` shows others."),
         ("evaluate floating_platform go_to_pose_3d", "'floating_platform' moves in the plane"),
         ("train spacecraft_16 go_to_position", "robot 'spacecraft_16' moves in space"),
         ("up mujoco_lqr --robot spacecraft_16 --controller external", "task 'go_to_pose' is about motion in"),
@@ -148,3 +151,22 @@ def test_what_belongs_to_the_other_space_is_one_line_before_anything_starts(
     assert words in done.stderr
     assert len(done.stderr.strip().splitlines()) == 1
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("controller", ["lqr", "pd"])
+def test_a_law_follows_a_target_that_moves_in_lock_step(
+    controller: str, ros_domain: RosDomain, tmp_path: Path
+) -> None:
+    asked = ("run", "spacecraft_16", "--goals", "upright_circle", "--controller", controller, "--lockstep")
+    done = fulmar(*asked, "--seed", "2", "--record", "bag", "--json", env=ros_domain.env, cwd=tmp_path)
+    summary = json_of(done.stdout)
+    assert summary["success"], done.stderr
+    assert summary["task"] == "go_to_pose_3d"
+    assert summary["goals_progress"] == "1 of 1 rounds"
+    assert summary["tracking_error_m"] < 0.02
+    assert summary["tracking_error_deg"] < 1.5
+    assert summary["path_error_m"] < 0.02
+    done = fulmar(
+        "bag", "rerun", "bag", "--controller", controller, "--json", env=ros_domain.env, cwd=tmp_path
+    )
+    assert done.returncode == 0, done.stdout + done.stderr

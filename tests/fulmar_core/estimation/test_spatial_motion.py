@@ -164,3 +164,21 @@ def test_a_reading_that_cannot_be_is_refused_with_one_line(name, value, words):
     track = Tumble(1)
     track.run(0.1)
     assert words in track.estimator.take(name, Reading(value, track.stamp_ns + 1))
+
+
+def test_a_saturated_gyroscope_is_no_measurement_and_there_is_no_estimate_until_it_reads_again() -> None:
+    body = Tumble(4)
+    body.run(2.0)
+    assert body.estimator.estimate() is not None
+    body.step()
+    full = ROBOT.sensors.imu.gyroscope_range
+    reading = Reading(ImuSample(np.zeros(3), np.array([0.1, -full, 0.0])), body.stamp_ns)
+    problem = body.estimator.take("imu", reading)
+    assert problem == (
+        "the gyroscope reads 8.73 rad/s, the end of its range: the body tumbles too fast for it"
+    )
+    assert body.estimator.estimate() is None
+    assert body.estimator.problem == problem
+    body.run(0.1)
+    assert body.estimator.estimate() is not None
+    assert body.estimator.problem == ""

@@ -12,7 +12,15 @@ import numpy as np
 from fulmar_bringup.system import default_hardware
 from fulmar_core.errors import ConfigError
 from fulmar_core.goal import PoseTuple
-from fulmar_core.goal_files import FollowedPath, GoalFile, Poses, Positions, Velocities, load_goals
+from fulmar_core.goal_files import (
+    FollowedPath,
+    GoalFile,
+    Poses,
+    Positions,
+    Trajectory,
+    Velocities,
+    load_goals,
+)
 from fulmar_core.goal_sequence import goal_sequence
 from fulmar_core.paths import config_path
 from fulmar_core.planar import PlanarState
@@ -169,6 +177,8 @@ def task_of_goals(goals: str) -> str:
         ConfigError: Unknown name, or a mistake in the file.
     """
     file = load_goals(goals)
+    if isinstance(file, Trajectory):
+        return (POSITION if file.facing == "any" else POSE) + SUFFIX[file.form]
     return DEFAULT_TASKS.get(type(file), "track_velocities") + SUFFIX[file.form]
 
 
@@ -210,6 +220,9 @@ def check_pace(file: GoalFile, goals: str, robot: Robot) -> None:
     """
     if isinstance(file, FollowedPath):
         ahead, sideways = file.speed, 0.0
+    elif isinstance(file, Trajectory):
+        ahead, sideways = file.speed, 0.0
+        _check_step(file, goals, robot)
     elif isinstance(file, Velocities):
         targets = file.targets()
         axes = file.form.AXES
@@ -226,6 +239,16 @@ def check_pace(file: GoalFile, goals: str, robot: Robot) -> None:
     if ahead > can.top_speed:
         raise ConfigError(
             f"the goals '{goals}' ask for {ahead:g} m/s; '{robot.name}' goes at most {can.top_speed:g} m/s."
+        )
+
+
+def _check_step(file: Trajectory, goals: str, robot: Robot) -> None:
+    """Refuse a target that is another goal at each control step: it moves beyond the tolerance of its task."""
+    most = load_task(task_of_goals(goals)).tolerance.position * robot.timing.control_hz
+    if file.speed > most:
+        raise ConfigError(
+            f"the goals '{goals}' move by {file.speed:g} m/s, at {robot.timing.control_hz:g} Hz by more than the "
+            f"task's tolerance in a control step: at most {most:g} m/s."
         )
 
 
@@ -259,6 +282,9 @@ def places_of(file: GoalFile) -> np.ndarray:
     """Where a file leads, as `geofence.unreachable` takes it; no place for velocities."""
     if isinstance(file, FollowedPath):
         return np.asarray(file.planner().points)
+    if isinstance(file, Trajectory):
+        points = file.target().points
+        return np.column_stack((points, np.zeros((len(points), 4))))  # as poses
     return np.zeros((0, 3)) if isinstance(file, Velocities) else file.targets()
 
 
@@ -267,6 +293,8 @@ def start_of(file: GoalFile) -> PoseTuple | None:
     if isinstance(file, FollowedPath):
         (x, y), (next_x, next_y) = file.planner().points[:2].tolist()
         return x, y, math.degrees(math.atan2(next_y - y, next_x - x))
+    if isinstance(file, Trajectory):
+        return file.form.written(file.targets()[0])
     return (0.0,) * len(file.form.NUMBERS) if isinstance(file, Velocities) else None
 
 
@@ -278,6 +306,8 @@ def duration_of(file: GoalFile, robot: Robot, start: PoseTuple) -> float:
         planner = replace(file, loops=max(1, file.loops)).planner()
         length = planner.spacing * len(planner.points) * (planner.loops if planner.closed else 1)
         return 1.25 * length / file.speed + SPARE_S
+    if isinstance(file, Trajectory):
+        return replace(file, loops=max(1, file.loops)).target().duration_s + 2.0 * SPARE_S  # it stops at once
     axes = file.form.AXES
     places = np.concatenate((np.array([start[:axes]]), file.targets()[:, :axes]))
     ways = np.linalg.norm(np.diff(places, axis=0), axis=1)
@@ -286,6 +316,9 @@ def duration_of(file: GoalFile, robot: Robot, start: PoseTuple) -> float:
 
 def shown_path(file: GoalFile) -> list[list[float]]:
     """Where a path runs that is followed, thinned out [m]; empty for goals of another kind."""
+    if isinstance(file, Trajectory):
+        points = file.target().points
+        return np.round(points[:: max(1, len(points) // SHOWN)], 4).tolist()
     if not isinstance(file, FollowedPath):
         return []
     planner = file.planner()
@@ -296,4 +329,6 @@ def shown_path(file: GoalFile) -> list[list[float]]:
 
 def is_endless(file: GoalFile) -> bool:
     """Whether the goals never come to an end."""
+    if isinstance(file, Trajectory):
+        return file.path.closed and file.loops == 0
     return isinstance(file, FollowedPath) and file.planner().closed and file.loops == 0

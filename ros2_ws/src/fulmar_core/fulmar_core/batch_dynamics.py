@@ -14,7 +14,12 @@ from fulmar_core.actuators.pushing import Pushing
 from fulmar_core.attitude import Vector, cross, minus, plus, scaled
 from fulmar_core.counter_rng import Draws
 from fulmar_core.disturbances.scenario import Scenario, draw_world
-from fulmar_core.disturbances.spatial_world import SpatialWorld, draw_spatial_world, push_in_world
+from fulmar_core.disturbances.spatial_world import (
+    SpatialWorld,
+    draw_spatial_world,
+    orbit_torque,
+    push_in_world,
+)
 from fulmar_core.disturbances.world import Drawn, World, outside_wrench, push_is_constant
 from fulmar_core.dynamics.free_body import Wrench
 from fulmar_core.dynamics.rigid_body import inertia_of, rigid_body_step, shifted
@@ -181,9 +186,11 @@ class SpatialDynamics(Dynamics[SpatialWorld, SpatialState]):
     state_type = SpatialState
     odometer = SpatialOdometer
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, robot: Robot, *, orbits: bool = True) -> None:
+        """Prepare; `orbits`: some world may have the gravity gradient of an orbit."""
         super().__init__(robot)
         assert isinstance(robot.actuators, Pushing)  # as of `Robot.state_type`
+        self._orbits = orbits
         self._actuators = robot.actuators
         self._full = any(robot.body.tensor[3:])  # whether the inertia has more than its diagonal
 
@@ -195,13 +202,19 @@ class SpatialDynamics(Dynamics[SpatialWorld, SpatialState]):
         """See `Dynamics.blurs`."""
         return bool(world.velocity_noise.any() or world.rate_noise.any())
 
-    def outside(self, state: SpatialState, world: SpatialWorld, time_s: Array, control_dt: float) -> Vector:
-        """Force along the world's axes [N]; see `Dynamics.outside`. A constant torque turns with the body."""
-        return push_in_world(world, time_s, control_dt)
+    def outside(
+        self, state: SpatialState, world: SpatialWorld, time_s: Array, control_dt: float
+    ) -> tuple[Array, ...]:
+        """Force along the world's axes [N], and torque about the body's [N·m]; see `Dynamics.outside`.
+
+        The torque is that of an orbit, and left out where no world has one; the constant one of a world is not in it.
+        """
+        force = push_in_world(world, time_s, control_dt)
+        return (*force, *orbit_torque(state, world)) if self._orbits else force
 
     def push_is_constant(self, world: SpatialWorld) -> bool:
         """See `Dynamics.push_is_constant`."""
-        return not world.kick.any()
+        return not (world.kick.any() or world.orbit_rate.any())
 
     def is_off_centre(self, world: SpatialWorld) -> bool:
         """See `Dynamics.is_off_centre`."""
@@ -212,7 +225,7 @@ class SpatialDynamics(Dynamics[SpatialWorld, SpatialState]):
         state: SpatialState,
         actuation: ActuationState,
         world: SpatialWorld,
-        outside: Vector,
+        outside: tuple[Array, ...],
         *,
         substeps: int,
         latest_s: float,
@@ -224,7 +237,11 @@ class SpatialDynamics(Dynamics[SpatialWorld, SpatialState]):
         com: Vector = (world.com[0], world.com[1], world.com[2])
         if off_centre:
             state = shifted(state, com)
-        doing, force, torque = None, outside, outside
+        push: Vector = (outside[0], outside[1], outside[2])
+        steady: Vector = (world.torque[0], world.torque[1], world.torque[2])
+        if len(outside) > 3:
+            steady = plus(steady, (outside[3], outside[4], outside[5]))
+        doing, force, torque = None, push, push
         for _ in range(substeps):
             applied = actuation.advance(dt, latest_s=latest_s)
             if applied is not doing:
@@ -232,8 +249,8 @@ class SpatialDynamics(Dynamics[SpatialWorld, SpatialState]):
                 force, torque = self._actuators.spatial_wrench(applied, actuation.gain)
                 if off_centre:
                     torque = minus(torque, cross(com, force))
-                torque = plus(torque, (world.torque[0], world.torque[1], world.torque[2]))
-            state = rigid_body_step(state, force, torque, outside, world.mass, inertia, dt)
+                torque = plus(torque, steady)
+            state = rigid_body_step(state, force, torque, push, world.mass, inertia, dt)
         return shifted(state, scaled(-1.0, com)) if off_centre else state
 
     def reported(self, measured: SpatialState, truth: RigidBodyState) -> RigidBodyState:
@@ -241,6 +258,8 @@ class SpatialDynamics(Dynamics[SpatialWorld, SpatialState]):
         return measured.to_rigid()
 
 
-def dynamics_of(robot: Robot) -> Dynamics[Any, Any]:
-    """The dynamics of a robot's kind."""
-    return SpatialDynamics(robot) if robot.state_type is SpatialState else PlanarDynamics(robot)
+def dynamics_of(robot: Robot, *, orbits: bool = True) -> Dynamics[Any, Any]:
+    """The dynamics of a robot's kind; `orbits`: whether some world may have an `orbit_rate`."""
+    return (
+        SpatialDynamics(robot, orbits=orbits) if robot.state_type is SpatialState else PlanarDynamics(robot)
+    )

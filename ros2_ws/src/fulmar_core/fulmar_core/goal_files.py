@@ -13,7 +13,9 @@ from fulmar_core.config import load_config
 from fulmar_core.paths import config_path
 from fulmar_core.planar import PlanarState
 from fulmar_core.references import ReferencePath
+from fulmar_core.references.in_space import SpacePath
 from fulmar_core.references.look_ahead import LookAhead, follow
+from fulmar_core.references.moving_target import Facing, MovingTarget
 from fulmar_core.spatial import SpatialState
 from fulmar_core.state import State
 
@@ -154,7 +156,43 @@ class FollowedPath:
         return follow(self.path, speed=self.speed, look_ahead=self.look_ahead, loops=self.loops)
 
 
-GoalFile = Positions | Poses | Velocities | FollowedPath
+@dataclass(frozen=True)
+class Trajectory:
+    """A target that moves along a path in space, from the first odometry on."""
+
+    kind: Literal["trajectory"]
+    title: str
+    path: SpacePath
+    speed: float  # [m/s]
+    # Of the body's x axis: along the path, with z nearest to the path's own up; `fixed` as `angles_deg`; or `any`, of
+    # goals that are positions.
+    facing: Facing = "along_path"
+    angles_deg: tuple[float, float, float] = (0.0, 0.0, 0.0)  # roll, pitch, yaw of `fixed` [deg]
+    loops: int = 1  # rounds of a closed path; 0 means for ever
+
+    def __post_init__(self) -> None:
+        if self.speed <= 0.0:
+            raise ValueError("'speed' must be greater than 0.")
+        if self.loops < 0:
+            raise ValueError("'loops' must not be negative; 0 means for ever.")
+        if any(self.angles_deg) and self.facing != "fixed":
+            raise ValueError(f"'angles_deg' needs facing: fixed, found facing: {self.facing}.")
+
+    @property
+    def form(self) -> type[State]:
+        """Such paths lie in space."""
+        return SpatialState
+
+    def target(self) -> MovingTarget:
+        """What moves."""
+        return MovingTarget(self.path, self.speed, self.facing, self.angles_deg, self.loops)
+
+    def targets(self) -> np.ndarray:
+        """The pose that it begins with, shape (1, 7)."""
+        return self.target().pose(0.0)[None]
+
+
+GoalFile = Positions | Poses | Velocities | FollowedPath | Trajectory
 
 
 def single_goal(place: tuple[float, ...], form: type[State] = PlanarState) -> Positions | Poses:

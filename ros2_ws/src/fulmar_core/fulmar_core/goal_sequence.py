@@ -10,7 +10,7 @@ import numpy as np
 
 from fulmar_core.errors import ConfigError
 from fulmar_core.goal import Goal, goal_at
-from fulmar_core.goal_files import FollowedPath, GoalFile, Poses, Positions, Velocities
+from fulmar_core.goal_files import FollowedPath, GoalFile, Poses, Positions, Trajectory, Velocities
 from fulmar_core.planar import PlanarState
 from fulmar_core.references.look_ahead import LookAhead, Progress, body_target, steered_target
 from fulmar_core.robot import Robot
@@ -205,6 +205,40 @@ class Following:
         return Progress()
 
 
+class Moving:
+    """A pose or a position that moves by the clock, and stands still at its end."""
+
+    def __init__(self, file: Trajectory) -> None:
+        """Begin where the file's path does."""
+        self.topic = "goal_point" if file.facing == "any" else "goal_pose"
+        self._target, self._time_s = file.target(), 0.0
+        self._form = file.form
+        self.standstill = _goal(self._target.pose(0.0))
+
+    @property
+    def form(self) -> type[State]:
+        """State type of the file's goals."""
+        return self._form
+
+    @property
+    def done(self) -> bool:
+        """Whether the target stands still."""
+        return self._time_s >= self._target.duration_s
+
+    @property
+    def progress(self) -> str:
+        """How many rounds of a closed path are over, or how much of an open one."""
+        rounds = self._target.rounds(self._time_s)
+        if not self._target.path.closed:
+            return f"{math.floor(10.0 * rounds) * 10} % of the path"
+        return f"{math.floor(rounds)} of {self._target.loops or 'endless'} rounds"
+
+    def step(self, state: State, time_s: float) -> Goal:
+        """The pose of this time; see `GoalSequence.step`."""
+        self._time_s = time_s + 1e-6  # for times that were added up
+        return _goal(self._target.pose(time_s))
+
+
 def _goal(*targets: np.ndarray) -> Goal:
     return goal_at(*(tuple(target.tolist()) for target in targets))
 
@@ -237,8 +271,10 @@ def goal_sequence(goals: GoalFile, robot: Robot, *, as_path: bool = False) -> Go
         return Waypoints(topic, goals, tolerance, hold_s=HOLD_S, at_once=False)
     if as_path:
         raise ConfigError(
-            f"'{goals.title}' is a sequence of velocities; only positions and poses can be a path."
+            f"'{goals.title}' has neither positions nor poses; only positions and poses can be a path."
         )
     if isinstance(goals, Velocities):
         return Schedule(goals)
+    if isinstance(goals, Trajectory):
+        return Moving(goals)
     return Following(goals, sideways=robot.actuators.sideways)

@@ -171,7 +171,7 @@ class GuardedLoop:
                 return f"{ENDED}. Publish it with a new stamp."
             self.refusal = Refusal()
             if self.mission.give(goal, stamp_ns):
-                self._anew = True
+                self._anew = self._anew or not self.mission.moved
                 if not self._settings.goals_streamed:
                     # A new goal after a look at the robot: one that was outside its area may go on, if it is back.
                     self._change(outside=self._outside())

@@ -62,6 +62,7 @@ class Mission:
         goal_stamp_ns: Of the newest goal; 0 without one [ns].
         obstacles_stamp_ns: Of the newest obstacles [ns].
         goals_received: Goals that began something new; of velocities that follow one another, the first.
+        moved: Whether the newest goal goes on from the one before: the target moved by no more than the tolerance.
     """
 
     def __init__(self, loop: ControlLoop, *, streamed: bool = False) -> None:
@@ -78,6 +79,7 @@ class Mission:
         self.goal_stamp_ns = 0
         self.obstacles_stamp_ns = 0
         self.goals_received = 0
+        self.moved = False
 
     @property
     def lacking(self) -> str:
@@ -112,9 +114,19 @@ class Mission:
         same = self._given_goal is not None and np.array_equal(self._given_goal.targets, goal.targets)
         if self._streamed and same:
             return False
-        self.goals_received += 1
-        self._take(goal)
+        self.moved = not same and self._goes_on(goal)
+        self.goals_received += not self.moved
+        self._take(goal, anew=not self.moved)
         return True
+
+    def _goes_on(self, goal: Goal) -> bool:
+        """Whether a robot that is at the goal's target so far is at that of another goal, too."""
+        given, task = self._given_goal, self._task
+        alone = len(goal.targets) == 1 and not task.things and not task.sees_obstacles
+        if given is None or self._loop.goal is None or not alone or len(given.targets) > 1:
+            return False
+        there = task.state_type.resting(np.asarray(given.targets, dtype=float))
+        return bool(task.tolerance.holds(task.errors(there, stack_goals([goal])))[0])
 
     def drop(self) -> None:
         """Forget the goal, as after an emergency stop: what moves then is asked for anew, see `is_void`."""

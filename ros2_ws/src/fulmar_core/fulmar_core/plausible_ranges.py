@@ -183,6 +183,7 @@ SCENARIO: tuple[Plausible, ...] = (
     Plausible("tether.stiffness.*", "N/m", (0.0, 1000.0), (0.0, 10.0), "tension over height of an air line"),
     Plausible("tether.reach", "m", (0.0, 100.0), (0.0, 10.0), "the ceiling of a laboratory"),
     Plausible("tether.lever", "m", (0.0, 10.0), (0.0, 1.0), "an air line is fastened to the body"),
+    Plausible("orbit_rate", "rad/s", (0.0, 0.1), (0.0, 0.00125), "circular orbits of the Earth: 84 min and longer"),
     Plausible("actuation.noise", "of 1", (0.0, 1.0), (0.0, 0.3), "share of full command"),
     Plausible("actuation.gain.*", "of 1", (0.0, 3.0), (0.3, 1.5), "share of a command that is done"),
     Plausible("actuation.delay_s", "s", (0.0, 2.0), (0.0, 0.5), "at most one control step"),

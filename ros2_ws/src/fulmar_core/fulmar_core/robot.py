@@ -48,14 +48,19 @@ class Body:
     def __post_init__(self) -> None:
         if len(self.inertia) not in (3, 6) or len(self.center_of_mass) not in (2, 3):
             raise ValueError("'inertia' needs three or six values, 'center_of_mass' two or three.")
-        if min(self.mass, self.radius, self.height, *self.inertia[:3]) <= 0.0:
-            raise ValueError("mass, inertia, radius and height must be greater than 0.")
+        for name in ("mass", "radius", "height"):
+            if getattr(self, name) <= 0.0:
+                raise ValueError(f"'{name}' = {getattr(self, name):g} must be greater than 0.")
+        if min(self.inertia[:3]) <= 0.0:
+            raise ValueError(f"'inertia' = {list(self.inertia)}: xx, yy and zz must be greater than 0 kg·m².")
         if sum(part * part for part in self.center_of_mass) > self.radius**2:
             raise ValueError(f"'center_of_mass' = {list(self.center_of_mass)} lies outside of the outline.")
         moments = np.linalg.eigvalsh(self.inertia_matrix)
         if moments[0] <= 0.0 or 2.0 * moments[2] > moments.sum() * (1.0 + 1e-9):
+            found = ", ".join(f"{moment:.4g}" for moment in moments)
             raise ValueError(
-                f"'inertia' = {list(self.inertia)}: no body has a moment beyond the sum of the two others."
+                f"'inertia' = {list(self.inertia)} has principal moments of {found} kg·m²: no body has a moment beyond "
+                "the sum of the two others, or of 0 or less. Take them about the centre of mass, from one source."
             )
 
     @property
@@ -248,6 +253,11 @@ class Robot:
             raise ValueError("'hydrodynamics' and wheels exclude one another.")
         if self.air_bearing and not (isinstance(self.actuators, Pushing) and self.hydrodynamics is None):
             raise ValueError("'air_bearing' is for robots on the floor with thrusters or fans; leave it out.")
+        if self.limits.yaw_rate >= self.sensors.imu.gyroscope_range:
+            raise ValueError(
+                f"'limits.yaw_rate' = {self.limits.yaw_rate:g} rad/s must be below the gyroscope's range, "
+                f"{self.sensors.imu.gyroscope_range:g} rad/s: a faster tumble would look like that, and pass the gates."
+            )
         late_s = self.actuators.response.latest_s
         if self.timing.is_over_within(late_s):
             raise ValueError(

@@ -90,7 +90,7 @@ class BatchSimulation(MutableState, Generic[S]):
         self._repeats = self._whole(np.zeros(worlds))
         self._steps = self._whole(np.zeros(worlds))
         self._noise_keys = self._actuator_keys(self._numbers, self._repeats)
-        self._dynamics: Dynamics[Any, S] = dynamics_of(robot)
+        self._dynamics: Dynamics[Any, S] = dynamics_of(robot, orbits=scenario.orbit_rate > 0.0)
         self._latest_s = longest_delay(robot, scenario)
         self._off_centre = may_be_off_centre(robot, scenario)
         self._noisy = scenario.actuation.noise > 0.0

@@ -48,7 +48,7 @@ class RunResult:
     duration_s: float  # [s]
     progress: str | None  # how far the goals of a file came, in words; None: there was no such file
     unfinished: bool  # whether more was to come of them
-    path: np.ndarray  # (m, 2) to be followed [m]; m may be 0
+    path: np.ndarray  # (m, 2 or, in space, 3) to be followed [m]; m may be 0
 
     @property
     def success(self) -> bool:
@@ -67,12 +67,21 @@ class RunResult:
         """Mean distance from the path [m]; None where none was to be followed."""
         if not len(self.path):
             return None
-        place = np.stack((self.run.x[0], self.run.y[0]), axis=-1)[:, None]
+        axes = (self.run.x, self.run.y, self.run.z)[: self.path.shape[1]]
+        place = np.stack([axis[0] for axis in axes if axis is not None], axis=-1)[:, None]
         begin, way = self.path[:-1], np.diff(self.path, axis=0)
         length = np.clip(np.sum(way * way, axis=-1), 1e-12, None)
         share = np.clip(np.sum((place - begin) * way, axis=-1) / length, 0.0, 1.0)
         gap = np.linalg.norm(begin + share[..., None] * way - place, axis=-1)
         return float(np.mean(np.min(gap, axis=1)))
+
+    @property
+    def tracking_error(self) -> tuple[float | None, float | None]:
+        """Mean distance and angle from a target that moves along a path [m, rad]; None where there is none."""
+        if not len(self.path) or self.task.goal_topic not in ("goal_pose", "goal_point"):
+            return None, None
+        angle = self.run.attitude_error if self.task.goal_topic == "goal_pose" else None
+        return float(np.mean(self.run.position_error)), None if angle is None else float(np.mean(angle))
 
     @property
     def counts(self) -> bool:
@@ -146,7 +155,7 @@ def _of_goal_file(record: RunRecord) -> dict[str, Any]:
     return {
         "progress": (said.values.get("progress", "") if said else "nothing was reported") if asked else None,
         "unfinished": asked and not finished and not record.info.get("endless"),
-        "path": np.array(record.info.get("path") or np.empty((0, 2)), dtype=float).reshape(-1, 2),
+        "path": np.atleast_2d(np.array(record.info.get("path") or np.empty((0, 2)), dtype=float)),
     }
 
 

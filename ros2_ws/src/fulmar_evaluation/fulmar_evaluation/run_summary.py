@@ -50,6 +50,7 @@ def summarise(record: RunRecord) -> dict[str, Any]:
         **{name: result.figure(name) if result else None for name in FIGURES},
         "collided": None if result is None else bool(result.figures["collided"]),
         "path_error_m": result.path_error_m if result else None,
+        **_tracking(result),
         "goals_progress": result.progress if result else None,
         "control_rate_hz": _own_rate_hz(record, wall_hz),
         "wall_control_rate_hz": wall_hz,
@@ -130,6 +131,12 @@ def _use(result: RunResult | None) -> float | None:
     return _finite(np.mean(result.run.actuators_in_use))
 
 
+def _tracking(result: RunResult | None) -> dict[str, float | None]:
+    """Mean errors from a target that moves."""
+    place, angle = (None, None) if result is None else result.tracking_error
+    return {"tracking_error_m": place, "tracking_error_deg": None if angle is None else math.degrees(angle)}
+
+
 def _own_rate_hz(record: RunRecord, wall_hz: float | None) -> float | None:
     """Commands a second of the robot's own time, which in lock step goes by commands."""
     if record.info.get("lockstep"):
@@ -206,6 +213,8 @@ FIGURE_TEXTS = {
     "yaw_rate_error_deg_s": "turn rate {:.1f}°/s off",
     "rate_error_deg_s": "turn rate {:.1f}°/s off",
     "path_error_m": "path {:.3f} m off",
+    "tracking_error_m": "moving target {:.3f} m off",
+    "tracking_error_deg": "its attitude {:.1f}° off",
     "goals_progress": "{}",
 }
 

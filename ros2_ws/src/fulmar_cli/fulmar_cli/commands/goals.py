@@ -8,7 +8,7 @@ import typer
 
 from fulmar_cli.commands.arguments import NameOption, argument, flag, option
 from fulmar_cli.commands.list import list_names
-from fulmar_cli.commands.values import read_goal
+from fulmar_cli.commands.values import read_area, read_goal
 from fulmar_core.errors import ConfigError
 from fulmar_core.robot_name import checked_name
 
@@ -37,6 +37,12 @@ def goals(
     as_path: Annotated[
         bool, flag("--as-path", "Send all positions or poses at once, for tasks that pass through them.")
     ] = False,
+    area: Annotated[
+        str | None,
+        option(
+            "x,x,y,y", "Send no goal outside: x_min, x_max, y_min, y_max, in space also z_min, z_max [m]."
+        ),
+    ] = None,
     control_hz: Annotated[float, option("HZ", "Rate of velocities along a path.", min=0.01)] = 10.0,
     wait: Annotated[
         bool, flag("--wait", f"Wait for the robot and its controller; {GIVE_UP_S:g} s by default.")
@@ -77,16 +83,18 @@ def goals(
     from fulmar_core.goal_files import load_goals, single_goal
     from fulmar_core.goal_sequence import goal_sequence
     from fulmar_core.robot import load_robot
-    from fulmar_core.safety.geofence import check_places
+    from fulmar_core.safety.geofence import NO_AREA, check_area_of, check_places
 
     the_robot = load_robot(robot)
+    inside = read_area(area) or NO_AREA
+    check_area_of(the_robot, inside)
     if place is not None:
         whole_pose(place, the_robot, "--pose")  # refuses numbers of another robot
     given = None if place is None else single_goal(place, the_robot.state_type)
     file = given or load_goals(name or "")
     goal_sequence(file, the_robot, as_path=as_path)  # rejects goals that the robot cannot have
     check_pace(file, name or "", the_robot)
-    check_places(f"the goal of '{name}'" if name else "the goal", places_of(file).tolist())
+    check_places(f"the goal of '{name}'" if name else "the goal", places_of(file).tolist(), inside)
     spec = goals_spec(
         robot,
         name or "",

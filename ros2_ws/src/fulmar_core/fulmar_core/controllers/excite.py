@@ -8,25 +8,39 @@ few candidates near the goal, which leaves most of the randomness, more of them 
 
 from __future__ import annotations
 
+from typing import Any, ClassVar
+
 import numpy as np
 
+from fulmar_core.actuators.actuation import ActuationState
 from fulmar_core.actuators.excitation import Excitation
 from fulmar_core.actuators.families import FAMILIES
+from fulmar_core.attitude import length, minus, plus, scaled
+from fulmar_core.batch_dynamics import dynamics_of
+from fulmar_core.controllers.body_frame import BodyFrame
 from fulmar_core.controllers.controller import Inputs
-from fulmar_core.controllers.planar_law import PlanarLaw
+from fulmar_core.controllers.law import Law
+from fulmar_core.dynamics.linear_model import nominal_worlds
 from fulmar_core.identification.model import nominal_world
 from fulmar_core.motion import actuation_of, move
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
+from fulmar_core.spatial import SpatialState, position_of
+from fulmar_core.state import State
 from fulmar_core.tasks import Task
 
-TASKS = ("go_to_position", "go_to_pose")  # kinds with one place to stay around
+TASKS = {  # kinds with one place to stay around
+    PlanarState: ("go_to_position", "go_to_pose"),
+    SpatialState: ("go_to_position_3d", "go_to_pose_3d"),
+}
 SEED = 5  # of the commands: any number
 
 
-class Excite(PlanarLaw):
-    """Random commands around a goal."""
+class Excite(Law):
+    """Random commands around a goal, of a robot in the plane."""
 
+    FORM: ClassVar[type[State]] = PlanarState
+    HOW: ClassVar[Excitation | None] = None  # in place of that of the robot's family
     law = "excite"
     title = "random commands, to identify the robot by"
 
@@ -37,20 +51,25 @@ class Excite(PlanarLaw):
 
         Args:
             robot: The robot.
-            task: One of the kinds `TASKS`; its goal is the middle of the room.
+            task: One of the kinds `TASKS` of its space; its goal is the middle of the room.
             gains: How restless; the usual of the robot's family by default.
             control_hz: Command rate; the robot's own by default [Hz].
         """
-        if task.kind not in TASKS:
-            raise ValueError(f"'excite' stays around one place; tasks for that are {', '.join(TASKS)}.")
-        how = gains or robot.actuators.excitation
+        tasks = TASKS[self.FORM]
+        if task.kind not in tasks:
+            raise ValueError(f"'excite' stays around one place; tasks for that are {', '.join(tasks)}.")
+        how = gains or (robot.actuators.excitation and (self.HOW or robot.actuators.excitation))
         if how is None:
             families = ", ".join(kind for kind, family in FAMILIES.items() if family.excitation)
             raise ValueError(f"'excite' drives {families}; '{robot.name}' has {robot.actuators.kind}.")
         self._how = how
         super().__init__(robot, task, self._how, control_hz=control_hz)
-        self._world = nominal_world(robot)
         self._off_centre = any(robot.body.center_of_mass)
+
+    def bind(self) -> None:
+        """See `Law.bind`."""
+        self._frame = BodyFrame(self.robot, self.task)
+        self._world: Any = nominal_world(self.robot)
 
     def reset(self) -> None:
         """Begin the sequence anew."""
@@ -70,17 +89,40 @@ class Excite(PlanarLaw):
 
     def _chosen(self, inputs: Inputs, steps: int) -> np.ndarray:
         how, count = self._how, len(inputs.previous)
-        x, y = self.frame.goal(inputs)
-        u, v, r = self.frame.motion(inputs)
         room = how.room * self.robot.limits.geofence
-        share = np.minimum(np.hypot(x, y) / room, 1.0) ** 2
+        share = np.minimum(self._distance(inputs) / room, 1.0) ** 2
         allowed = how.near + np.floor((how.far - how.near) * share)  # candidates, shape (rows,)
         # The same ones for every row, so that a row's answer does not depend on its neighbours.
         candidates = np.repeat(self.robot.actuators.random_commands(self._rng, how.far), count, axis=0)
-        before = PlanarState(*(np.tile(part, how.far) for part in (-x, -y, 0.0 * x, u, v, r)))
         safe = np.tile(inputs.previous, (how.far, 1)).T
         actuation = actuation_of(self.robot, safe)
         actuation.begin(candidates.T, self._world, None)
+        substeps = steps * self.robot.timing.substeps(self.control_hz)
+        away, turning = self._ahead(inputs, actuation, substeps)
+        miss, spin = away / room, turning / self.robot.performance.yaw_rate
+        cost = (miss**2 + how.calm * spin**2).reshape(how.far, count)
+        cost = np.where(np.arange(how.far)[:, None] < allowed, cost, np.inf)
+        best = np.argmin(cost, axis=0)
+        return np.asarray(candidates.reshape(how.far, count, -1)[best, np.arange(count)])
+
+    def _distance(self, inputs: Inputs) -> np.ndarray:
+        """From the goal, shape (n,) [m]."""
+        return np.asarray(np.hypot(*self._frame.goal(inputs)))
+
+    def _ahead(
+        self, inputs: Inputs, actuation: ActuationState, substeps: int
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Where candidates lead: distance from the goal, the last velocity gone on [m], and turn rate [rad/s].
+
+        Args:
+            inputs: Of n robots.
+            actuation: With the candidates' commands, n of each after those of the one before.
+            substeps: For which they are held.
+        """
+        how = self._how
+        x, y = self._frame.goal(inputs)
+        u, v, r = self._frame.motion(inputs)
+        before = PlanarState(*(np.tile(part, how.far) for part in (-x, -y, 0.0 * x, u, v, r)))
         still = (np.zeros(1),) * 3
         after = move(
             self.robot,
@@ -88,14 +130,51 @@ class Excite(PlanarLaw):
             actuation,
             self._world,
             still,
-            substeps=steps * self.robot.timing.substeps(self.control_hz),
+            substeps=substeps,
             latest_s=0.0,
             off_centre=self._off_centre,
         )
         ahead = how.foresight_s
-        miss = np.hypot(after.x + ahead * after.vx, after.y + ahead * after.vy) / room
-        spin = after.yaw_rate / self.robot.performance.yaw_rate
-        cost = (miss**2 + how.calm * spin**2).reshape(how.far, count)
-        cost = np.where(np.arange(how.far)[:, None] < allowed, cost, np.inf)
-        best = np.argmin(cost, axis=0)
-        return np.asarray(candidates.reshape(how.far, count, -1)[best, np.arange(count)])
+        return np.hypot(after.x + ahead * after.vx, after.y + ahead * after.vy), after.yaw_rate
+
+
+class ExciteInSpace(Excite):
+    """Random commands around a goal, of a body in space; its attitude does not count."""
+
+    FORM = SpatialState
+    # A command that pushes in the world turns with the body: more candidates, and a longer look ahead.
+    HOW = Excitation(hold_s=0.6, foresight_s=8.0, near=6, far=48)
+
+    def bind(self) -> None:
+        """See `Law.bind`."""
+        self._dynamics = dynamics_of(self.robot, orbits=False)
+        self._world = nominal_worlds(self.robot, 1)
+
+    def _distance(self, inputs: Inputs) -> np.ndarray:
+        """See `Excite._distance`."""
+        return np.asarray(inputs.state.distance_to(inputs.goal.current))
+
+    def _ahead(
+        self, inputs: Inputs, actuation: ActuationState, substeps: int
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """See `Excite._ahead`."""
+        how, state = self._how, inputs.state
+        away = minus(state.position, position_of(inputs.goal.current))
+        parts = (*away, *state.quat, *state.velocity, *state.rate)
+        after = self._dynamics.move(
+            SpatialState(*(np.tile(part, how.far) for part in parts)),
+            actuation,
+            self._world,
+            (np.zeros(1),) * 3,
+            substeps=substeps,
+            latest_s=0.0,
+            off_centre=self._off_centre,
+        )
+        then = plus(after.position, scaled(how.foresight_s, after.velocity))
+        return np.asarray(length(then)), np.asarray(length(after.rate))
+
+
+def excite_of(robot: Robot, task: Task, *, control_hz: float | None = None) -> Excite:
+    """The controller `excite` of a robot; arguments and errors as of `Excite`."""
+    kind = ExciteInSpace if robot.state_type is SpatialState else Excite
+    return kind(robot, task, control_hz=control_hz)

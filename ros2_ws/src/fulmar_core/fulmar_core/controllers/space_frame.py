@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from fulmar_core.attitude import Quaternion, Vector, conjugate, minus, product, turn_back
+from fulmar_core.attitude import Quaternion, Vector, conjugate, minus, product, turn, turn_back
 from fulmar_core.controllers.controller import Inputs
 from fulmar_core.spatial import SpatialState, position_of, quat_of
 from fulmar_core.tasks import Task
@@ -19,7 +19,7 @@ class SpaceMotion:
 
     way: np.ndarray  # to the current target; zeros where velocities are the goal [m]
     to_goal: Quaternion  # rotation to the wanted attitude, shapes (n,); none where no attitude is wanted
-    velocity: np.ndarray  # less the wanted one where velocities are the goal [m/s]
+    velocity: np.ndarray  # less that of the goal: the wanted one, or of a target that moves [m/s]
     rate: np.ndarray  # same of the turn rate [rad/s]
     moving: np.ndarray  # the velocity itself [m/s]
     turning: np.ndarray  # the turn rate itself [rad/s]
@@ -55,6 +55,23 @@ class SpaceFrame:
             return SpaceMotion(np.zeros_like(velocity), to_goal, *missing, velocity, rate, alive)
         way = _rows(turn_back(state.quat, minus(position_of(target), state.position)))
         return SpaceMotion(way, to_goal, velocity, rate, velocity, rate, alive)
+
+    def less_target(
+        self, now: SpaceMotion, inputs: Inputs, velocity: np.ndarray, rate: np.ndarray
+    ) -> SpaceMotion:
+        """The same motion, less that of the target.
+
+        Args:
+            now: As of `motion`.
+            inputs: It came from them.
+            velocity: Of the target, in the world, shape (n, 3) [m/s].
+            rate: Of the target, about its own axes; of none where no attitude is wanted, shape (n, 3) [rad/s].
+        """
+        along = _rows(turn_back(_state(inputs).quat, tuple(velocity.T)))
+        found = replace(now, velocity=now.velocity - along)
+        if not self.heads:
+            return found
+        return replace(found, rate=now.rate - _rows(turn(now.to_goal, tuple(rate.T))))
 
     def next_leg(self, inputs: Inputs) -> np.ndarray:
         """Way from the current target to the one after it, in the body's frame, shape (n, 3) [m]."""

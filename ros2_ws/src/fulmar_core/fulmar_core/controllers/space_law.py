@@ -13,6 +13,7 @@ from fulmar_core.controllers.controller import Inputs
 from fulmar_core.controllers.delta_sigma import DeltaSigma
 from fulmar_core.controllers.law import Law
 from fulmar_core.controllers.space_frame import SpaceFrame, SpaceMotion
+from fulmar_core.controllers.target_motion import TargetMotion
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,6 +51,8 @@ class SpaceLaw(Law):
             raise ValueError("the law allocates valves or fans; this robot has neither.")
         self.frame = SpaceFrame(self.task)
         self._modulation: DeltaSigma | None = None
+        limits = self.robot.limits
+        self._target = TargetMotion(speed=limits.speed, rate=limits.yaw_rate)
         self._com = np.array(self.robot.body.com)
         self._inertia = self.robot.body.inertia_matrix
 
@@ -71,14 +74,17 @@ class SpaceLaw(Law):
             self._modulation = DeltaSigma(self.allocation, actuators, most=most)
 
     def reset(self) -> None:
-        """Forget what the valves owe."""
+        """Forget what the valves owe, and how the target moves."""
         super().reset()
+        self._target.reset()
         if self._modulation is not None:
             self._modulation.reset()
 
     def command(self, inputs: Inputs) -> np.ndarray:
         """Choose commands; shapes as in `Controller.act`."""
         now = self.frame.motion(inputs)
+        if not self.frame.tracks and not self.frame.passes:
+            now = self.frame.less_target(now, inputs, *self._target.update(inputs.goal.current, inputs.dt))
         wrench = self.wrench(self._way(inputs, now), now)
         # Allocations count torques about the body's origin.
         wrench[..., 3:] += np.cross(self._com, wrench[..., :3])

@@ -177,6 +177,8 @@ class Scenario:
     kick: Kick = Kick()
     tether: Tether = Tether()
     slope: Slope = Slope()
+    # Mean motion √(μ/r³) of a circular orbit whose gravity gradient turns bodies in space; 0: none [rad/s].
+    orbit_rate: float = 0.0
     actuation: Actuation = Actuation()
     sensing: Sensing = Sensing()
     # Of robots with an air bearing, in simulated plants and emulated devices; batches know neither.
@@ -190,6 +192,8 @@ class Scenario:
                 raise ValueError(
                     f"'{name}' must be [low, high] with 0 <= low <= high, found [{low}, {high}]."
                 )
+        if self.orbit_rate < 0.0:
+            raise ValueError(f"'orbit_rate' = {self.orbit_rate:g} rad/s must not be negative; 0 is none.")
         its = self.sensing
         if not self.sensor_noise and (its.noise, its.bias, its.delay_s, its.dropout) != (1.0, 1.0, 0.0, 0.0):
             raise ValueError(

@@ -12,8 +12,10 @@ from fulmar_core.attitude import Vector, uniform_direction
 from fulmar_core.counter_rng import Draws
 from fulmar_core.disturbances.scenario import Scenario, around, check_delays, survivors
 from fulmar_core.disturbances.world import Drawn
+from fulmar_core.dynamics.rigid_body import Inertia, gravity_gradient_torque
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
+from fulmar_core.spatial import SpatialState
 
 SENSED = 12  # errors of the odometry: three each of place, attitude, velocity and turn rate
 
@@ -37,6 +39,7 @@ class SpatialWorld(Drawn):
     torque: Array  # (3, ...) constant, in the body's frame, as of a leak [N·m]
     kick: Array  # (3, ...) force of a kick that lasts one control step, in the world [N]
     kick_period: Array  # from kick to kick [s]
+    orbit_rate: Array  # mean motion of the orbit whose gravity gradient turns the body; 0: none [rad/s]
     noise: Array  # factor on the sensors' noise [-]
     velocity_noise: Array  # largest error of each measured velocity, anew with each measurement [m/s]
     rate_noise: Array  # same for each turn rate [rad/s]
@@ -60,6 +63,21 @@ def push_in_world(world: SpatialWorld, time_s: Array, control_dt: float) -> Vect
     share = xp.where(kicking, xp.ones_like(world.mass), xp.zeros_like(world.mass))
     x, y, z = (world.force[i] + share * world.kick[i] for i in range(3))
     return x, y, z
+
+
+def orbit_torque(state: SpatialState, world: SpatialWorld) -> Vector:
+    """Torque of the gravity gradient, held over a control step, about the body's axes [N·m].
+
+    The planet lies along the world's −z, which is the orbit's local vertical: how that turns in an orbit, and how the
+    body turns in a control step, are left aside. It is 3 n² u × J u, with n = √(μ/r³) the mean motion, u the vertical
+    and J the inertia; see `gravity_gradient_torque`.
+
+    Args:
+        state: Of the body, shapes (...,).
+        world: Inertia and orbit.
+    """
+    tensor = tuple(world.inertia[i] for i in range(6))
+    return gravity_gradient_torque(state, Inertia(tensor, ()), world.orbit_rate)
 
 
 def draw_spatial_world(robot: Robot, scenario: Scenario, draws: Draws) -> SpatialWorld:
@@ -115,6 +133,7 @@ def draw_spatial_world(robot: Robot, scenario: Scenario, draws: Draws) -> Spatia
         torque=xp.stack([torque * part for part in about]),
         kick=xp.stack([kick_size * part for part in kick_towards]),
         kick_period=kick_period,
+        orbit_rate=zero + scenario.orbit_rate,
         noise=zero + own * sensing.noise,
         velocity_noise=velocity_noise,
         rate_noise=rate_noise,

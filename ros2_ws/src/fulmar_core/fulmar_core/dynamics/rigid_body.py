@@ -150,7 +150,7 @@ def angular_momentum_in_world(state: SpatialState, inertia: Inertia) -> Vector:
     return turn(state.quat, times(inertia.tensor, state.rate))
 
 
-def gravity_gradient_torque(state: SpatialState, inertia: Inertia, orbit_rate: float) -> Vector:
+def gravity_gradient_torque(state: SpatialState, inertia: Inertia, orbit_rate: Array | float) -> Vector:
     """Torque of a planet's gravity along the world's −z, in the body's frame [N·m].
 
     3 n² e × J e with e the unit vector to the planet (Wertz, Spacecraft Attitude Determination and Control, 1978,
@@ -158,8 +158,8 @@ def gravity_gradient_torque(state: SpatialState, inertia: Inertia, orbit_rate: f
 
     Args:
         state: Of the centre of mass; the world's z points away from the planet.
-        inertia: Of the body.
-        orbit_rate: n [rad/s].
+        inertia: Of the body; its inverse does not matter.
+        orbit_rate: n = √(μ/r³) [rad/s].
     """
     zero = 0.0 * state.x
     e = turn_back(state.quat, (zero, zero, zero - 1.0))

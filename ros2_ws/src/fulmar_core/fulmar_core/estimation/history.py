@@ -85,7 +85,14 @@ class HistoryEstimator(ABC):
     )
 
     def __init__(
-        self, limits: Limits, *, gate: float, bridge_s: float, latency_s: float, slack: float
+        self,
+        limits: Limits,
+        *,
+        gate: float,
+        bridge_s: float,
+        latency_s: float,
+        slack: float,
+        gyroscope_range: float = math.inf,
     ) -> None:
         """Begin without an estimate.
 
@@ -95,7 +102,9 @@ class HistoryEstimator(ABC):
             bridge_s: Longest time without a believed pose [s].
             latency_s: From capture of a pose to its stamp [s].
             slack: Distance between two poses that their noise explains [m].
+            gyroscope_range: Largest turn rate about an axis that inertial readings have [rad/s].
         """
+        self._gyroscope_range = gyroscope_range
         self._limits, self._gate, self._bridge_s, self._slack = limits, gate, bridge_s, slack
         self._latency_ns = round(1e9 * latency_s)
         self._kinds: Mapping[str, tuple[int, Callable[[Reading], Any]]] = {
@@ -149,6 +158,8 @@ class HistoryEstimator(ABC):
             return f"reading of '{name}' has no stamp"
         kind, value_of = self._kinds[name]
         stamp_ns = reading.stamp_ns - (self._latency_ns if kind == POSE else 0)
+        if kind == IMU:
+            self._saturated = self._saturation(reading)
         problem = self._problem_of(kind, reading) or self._time_problem(stamp_ns, WHAT[kind])
         if problem:
             return problem
@@ -182,11 +193,9 @@ class HistoryEstimator(ABC):
             if not (np.isfinite(value.specific_force).all() and np.isfinite(value.angular_velocity).all()):
                 return "inertial reading holds a value that is not finite"
             rate = self._turn_rate(reading)
-            return (
-                f"turn rate {rate:.1f} rad/s is beyond the possible"
-                if abs(rate) > 2.0 * self._limits.yaw_rate
-                else ""
-            )
+            if abs(rate) > 2.0 * self._limits.yaw_rate:
+                return f"turn rate {rate:.1f} rad/s is beyond the possible {self._limits.yaw_rate:g} rad/s"
+            return self._saturated
         if not np.isfinite(value).all():
             return f"{WHAT[kind]} holds a value that is not finite"
         norm = float(np.linalg.norm(value[-4:]))
@@ -194,6 +203,15 @@ class HistoryEstimator(ABC):
             ""
             if abs(norm - 1.0) <= 0.01
             else f"quaternion of the {WHAT[kind]} has norm {norm:.3f}, must be 1"
+        )
+
+    def _saturation(self, reading: Reading) -> str:
+        """Why the turn rate of an inertial reading is unknown; empty if it lies within the range."""
+        largest = float(np.max(np.abs(reading.value.angular_velocity)))
+        if not largest >= self._gyroscope_range:
+            return ""
+        return (
+            f"the gyroscope reads {largest:.2f} rad/s, the end of its range: the body tumbles too fast for it"
         )
 
     def estimate(self, stamp_ns: int | None = None) -> Estimate | None:
@@ -213,6 +231,8 @@ class HistoryEstimator(ABC):
     def _staleness(self, stamp_ns: int) -> str:
         if self._filter is None:
             return NO_POSE
+        if self._saturated:
+            return self._saturated
         gap_s = (stamp_ns - self._believed_ns) / 1e9
         if gap_s > self._bridge_s:
             return f"no believable pose for {gap_s:.2f} s (limit {self._bridge_s:g} s)"
@@ -222,6 +242,7 @@ class HistoryEstimator(ABC):
 
     def _forget(self) -> None:
         self._filter: Filter | None = None
+        self._saturated = ""  # why the newest inertial reading has no turn rate
         self._history: list[Event] = []
         self._newest_ns: dict[str, int] = {}  # stamp of the newest reading, by what it is
         self._believed_ns = 0

@@ -42,13 +42,13 @@ class EstimatorKind:
 def _planar_motion(settings: PlanarMotionSettings, robot: Robot) -> Estimator:
     from fulmar_core.estimation.planar_motion import PlanarMotionEstimator
 
-    return PlanarMotionEstimator(settings, robot.limits)
+    return PlanarMotionEstimator(settings, robot.limits, gyroscope_range=robot.sensors.imu.gyroscope_range)
 
 
 def _spatial_motion(settings: SpatialMotionSettings, robot: Robot) -> Estimator:
     from fulmar_core.estimation.spatial_motion import SpatialMotionEstimator
 
-    return SpatialMotionEstimator(settings, robot.limits)
+    return SpatialMotionEstimator(settings, robot.limits, gyroscope_range=robot.sensors.imu.gyroscope_range)
 
 
 KINDS: dict[str, EstimatorKind] = {

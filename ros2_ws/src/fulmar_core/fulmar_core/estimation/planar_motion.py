@@ -29,12 +29,15 @@ class PlanarMotionEstimator(HistoryEstimator):
 
     _filter: MotionFilter | None
 
-    def __init__(self, settings: PlanarMotionSettings, limits: Limits) -> None:
+    def __init__(
+        self, settings: PlanarMotionSettings, limits: Limits, *, gyroscope_range: float = math.inf
+    ) -> None:
         """Begin without an estimate.
 
         Args:
             settings: What to believe of the sensors.
             limits: What the robot can possibly do.
+            gyroscope_range: Largest turn rate about an axis that inertial readings have [rad/s].
         """
         self._settings = settings
         super().__init__(
@@ -43,6 +46,7 @@ class PlanarMotionEstimator(HistoryEstimator):
             bridge_s=settings.bridge_s,
             latency_s=settings.latency_s,
             slack=10.0 * settings.position_std,
+            gyroscope_range=gyroscope_range,
         )
 
     def _forget(self) -> None:

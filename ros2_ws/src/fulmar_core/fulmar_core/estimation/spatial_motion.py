@@ -9,6 +9,8 @@ body [rad/s].
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from fulmar_core.estimation.history import HistoryEstimator
@@ -26,12 +28,15 @@ class SpatialMotionEstimator(HistoryEstimator):
 
     _filter: SpatialFilter | None
 
-    def __init__(self, settings: SpatialMotionSettings, limits: Limits) -> None:
+    def __init__(
+        self, settings: SpatialMotionSettings, limits: Limits, *, gyroscope_range: float = math.inf
+    ) -> None:
         """Begin without an estimate.
 
         Args:
             settings: What to believe of the sensors.
             limits: What the robot can possibly do.
+            gyroscope_range: Largest turn rate about an axis that inertial readings have [rad/s].
         """
         self._settings = settings
         super().__init__(
@@ -40,6 +45,7 @@ class SpatialMotionEstimator(HistoryEstimator):
             bridge_s=settings.bridge_s,
             latency_s=settings.latency_s,
             slack=10.0 * settings.position_std,
+            gyroscope_range=gyroscope_range,
         )
 
     def _pose(self, reading: Reading) -> np.ndarray:

@@ -45,17 +45,21 @@ def few(**turns: float) -> None:
 def along_curve(
     curve: Callable[[np.ndarray], np.ndarray], count: int, *, closed: bool, centre: Point
 ) -> np.ndarray:
+    """Points as of `spread_along`, with the origin at a centre [m]."""
+    return np.asarray(spread_along(curve, count, closed=closed) + np.array(centre))
+
+
+def spread_along(curve: Callable[[np.ndarray], np.ndarray], count: int, *, closed: bool) -> np.ndarray:
     """Spread points over a smooth curve.
 
     Args:
-        curve: Positions (n, 2) about the origin for parameters (n,) from 0 to 1 [m].
+        curve: Positions (n, 2 or 3) for parameters (n,) from 0 to 1 [m].
         count: How many points.
         closed: The curve ends where it began: the last point is one distance before the first, which is not
             repeated. Otherwise the last point is the curve's end.
-        centre: Where the origin goes [m].
 
     Returns:
-        Points on the curve, shape (count, 2) [m]; distances along it are equal to about 1 part in 1,000.
+        Points on the curve, shape (count, 2 or 3) [m]; distances along it are equal to about 1 part in 1,000.
 
     Raises:
         ValueError: Fewer than three points.
@@ -63,7 +67,7 @@ def along_curve(
     parameter = np.linspace(0.0, 1.0, max(_LEAST, _FINEST * count) + 1)
     walked = _walked(curve(parameter))
     at = np.interp(_stations(walked[-1], count, closed), walked, parameter)
-    return np.asarray(curve(at) + np.array(centre))
+    return np.asarray(curve(at))
 
 
 class Curve(ABC):

@@ -34,6 +34,12 @@ class ImuSpec:
         if min(self.rate_hz, self.delay_s) < 0.0:
             raise ValueError("rate_hz and delay_s must not be negative.")
 
+    @property
+    def gyroscope_range(self) -> float:
+        """Largest turn rate about an axis that is reported; infinite without a limit [rad/s]."""
+        gyroscope = self.gyroscope
+        return float(largest_reading(np.array(gyroscope.limit), np.array(gyroscope.quantum)))
+
     def part(self, name: str) -> np.ndarray:
         """One number of the channels, for three axes of force and three of turning, shape (6,)."""
         return np.repeat([getattr(self.accelerometer, name), getattr(self.gyroscope, name)], 3)

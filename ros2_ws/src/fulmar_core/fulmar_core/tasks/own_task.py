@@ -23,6 +23,8 @@ from fulmar_core.own_class import construct, load_class, one_line, settings_besi
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
+from fulmar_core.spatial import SpatialState
+from fulmar_core.state import State
 from fulmar_core.tasks.task import Task
 from fulmar_core.tasks.terms import Errors, Tolerance
 from fulmar_core.things import Thing
@@ -69,6 +71,11 @@ def load_own_task(path: str) -> OwnTask:
             "episode_s",
             "a number of seconds, greater than 0",
         ),
+        (
+            getattr(own, "state_type", PlanarState) in (PlanarState, SpatialState),
+            "state_type",
+            "fulmar_core.planar.PlanarState or fulmar_core.spatial.SpatialState",
+        ),
         (_are_things(things), "things", "a tuple of fulmar_core.things.Thing, no name twice"),
         (isinstance(own.tolerance, Tolerance), "tolerance", "a fulmar_core.tasks.terms.Tolerance"),
         (_are_names(names), "observation_names", "a tuple of names, none of them twice"),
@@ -97,11 +104,12 @@ def load_own_task(path: str) -> OwnTask:
         required=None if required is None else int(required),
         sees_obstacles=bool(getattr(own, "sees_obstacles", False)),
         things=tuple(things),
+        state_type=getattr(own, "state_type", PlanarState),
     )
 
 
 @dataclass(frozen=True)
-class OwnTask(Task[PlanarState]):
+class OwnTask(Task[Any]):
     """A user's object behind the interface of tasks: whatever it does wrong becomes one line.
 
     Attributes:
@@ -119,6 +127,7 @@ class OwnTask(Task[PlanarState]):
     required: int | None = None
     sees_obstacles: bool = False
     things: tuple[Thing, ...] = ()
+    state_type: type[State] = PlanarState
 
     @property
     def source(self) -> Path:
@@ -141,13 +150,20 @@ class OwnTask(Task[PlanarState]):
             self.reward(state, state, goal, ended)
             self.penalty(state, goal, robot)
 
-    def draw(self, draws: Draws, robot: Robot, *, training: bool) -> tuple[PlanarState, Goal]:
+    def draw(self, draws: Draws, robot: Robot, *, training: bool) -> tuple[State, Goal]:
         """See `Task.draw`."""
         found = self._ask("draw", draws, robot, training=training)
-        if not (isinstance(found, tuple) and [type(part) for part in found] == [PlanarState, Goal]):
-            raise self._wrong("draw", f"returned {_kind(found)}, it must be a PlanarState and a Goal")
+        form = self.state_type
+        if not (isinstance(found, tuple) and [type(part) for part in found] == [form, Goal]):
+            what = _kind(found)
+            if isinstance(found, tuple) and [type(part) for part in found] in (
+                [PlanarState, Goal],
+                [SpatialState, Goal],
+            ):
+                what = f"{_kind(found[0])}; a task in {found[0].WORLD} says state_type = {type(found[0]).__name__}"
+            raise self._wrong("draw", f"returned {what}, it must be a {form.__name__} and a Goal")
         state, goal = found
-        for name in PlanarState.COLUMNS:
+        for name in form.COLUMNS:
             value = getattr(state, name)
             if np.shape(value) != (draws.worlds,):
                 raise self._wrong(
@@ -156,7 +172,7 @@ class OwnTask(Task[PlanarState]):
             self._numbers("draw", value, state, name)
         return state, self._goal("draw", goal, state)
 
-    def observe(self, state: PlanarState, goal: Goal) -> tuple[Array, ...]:
+    def observe(self, state: State, goal: Goal) -> tuple[Array, ...]:
         """See `Task.observe`."""
         terms, names = self._ask("observe", state, goal), self.observation_names
         if not isinstance(terms, tuple | list):
@@ -168,11 +184,11 @@ class OwnTask(Task[PlanarState]):
             for term, name in zip(terms, names, strict=True)
         )
 
-    def reward(self, before: PlanarState, after: PlanarState, goal: Goal, ended: Goal) -> Array:
+    def reward(self, before: State, after: State, goal: Goal, ended: Goal) -> Array:
         """See `Task.reward`."""
         return self._numbers("reward", self._ask("reward", before, after, goal, ended), after, "the reward")
 
-    def errors(self, state: PlanarState, goal: Goal) -> Errors:
+    def errors(self, state: State, goal: Goal) -> Errors:
         """See `Task.errors`; of every quantity that the tolerance limits, and of both velocities or of none."""
         found = self._ask("errors", state, goal)
         if not isinstance(found, Errors):
@@ -201,32 +217,32 @@ class OwnTask(Task[PlanarState]):
             }
         )
 
-    def begun(self, goal: Goal, state: PlanarState) -> Goal:
+    def begun(self, goal: Goal, state: State) -> Goal:
         """See `Task.begun`."""
         return self._goal("begun", self._ask("begun", goal, state), state) if self._has("begun") else goal
 
-    def advance(self, goal: Goal, state: PlanarState, time_s: Array) -> Goal:
+    def advance(self, goal: Goal, state: State, time_s: Array) -> Goal:
         """See `Task.advance`."""
         if not self._has("advance"):
             return goal
         return self._goal("advance", self._ask("advance", goal, state, time_s), state)
 
-    def counted(self, goal: Goal, state: PlanarState, time_s: Array) -> Goal:
+    def counted(self, goal: Goal, state: State, time_s: Array) -> Goal:
         """See `Task.counted`."""
         if not self._has("counted"):
             return self.advance(goal, state, time_s)
         return self._goal("counted", self._ask("counted", goal, state, time_s), state)
 
-    def collides(self, state: PlanarState, goal: Goal, robot: Robot) -> Array | None:
+    def collides(self, state: State, goal: Goal, robot: Robot) -> Array | None:
         """See `Task.collides`."""
         found = self._maybe("collides", state, goal, robot)
         return None if found is None else found != 0
 
-    def penalty(self, state: PlanarState, goal: Goal, robot: Robot) -> Array | None:
+    def penalty(self, state: State, goal: Goal, robot: Robot) -> Array | None:
         """See `Task.penalty`."""
         return self._maybe("penalty", state, goal, robot)
 
-    def distance_from_goal(self, state: PlanarState, goal: Goal) -> Array | None:
+    def distance_from_goal(self, state: State, goal: Goal) -> Array | None:
         """See `Task.distance_from_goal`."""
         if not self._has("distance_from_goal"):
             return super().distance_from_goal(state, goal)
@@ -241,12 +257,12 @@ class OwnTask(Task[PlanarState]):
         except (Exception, SystemExit) as error:
             raise self._wrong(member, f"raised {one_line(error, type(self.own).__module__)}") from error
 
-    def _maybe(self, member: str, state: PlanarState, *more: Any) -> Array | None:
+    def _maybe(self, member: str, state: State, *more: Any) -> Array | None:
         """Numbers of a member that may be missing, or return None."""
         found = self._ask(member, state, *more) if self._has(member) else None
         return None if found is None else self._numbers(member, found, state, "the result")
 
-    def _numbers(self, member: str, value: Any, state: PlanarState, what: str) -> Array:
+    def _numbers(self, member: str, value: Any, state: State, what: str) -> Array:
         """A result as finite numbers in the shape of the state that it is for."""
         xp, shape = array_namespace(state.x), tuple(state.x.shape)
         try:
@@ -261,7 +277,7 @@ class OwnTask(Task[PlanarState]):
             raise self._wrong(member, f"returned {what} that is not finite")
         return numbers
 
-    def _goal(self, member: str, found: Any, state: PlanarState) -> Goal:
+    def _goal(self, member: str, found: Any, state: State) -> Goal:
         if not isinstance(found, Goal):
             raise self._wrong(member, f"returned {_kind(found)}, it must be a Goal")
         lead = tuple(np.shape(state.x))
@@ -272,11 +288,14 @@ class OwnTask(Task[PlanarState]):
         for thing in self.things:
             if thing.name not in found.things:
                 raise self._wrong(member, f"returned a Goal without the pose of {thing.name} in its things")
+        twists = self.goal_topic == "goal_velocity"
+        pose = 3 if self.state_type is PlanarState else 7
+        target = pose if self.state_type is PlanarState or not twists else 6
         for name, value, tail in (
-            ("targets", found.targets, (None, 3)),
+            ("targets", found.targets, (None, target)),
             ("done", found.done, ()),
             ("obstacles", found.obstacles, (None, None)),
-            *((f"things['{name}']", pose, (3,)) for name, pose in found.things.items()),
+            *((f"things['{name}']", where, (pose,)) for name, where in found.things.items()),
         ):
             shape, must = tuple(np.shape(value)), (*lead, *tail)
             if len(shape) != len(must) or any(

@@ -8,12 +8,15 @@ from typing import TYPE_CHECKING, Generic, Self
 from fulmar_core.counter_rng import Draws
 from fulmar_core.errors import ConfigError
 from fulmar_core.goal import Goal, goal_at
+from fulmar_core.paths import config_names
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
 from fulmar_core.state import S, State
 from fulmar_core.tasks.terms import Errors, Tolerance
 from fulmar_core.things import Thing
+
+IN_SPACE = "_3d"  # ends the names of tasks in space
 
 
 class Task(ABC, Generic[S]):
@@ -88,9 +91,16 @@ class Task(ABC, Generic[S]):
             TaskError: A member of a user's own task raises, or returns what no task returns.
         """
         if robot.state_type is not self.state_type:
+            in_space = self.name.endswith(IN_SPACE)
+            other = self.name.removesuffix(IN_SPACE) if in_space else self.name + IN_SPACE
+            hint = (
+                f"Did you mean '{other}'?"
+                if other in config_names("tasks")
+                else "`fulmar list tasks` shows others."
+            )
             raise ConfigError(
                 f"task '{self.name}' is about motion in {self.state_type.WORLD}, and robot '{robot.name}' moves in "
-                f"{robot.state_type.WORLD}. `fulmar list tasks` shows the others; those in space end in _3d."
+                f"{robot.state_type.WORLD}. {hint} Names of tasks in space end in {IN_SPACE}."
             )
 
     def goal_of(self, targets: Array) -> Goal:

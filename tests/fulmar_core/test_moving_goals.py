@@ -1,0 +1,133 @@
+"""Targets that move in space: their paths, their sequence, and laws that follow them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fulmar_core.attitude import turn
+from fulmar_core.controllers.target_motion import TargetMotion
+from fulmar_core.errors import ConfigError
+from fulmar_core.goal_files import Trajectory, load_goals
+from fulmar_core.goal_sequence import goal_sequence
+from fulmar_core.references.in_space import Helix, TiltedCircle
+from fulmar_core.robot import load_robot
+from fulmar_core.spatial import SpatialState
+from tests.fulmar_core.test_guards_in_space import Bench
+
+CRAFT = load_robot("spacecraft_16")
+CIRCLE = Trajectory("trajectory", "t", TiltedCircle("tilted_circle", radius=2.0, tilt_deg=90.0), speed=0.1)
+HELIX = Trajectory("trajectory", "t", Helix("helix", radius=1.0, pitch=0.5, turns=2.0), speed=0.1)
+NOWHERE = SpatialState.resting(SpatialState.target_at((9.0, 0.0, 0.0)))
+
+
+def axes_of(pose: np.ndarray) -> np.ndarray:
+    """Body axes in the world, one a row."""
+    quat = tuple(pose[3:])
+    return np.array([turn(quat, tuple(axis)) for axis in np.eye(3)])
+
+
+def test_a_helix_rises_about_its_centre_at_its_speed():
+    target = replace(HELIX, path=replace(HELIX.path, centre=(1.0, -2.0, 3.0))).target()
+    length = 2.0 * np.hypot(2.0 * np.pi, 0.5)
+    assert target.duration_s == pytest.approx(length / 0.1, rel=1e-5)
+    begin, end = target.pose(0.0), target.pose(target.duration_s)
+    assert begin[:3] == pytest.approx([2.0, -2.0, 2.5])
+    assert end[:3] == pytest.approx([2.0, -2.0, 3.5])
+    assert target.pose(1e6) == pytest.approx(end)
+    ways = np.diff([target.pose(t)[:3] for t in np.arange(0.0, 100.0, 0.5)], axis=0)
+    assert np.linalg.norm(ways, axis=1) == pytest.approx(0.05, rel=2e-3)
+
+
+@pytest.mark.parametrize("file", [HELIX, CIRCLE])
+def test_x_points_along_the_path_and_z_up(file):
+    target = file.target()
+    for time_s in np.linspace(0.5, target.duration_s - 0.5, 40):
+        x, _, z = axes_of(target.pose(time_s))
+        way = target.pose(time_s + 0.01)[:3] - target.pose(time_s - 0.01)[:3]
+        assert x @ way == pytest.approx(np.linalg.norm(way), rel=1e-4)
+        assert z @ file.path.up > 0.9
+    assert np.linalg.norm(target.pose(1.0)[3:]) == pytest.approx(1.0)
+
+
+def test_a_circle_that_stands_upright_closes_without_a_jump_of_its_attitude():
+    target = replace(CIRCLE, loops=0).target()
+    assert target.duration_s == np.inf
+    before, after = (target.pose(target.round_s + offset) for offset in (-0.01, 0.01))
+    assert after[:3] == pytest.approx(before[:3], abs=0.003)
+    assert abs(after[3:] @ before[3:]) == pytest.approx(1.0, abs=1e-5)
+    top = target.pose(0.25 * target.round_s)
+    assert top[:3] == pytest.approx([0.0, 0.0, 2.0], abs=1e-3)
+    assert axes_of(top)[0] == pytest.approx([-1.0, 0.0, 0.0], abs=2e-3)
+
+
+def test_facing_may_be_fixed_or_any():
+    fixed = replace(CIRCLE, facing="fixed", angles_deg=(0.0, 0.0, 90.0))
+    assert SpatialState.written(fixed.target().pose(7.0))[3:] == pytest.approx([0.0, 0.0, 90.0])
+    free = replace(CIRCLE, facing="any")
+    assert goal_sequence(free, CRAFT).topic == "goal_point"
+    assert goal_sequence(fixed, CRAFT).topic == goal_sequence(CIRCLE, CRAFT).topic == "goal_pose"
+    with pytest.raises(ValueError, match="'angles_deg' needs facing: fixed"):
+        replace(CIRCLE, angles_deg=(0.0, 0.0, 90.0))
+
+
+def test_the_sequence_goes_by_the_clock_and_ends():
+    sequence, target = goal_sequence(CIRCLE, CRAFT), CIRCLE.target()
+    assert sequence.step(NOWHERE, 3.0).current == pytest.approx(target.pose(3.0))
+    assert (sequence.progress, sequence.done) == ("0 of 1 rounds", False)
+    assert sequence.step(NOWHERE, 200.0).current == pytest.approx(target.pose(0.0), abs=1e-6)
+    assert (sequence.progress, sequence.done) == ("1 of 1 rounds", True)
+    sequence = goal_sequence(HELIX, CRAFT)
+    sequence.step(NOWHERE, 0.35 * HELIX.target().duration_s)
+    assert sequence.progress == "30 % of the path"
+
+
+def test_the_plane_has_no_such_targets():
+    with pytest.raises(ConfigError, match="is in space, and robot 'floating_platform' moves in the plane"):
+        goal_sequence(load_goals("helix"), load_robot("floating_platform"))
+    with pytest.raises(ConfigError, match="only positions and poses can be a path"):
+        goal_sequence(CIRCLE, CRAFT, as_path=True)
+
+
+def test_motion_of_targets_is_their_difference_and_a_jump_is_none():
+    motion = TargetMotion(speed=3.0, rate=6.0)
+    here = SpatialState.target_at((1.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+    there = SpatialState.target_at((1.0, 0.02, 0.0, 0.0, 0.0, 3.0))
+    far = SpatialState.target_at((5.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+    assert not np.any(motion.update(np.stack((here, here)), 0.2))
+    velocity, rate = motion.update(np.stack((there, far)), 0.2)
+    assert velocity == pytest.approx(np.array([[0.0, 0.1, 0.0], [0.0, 0.0, 0.0]]))
+    assert rate == pytest.approx(np.array([[0.0, 0.0, np.deg2rad(15.0)], [0.0, 0.0, 0.0]]))
+    assert not np.any(motion.update(np.stack((there, far)), 0.2))  # exactly
+    motion.reset()
+    assert not np.any(motion.update(np.stack((here, here)), 0.2))
+
+
+def test_a_goal_that_moves_a_little_goes_on_and_one_that_moves_more_begins_anew():
+    bench = Bench(goals_streamed=True)
+    forgotten = []
+    bench.guard.switch.current.controller.reset = lambda: forgotten.append(bench.now_ns)
+    bench.give(1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    bench.step(0.0, 0.0, 0.0)
+    begun = len(forgotten)
+    bench.give(1.0, 0.02, 0.0, 0.0, 0.0, 2.0)
+    assert bench.guard.mission.moved
+    bench.step(0.0, 0.0, 0.0)
+    assert len(forgotten) == begun
+    assert bench.guard.loop.goal.current[0, 1] == 0.02
+    for pose in ((1.0, 0.1, 0.0, 0.0, 0.0, 2.0), (1.0, 0.1, 0.0, 0.0, 0.0, 9.0)):
+        bench.give(*pose)
+        assert not bench.guard.mission.moved
+        bench.step(0.0, 0.0, 0.0)
+        begun += 1
+        assert len(forgotten) == begun
+    assert bench.guard.mission.goals_received == 3
+
+
+def test_a_repeated_goal_of_an_operator_begins_anew_as_before():
+    bench = Bench()
+    bench.give(1.0, 0.0, 0.0)
+    bench.give(1.0, 0.0, 0.0)
+    assert (bench.guard.mission.moved, bench.guard.mission.goals_received) == (False, 2)
