@@ -8,7 +8,7 @@ from typing import Any
 from fulmar_core.config import load_config
 from fulmar_core.controllers.classical import default_gains_note
 from fulmar_core.errors import ConfigError, UnknownNameError, did_you_mean
-from fulmar_core.estimation.kinds import estimator_kind
+from fulmar_core.estimation.kinds import default_estimator, estimator_kind
 from fulmar_core.paths import config_names, config_path
 from fulmar_core.recording import Recording
 from fulmar_core.robot import load_robot
@@ -52,7 +52,6 @@ class Guards:
 
 
 NONE = Guards()
-DEFAULT_ESTIMATOR = "mocap_imu"
 
 
 @dataclass(frozen=True)
@@ -222,5 +221,6 @@ def default_guards(controller: str, backend: str, hardware: str = "") -> Guards:
         return system.guards
     if backend != "hardware":
         return NONE
-    seen = load_hardware(hardware).seen_from_outside
-    return Guards(estop=True, estimator=DEFAULT_ESTIMATOR if seen else None)
+    device = load_hardware(hardware)
+    estimator = default_estimator(load_robot(device.robot)) if device.seen_from_outside else None
+    return Guards(estop=True, estimator=estimator)

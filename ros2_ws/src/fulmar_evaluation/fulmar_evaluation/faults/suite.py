@@ -81,7 +81,7 @@ def modules_for(robot: str, faults: list[Fault]) -> tuple[str, ...]:
     needed: dict[str, None] = {}
     for about in (fault.about for fault in faults):
         backend, hardware = ("hardware", default_hardware(robot)) if about.emulated else ("mujoco", "")
-        guards = Guards(**about.guards)
+        guards = Guards(**about.guards_of(load_robot(robot)))
         modules = modules_of("policy", backend, guards=guards, hardware=hardware, emulated=about.emulated)
         needed |= dict.fromkeys(modules)
     return tuple(needed)
