@@ -120,9 +120,9 @@ USUAL = FaultEnvironment()
 
 
 def task_of(robot: Robot) -> Task:
-    """What a robot does when a fault comes: the first of `TASKS` in its world for which a policy is shipped."""
+    """What a robot does when a fault comes: the first of `TASKS` in its world that a policy is shipped for."""
     fitting = [task for task in map(load_task, TASKS) if task.state_type is robot.state_type]
-    return next((task for task in fitting if shipped_policy(robot.name, task.name)), fitting[-1])
+    return next((task for task in fitting if shipped_policy(robot.name, task.name)), fitting[0])
 
 
 def goal_of(robot: Robot) -> tuple[float, ...]:
