@@ -129,7 +129,7 @@ def varied_system(
     chosen = (robot or base.robot, task or base.task, controller or base.controller, backend or base.backend)
     if chosen == (base.robot, base.task, base.controller, base.backend):
         return base
-    check_names(*chosen)
+    check_names(*chosen, hardware)
     guards = base.guards
     if chosen[3] == "hardware" and base.backend != "hardware":
         guards = default_guards(chosen[2], "hardware", default_hardware(chosen[0], hardware))
@@ -160,8 +160,10 @@ def system_of(controller: str, backend: str) -> System | None:
     return load_system(name) if name in config_names("systems") else None
 
 
-def check_names(robot: str, task: str, controller: str, backend: str) -> None:
+def check_names(robot: str, task: str, controller: str, backend: str, hardware: str | None = None) -> None:
     """Refuse unknown names, and controllers and backends that do not exist for a robot and a task.
+
+    Hardware is a file that was asked for; without one the robot has to have its own.
 
     Raises:
         ConfigError: On the first wrong one.
@@ -172,7 +174,7 @@ def check_names(robot: str, task: str, controller: str, backend: str) -> None:
     if backend not in BACKENDS:
         raise UnknownNameError("backend", backend, BACKENDS)
     if backend == "hardware":
-        default_hardware(robot)
+        default_hardware(robot, hardware)
 
 
 def gains_note(robot: str, controller: str | None) -> str:

@@ -126,7 +126,9 @@ def run(
 
     use_calibration(calibration, robot)
     place = read_goal(goal)
-    task, note = task_of_run(task, robot, controller, backend, goal=place, goals=goals, policy=policy)
+    task, note = task_of_run(
+        task, robot, controller, backend, goal=place, goals=goals, policy=policy, hardware=hardware
+    )
     if note:
         log_line(note)
     guards = {
