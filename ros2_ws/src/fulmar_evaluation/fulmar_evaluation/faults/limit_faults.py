@@ -112,7 +112,7 @@ def goal_outside_the_area(live: LiveSystem) -> Outcome:
 def _offer_goal(live: LiveSystem, numbers: list[float], change: Callable[[Any], None], words: str) -> Outcome:
     """Another node publishes a goal: it is rejected with the reason, and the robot goes on to the one before."""
     wire, form = GOAL_WIRES[task_of(live.robot).goal_topic], live.robot.state_type
-    goal = goal_at(form.target_at(numbers))
+    goal = goal_at(form.target_at(numbers).tolist())
     message = goal_message(goal, wire.name, SIMULATION_START_NS + 1, live.plan.frames, form=form)
     change(message)
     node = rclpy.create_node("stranger", namespace=live.plan.namespace)
