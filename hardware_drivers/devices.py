@@ -40,9 +40,10 @@ def make_device(robot: Robot, hardware: Hardware, *, port: str, patience_s: floa
     if isinstance(settings, (GpioValves, Kobuki, KingfisherNmea, MavlinkBoat, OwnDriver)) and port:
         settings = replace(settings, port=port)
     if isinstance(settings, GpioValves):
-        from hardware_drivers.thruster_driver import ThrusterDriver
+        from hardware_drivers.thruster_driver import ThrusterDriver, ValveDriver
 
-        return backend_of(robot, ThrusterDriver(robot, settings, patience_s=patience_s))
+        kind = ValveDriver if settings.bearing is None else ThrusterDriver
+        return backend_of(robot, kind(robot, settings, patience_s=patience_s))
     if isinstance(settings, Kobuki):
         from hardware_drivers.kobuki_driver import KobukiDriver
 

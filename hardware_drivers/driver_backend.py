@@ -11,6 +11,7 @@ from fulmar_core.actuators.refuge import slowdown
 from fulmar_core.backend import AirBearing, Sample
 from fulmar_core.episode import Episode
 from fulmar_core.errors import DeviceError
+from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
 from hardware_drivers.driver import DeviceDriver
 
@@ -32,6 +33,8 @@ class DriverBackend:
     def reset(self, episode: Episode, *, seed: int, number: int = 0) -> Sample:
         """Take the pose of the episode for where the robot stands, and send the safe command; see `Backend.reset`."""
         start = episode.start
+        if not isinstance(start, PlanarState):  # a device that measures odometry moves in the plane
+            start = PlanarState.from_rigid(start.to_rigid())
         self._driver.begin(float(start.x), float(start.y), float(start.yaw))
         return self.step(self.robot.actuators.safe_command)
 

@@ -30,7 +30,7 @@ def check_presence(driver: Driver, port: str = "") -> None:
         DeviceError: There is no such port, chip, line or host, or this user may not use it.
     """
     if isinstance(driver, GpioValves):
-        _check_chip(port or driver.port, (*driver.lines, driver.bearing.line))
+        _check_chip(port or driver.port, driver.every_line)
     elif isinstance(driver, OwnDriver) and "/gpiochip" in (port or driver.port):
         _check_chip(port or driver.port, ())
     elif isinstance(driver, (Kobuki, KingfisherNmea, MavlinkBoat, OwnDriver)) and (port or driver.port):

@@ -11,7 +11,8 @@ from fulmar_core.config import Named, load_config
 from fulmar_core.errors import ConfigError
 from fulmar_core.own_class import check_class_path
 from fulmar_core.paths import config_names, config_path
-from fulmar_core.robot import load_robot
+from fulmar_core.robot import Robot, load_robot
+from fulmar_core.spatial import SpatialState
 from hardware_drivers.valves import VALVE_ORDERS
 from hardware_drivers.wiring import AS_NAMED, check_wiring
 
@@ -69,17 +70,22 @@ class GpioValves:
     port: str  # the chip, such as /dev/gpiochip0
     lines: tuple[str, ...]  # names or numbers, in the order of the wiring
     order: ValveOrder  # which thruster, counted from 0, each of these lines opens
-    bearing: Bearing
+    bearing: Bearing | None = None  # None: the robot floats without air
     active_low: bool = True
     min_on_s: float = 0.0  # an opened valve stays open so long, except when all must close [s]
 
     def __post_init__(self) -> None:
-        every = (*self.lines, self.bearing.line)
+        every = self.every_line
         if len(set(every)) != len(every):
             raise ValueError("each valve and the bearing need a line of their own.")
         check_order(self.order, len(self.lines))
         if not 0.0 <= self.min_on_s <= 0.2:
             raise ValueError("min_on_s must be from 0 to 0.2 s.")
+
+    @property
+    def every_line(self) -> tuple[str, ...]:
+        """Those of the valves, then that of the bearing, if there is one."""
+        return (*self.lines, *([self.bearing.line] if self.bearing else []))
 
 
 @dataclass(frozen=True)
@@ -234,7 +240,6 @@ NEEDS: dict[type, tuple[str, ...]] = {  # modules of the extra `hardware`
 }
 TOPIC_DRIVERS = (ValveTopic, VelocityTopic, ThrustTopic)
 SEEN_FROM_OUTSIDE = (GpioValves, ValveTopic)  # drivers of robots that only motion capture localises
-FLOATS = (GpioValves, ValveTopic)  # drivers that switch an air bearing
 MEASURES = (Kobuki, KingfisherNmea, MavlinkBoat)  # drivers whose device measures odometry
 FITS = {
     "thrusters": (GpioValves, ValveTopic),
@@ -278,7 +283,9 @@ class Hardware:
         """Whether the driver switches an air bearing, without which nothing may move."""
         if isinstance(self.driver, OwnDriver):
             return self.driver.air_bearing
-        return isinstance(self.driver, FLOATS)
+        if isinstance(self.driver, GpioValves):
+            return self.driver.bearing is not None
+        return isinstance(self.driver, ValveTopic)
 
     @property
     def seen_from_outside(self) -> bool:
@@ -305,14 +312,15 @@ def load_hardware(name: str) -> Hardware:
     """
     path = hardware_path(name)
     hardware = load_config(Hardware, path)
-    actuators = load_robot(hardware.robot).actuators
+    robot = load_robot(hardware.robot)
+    actuators = robot.actuators
     if isinstance(hardware.driver, OwnDriver):
         hardware = replace(hardware, driver=_with_order(hardware.driver, actuators))
     elif not isinstance(hardware.driver, FITS.get(actuators.kind, ())):
         raise ConfigError(
             f"{path}: driver '{hardware.driver.kind}' cannot move '{hardware.robot}', which has {actuators.kind}."
         )
-    problem = _count_problem(hardware.driver, actuators)
+    problem = _count_problem(hardware.driver, actuators) or _bearing_problem(hardware.driver, robot)
     if problem:
         raise ConfigError(f"{path}: {problem}")
     return hardware
@@ -335,6 +343,19 @@ def _with_order(driver: OwnDriver, actuators: Actuators) -> OwnDriver:
     if actuators.kind != "thrusters" or driver.order:
         return driver
     return replace(driver, order=tuple(range(len(actuators.names))))
+
+
+def _bearing_problem(driver: Driver, robot: Robot) -> str:
+    """Why the driver does not fit what carries the robot; empty if it does."""
+    if isinstance(driver, GpioValves) and driver.bearing is None and robot.air_bearing:
+        return f"'{robot.name}' floats on an air bearing: give 'driver' the line of its valve, 'bearing'."
+    in_space = robot.state_type is SpatialState
+    if in_space and (isinstance(driver, ValveTopic) or getattr(driver, "bearing", None) is not None):
+        return (
+            f"'{robot.name}' moves in space, and this driver switches an air bearing. Use driver 'gpio_valves' without "
+            "'bearing', or one of your own: docs/own-driver.md."
+        )
+    return ""
 
 
 def _count_problem(driver: Driver, actuators: Actuators) -> str:

@@ -1,4 +1,4 @@
-"""Driver of the valves and the air bearing of a floating platform."""
+"""Drivers of valves by GPIO, with and without an air bearing."""
 
 from __future__ import annotations
 
@@ -17,12 +17,8 @@ from hardware_drivers.valves import ValveTiming
 STATES = {False: Value.INACTIVE, True: Value.ACTIVE}
 
 
-class ThrusterDriver(DeviceDriver):
-    """Opens and closes valves by GPIO; measures nothing.
-
-    The bearing is a line like the others, but its service switches it, the start and end of the driver, and a long
-    idle time, never a thrust command.
-    """
+class ValveDriver(DeviceDriver):
+    """Opens and closes valves by GPIO; measures nothing."""
 
     def __init__(self, robot: Robot, settings: GpioValves, *, patience_s: float) -> None:
         """Take the lines, everything closed.
@@ -30,23 +26,13 @@ class ThrusterDriver(DeviceDriver):
         Raises:
             DeviceError: The chip or a line is not there.
         """
-        self._settings = settings
         self._order = np.array(settings.order)
         self._valves = [line_of(line) for line in settings.lines]
-        self._bearing = line_of(settings.bearing.line)
-        every = (*settings.lines, settings.bearing.line)
         self._lines: LineRequest | None = output_lines(
-            settings.port, every, active_low=settings.active_low, patience_s=patience_s
+            settings.port, settings.every_line, active_low=settings.active_low, patience_s=patience_s
         )
         self._timing = ValveTiming(len(self._valves), settings.min_on_s)
         self._lock = threading.Lock()
-        self._bearing_on = False
-        self._used_ns = time.monotonic_ns()
-
-    def begin(self, x: float, y: float, heading: float) -> None:
-        """Switch the bearing on where the hardware file says so; see `DeviceDriver`."""
-        if self._settings.bearing.on_at_start:
-            self.set_bearing(True)
 
     def write(self, command: np.ndarray) -> np.ndarray:
         """Set the valves; see `DeviceDriver`."""
@@ -54,19 +40,62 @@ class ThrusterDriver(DeviceDriver):
         with self._lock:
             applied = self._timing.allowed(command, now_ns)
             self._set(applied)
-            self._watch_idleness(bool(applied.any()), now_ns)
+            self._note(bool(applied.any()), now_ns)
         return applied
+
+    def close(self) -> None:
+        """Close the valves and release the lines; see `DeviceDriver`."""
+        with self._lock:
+            if self._lines is not None:
+                self._set(np.zeros(len(self._valves)))
+                self._let_go()
+                self._lines.release()
+                self._lines = None
+
+    def _set(self, valves: np.ndarray) -> None:
+        """Bring every valve into its state; call with the lock held."""
+        if self._lines is not None:
+            wired = valves[self._order] > 0.5
+            self._lines.set_values(
+                {line: STATES[bool(on)] for line, on in zip(self._valves, wired, strict=True)}
+            )
+
+    def _note(self, used: bool, now_ns: int) -> None:
+        """Called after each command, with whether a valve is open and the steady clock [ns], with the lock held."""
+
+    def _let_go(self) -> None:
+        """Called before the lines are released, with the lock held."""
+
+
+class ThrusterDriver(ValveDriver):
+    """Switches the valve of an air bearing as well.
+
+    The bearing is a line like the others, but its service switches it, the start and end of the driver, and a long
+    idle time, never a thrust command.
+    """
+
+    def __init__(self, robot: Robot, settings: GpioValves, *, patience_s: float) -> None:
+        """Take the lines, everything closed; the settings have a bearing.
+
+        Raises:
+            DeviceError: The chip or a line is not there.
+        """
+        super().__init__(robot, settings, patience_s=patience_s)
+        assert settings.bearing is not None
+        self._settings, self._bearing = settings.bearing, line_of(settings.bearing.line)
+        self._bearing_on = False
+        self._used_ns = time.monotonic_ns()
+
+    def begin(self, x: float, y: float, heading: float) -> None:
+        """Switch the bearing on where the hardware file says so; see `DeviceDriver`."""
+        if self._settings.on_at_start:
+            self.set_bearing(True)
 
     def close(self) -> None:
         """Switch the bearing off after `linger_s`, and release the lines; see `DeviceDriver`."""
         if self._bearing_on:
-            time.sleep(self._settings.bearing.linger_s)
-        with self._lock:
-            if self._lines is not None:
-                self._set(np.zeros(len(self._valves)))
-                self._switch(False)
-                self._lines.release()
-                self._lines = None
+            time.sleep(self._settings.linger_s)
+        super().close()
 
     def health(self) -> dict[str, str]:
         """Whether it floats; see `DeviceDriver`."""
@@ -91,24 +120,20 @@ class ThrusterDriver(DeviceDriver):
             self._used_ns = time.monotonic_ns()
         return ""
 
-    def _set(self, valves: np.ndarray) -> None:
-        """Bring every valve into its state; call with the lock held."""
-        if self._lines is not None:
-            wired = valves[self._order] > 0.5
-            self._lines.set_values(
-                {line: STATES[bool(on)] for line, on in zip(self._valves, wired, strict=True)}
-            )
-
     def _switch(self, on: bool) -> None:
         """Switch the bearing; call with the lock held."""
         assert self._lines is not None
         self._lines.set_values({self._bearing: STATES[on]})
         self._bearing_on = on
 
-    def _watch_idleness(self, used: bool, now_ns: int) -> None:
-        """Switch the bearing off after a long idle time; call with the lock held."""
+    def _let_go(self) -> None:
+        """Switch the bearing off; see `ValveDriver`."""
+        self._switch(False)
+
+    def _note(self, used: bool, now_ns: int) -> None:
+        """Switch the bearing off after a long idle time; see `ValveDriver`."""
         if used:
             self._used_ns = now_ns
-        limit_ns = self._settings.bearing.idle_off_s * 1e9
+        limit_ns = self._settings.idle_off_s * 1e9
         if limit_ns and self._bearing_on and now_ns - self._used_ns > limit_ns:
             self._switch(False)

@@ -53,6 +53,7 @@ class EmulatorSettings(PlantSettings):
     link: str = ""  # path of the pseudo-terminal or the chip to make, tcp:<port>, udp:<port>, or a topic
     order: tuple[int, ...] = (0, 1, 2, 3, 4, 5, 6, 7)  # which thruster each valve line opens
     active_low: bool = True
+    bearing: bool = True  # valves have an air bearing beside them
     inverted: bool = False  # a valve node opens its valves at 0
     stamped: bool = False  # a base takes TwistStamped
     message: str = "int16"  # of VALVE_MESSAGES, which a valve node takes
@@ -89,7 +90,7 @@ class EmulatorNode(Node):
         simulator = MujocoBackend.of(robot, load_task(self.settings.task), scenario)
         self.device = make_emulator(robot, simulator, self.settings)
         self._backend: Backend = simulator
-        if isinstance(self.device, (ValveBank, ValveNode)):
+        if isinstance(self.device, (ValveBank, ValveNode)) and self.settings.bearing:
             self._backend = OnAir(simulator, scenario)
         self._sample = self._backend.reset(first_episode(robot, self.settings), seed=self.settings.seed)
         self._wiring = Wiring(
@@ -194,7 +195,8 @@ def make_emulator(robot: Robot, backend: MujocoBackend, settings: EmulatorSettin
         ConfigError: The link is of another kind than the device has.
     """
     if settings.device == "valves":
-        return ValveBank(Path(settings.link), robot, order=settings.order, active_low=settings.active_low)
+        path, order, bearing = Path(settings.link), settings.order, settings.bearing
+        return ValveBank(path, robot, order=order, active_low=settings.active_low, bearing=bearing)
     if settings.device == "valve_topic":
         return ValveNode(settings.link, settings.order, inverted=settings.inverted)
     if settings.device == "velocity_topic":

@@ -16,7 +16,9 @@ from fulmar_core.robot import Robot
 class ValveBank:
     """Valves and bearing on the pins of a GPIO chip that is a file; they keep their state when the driver dies."""
 
-    def __init__(self, path: Path, robot: Robot, *, order: tuple[int, ...], active_low: bool) -> None:
+    def __init__(
+        self, path: Path, robot: Robot, *, order: tuple[int, ...], active_low: bool, bearing: bool = True
+    ) -> None:
         """Make the chip, with all pins inactive.
 
         Args:
@@ -24,11 +26,12 @@ class ValveBank:
             robot: The robot.
             order: Which thruster each pin opens, counted from 0; the bearing's pin comes after them.
             active_low: Whether a valve opens at level 0.
+            bearing: Whether there is a bearing; a robot without one floats.
         """
         self._path, self._order, self._open_level = path, np.array(order), int(not active_low)
-        self._count = len(robot.actuators.names)
+        self._count, self._bearing = len(robot.actuators.names), bearing
         half_made = path.with_suffix(".new")
-        half_made.write_bytes(bytes([1 - self._open_level]) * (self._count + 1))
+        half_made.write_bytes(bytes([1 - self._open_level]) * (self._count + bearing))
         half_made.rename(path)  # a driver that waits for it finds all of its pins
         self._file = path.open("rb", buffering=0)
         self.address = f"file://{path}"
@@ -37,19 +40,19 @@ class ValveBank:
         """See `EmulatedDevice`; without air the platform stands on the floor."""
         levels = self.levels()
         valves = np.zeros(self._count)
-        if levels[self._count] == self._open_level:
+        if not self._bearing or levels[self._count] == self._open_level:
             valves[self._order] = levels[: self._count] == self._open_level
         return valves
 
     @property
     def air(self) -> bool:
-        """Whether the valve of the bearing is open."""
+        """Whether the valve of the bearing is open; there is one."""
         return bool(self.levels()[self._count] == self._open_level)
 
     def levels(self) -> np.ndarray:
-        """Level at the pin of each valve in the order of the wiring, then at the bearing's, shape (n + 1,)."""
+        """Level at the pin of each valve in the order of the wiring, then at the bearing's, shape (n + 1,) or (n,)."""
         self._file.seek(0)
-        return np.frombuffer(self._file.read(self._count + 1), dtype=np.uint8)
+        return np.frombuffer(self._file.read(self._count + self._bearing), dtype=np.uint8)
 
     def report(self, sample: Sample, now_s: float) -> None:
         """Valves report nothing."""

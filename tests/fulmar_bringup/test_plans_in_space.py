@@ -105,6 +105,21 @@ def test_the_goal_decides_the_task(goal, task):
     assert default_task("spacecraft_16", "external", goal=goal) == task
 
 
+def test_a_hardware_file_that_is_named_serves_a_robot_without_one_of_its_own(plan, tmp_path):
+    path = tmp_path / "valves.yaml"
+    lines, order = [str(number) for number in range(16)], list(range(16))
+    path.write_text(
+        f"title: t\nrobot: spacecraft_16\ndriver: {{kind: gpio_valves, port: x, lines: {lines}, order: {order}}}\n"
+    )
+    with pytest.raises(ConfigError, match="there is no hardware driver for 'spacecraft_16'"):
+        default_task("spacecraft_16", "lqr", "hardware")
+    task = default_task("spacecraft_16", "lqr", "hardware", hardware=str(path))
+    asked = {"robot": "spacecraft_16", "task": task, "controller": "lqr", "goal": GOAL}
+    found = plan(**asked, backend="hardware", hardware=str(path), emulate=True)
+    assert (task, found.plan.hardware) == ("go_to_pose_3d", str(path))
+    assert found.plan.guards.estimator == "mocap_imu_3d"  # valves measure nothing
+
+
 def test_a_place_is_no_pose_and_an_attitude_without_effect_is_said():
     with pytest.raises(ConfigError, match="needs an attitude: --goal x,y,z,roll,pitch,yaw"):
         check_heading("go_to_pose_3d", GOAL[:3])

@@ -226,6 +226,17 @@ def test_a_goal_outside_the_area_is_refused_with_the_area_and_the_goal_before_it
     np.testing.assert_array_equal(bench.guard.loop.goal.current[0], inside.current)
 
 
+def test_a_goal_of_an_invalid_message_is_reported_and_the_goal_before_it_stays():
+    bench = Bench()
+    bench.give(GOAL, 7)
+    bench.guard.refuse_goal("goal quaternion has norm 2.000, must be 1", 8)
+    assert (bench.guard.refusal.stamp_ns, bench.guard.refusal.reason[:15]) == (8, "goal quaternion")
+    assert bench.step()[1] == list(GENTLE)
+    np.testing.assert_array_equal(bench.guard.loop.goal.current[0], GOAL.current)
+    bench.give(OTHER, 9)
+    assert bench.guard.refusal.reason == ""
+
+
 def test_a_goal_farther_than_a_kilometre_is_refused_without_an_area():
     assert "1,001 m from the origin, farther than 1,000 m" in Bench().give(goal_at((0.0, 1001.0, 0.0)))
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -89,6 +91,42 @@ def test_too_few_valves_are_refused(tmp_path):
     )
     with pytest.raises(ConfigError, match="'order' has 2 entries, the robot has 8 thrusters"):
         load_hardware(str(path))
+
+
+GPIO = "title: t\nrobot: ROBOT\ndriver: {kind: gpio_valves, port: x, lines: LINES, order: ORDER MORE}\n"
+VALVE_TOPIC = "title: t\nrobot: ROBOT\ndriver: {kind: valve_topic, topic: /v, order: ORDER}\n"
+
+
+def valves_file(folder: Path, text: str, robot: str, count: int, more: str = "") -> str:
+    path = folder / "mine.yaml"
+    lines = ", ".join(f"'{number}'" for number in range(count))
+    order = ", ".join(map(str, range(count)))
+    text = text.replace("ROBOT", robot).replace("LINES", f"[{lines}]").replace("ORDER", f"[{order}]")
+    path.write_text(text.replace("MORE", more))
+    return str(path)
+
+
+def test_a_robot_in_space_has_as_many_valves_as_lines_and_no_bearing(tmp_path):
+    hardware = load_hardware(valves_file(tmp_path, GPIO, "spacecraft_16", 16))
+    assert (hardware.has_bearing, hardware.seen_from_outside, hardware.opens_valves) == (False, True, True)
+    path = valves_file(tmp_path, GPIO, "spacecraft_16", 8)
+    with pytest.raises(ConfigError, match="'order' has 8 entries, the robot has 16 thrusters"):
+        load_hardware(path)
+
+
+@pytest.mark.parametrize(("text", "more"), [(GPIO, ", bearing: {line: '99'}"), (VALVE_TOPIC, "")])
+def test_a_driver_that_switches_an_air_bearing_is_refused_in_space(tmp_path, text, more):
+    path = valves_file(tmp_path, text, "spacecraft_16", 16, more)
+    with pytest.raises(ConfigError, match="'spacecraft_16' moves in space, and this driver switches an air"):
+        load_hardware(path)
+
+
+def test_a_robot_on_an_air_bearing_needs_the_line_of_its_valve(tmp_path):
+    path = valves_file(tmp_path, GPIO, "floating_platform", 8)
+    with pytest.raises(
+        ConfigError, match="'floating_platform' floats on an air bearing: give 'driver' the line"
+    ):
+        load_hardware(path)
 
 
 @pytest.mark.parametrize("name", config_names("hardware"))

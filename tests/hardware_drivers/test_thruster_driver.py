@@ -8,11 +8,16 @@ import gpiod
 import numpy as np
 import pytest
 
+from fulmar_core.backend import AirBearing
+from fulmar_core.disturbances.scenario import load_scenario
+from fulmar_core.episode import draw_episode
 from fulmar_core.errors import DeviceError
 from fulmar_core.robot import load_robot
+from fulmar_core.tasks import load_task
+from hardware_drivers.devices import make_device
 from hardware_drivers.driver_backend import DriverBackend, backend_of
 from hardware_drivers.gpio import output_lines
-from hardware_drivers.settings import Bearing, GpioValves, load_hardware
+from hardware_drivers.settings import Bearing, GpioValves, Hardware, load_hardware
 from hardware_drivers.thruster_driver import ThrusterDriver
 from sim_nodes.emulators.outputs import ValveBank
 from tests.hardware_drivers.bench import episode_at
@@ -49,6 +54,30 @@ def test_each_thruster_opens_its_own_valve_and_no_other(rig, thruster):
     assert bank.command(0.0).tolist() == command.tolist()
     assert sample.applied.tolist() == command.tolist()
     assert sample.odometry is None
+
+
+def test_sixteen_valves_without_a_bearing_open_and_close_each_by_its_own_line(tmp_path):
+    craft, order = load_robot("spacecraft_16"), tuple(np.roll(range(16), 5).tolist())
+    bank = ValveBank(tmp_path / "gpio", craft, order=order, active_low=True, bearing=False)
+    lines = tuple(map(str, range(16)))
+    settings = GpioValves("gpio_valves", port=bank.address, lines=lines, order=order)
+    hardware = Hardware("sixteen valves", craft.name, settings)
+    assert not hardware.has_bearing
+    driver = make_device(craft, hardware, port="", patience_s=0.0)
+    try:
+        assert not isinstance(driver, AirBearing)
+        start = draw_episode(craft, load_task("go_to_pose_3d"), load_scenario("ideal"), seed=1, number=0)
+        driver.reset(start, seed=0)
+        assert bank.levels().tolist() == [1] * 16
+        for thruster in range(16):
+            command = np.eye(16)[thruster]
+            assert driver.step(command).applied.tolist() == command.tolist()
+            assert bank.command(0.0).tolist() == command.tolist()
+            assert bank.levels()[order.index(thruster)] == 0
+    finally:
+        driver.close()
+    assert bank.levels().tolist() == [1] * 16
+    bank.close()
 
 
 def test_taking_the_lines_opens_nothing(rig):

@@ -14,6 +14,7 @@ from fulmar_evaluation.faults.fault import Fault, Outcome, stopped
 from fulmar_evaluation.faults.fault_environment import request_of
 from fulmar_evaluation.faults.live_system import LiveSystem, NothingShown, live_system
 from fulmar_evaluation.faults.suite import EVERY, faults_of, run_faults
+from policy_server.controllers import shipped_policy
 from tests.conftest import RosDomain
 from tests.ros.cli import fulmar, json_of
 
@@ -21,6 +22,22 @@ pytestmark = pytest.mark.real_time
 
 ROBOTS = ("floating_platform", "turtlebot2", "kingfisher")
 THROUGH_THE_COMMAND = ("floating_platform", "controller_killed")
+SPACECRAFT = "spacecraft_16"
+IN_SPACE = (  # what differs there: three axes, sixteen valves, longer ticks, an estimator of its own
+    "controller_hangs",
+    "estimator_hangs",
+    "teleop_killed",
+    "odometry_with_a_wrong_quaternion",
+    "odometry_turns_too_fast",
+    "odometry_leaves_the_area",
+    "odometry_leaves_the_geofence",
+    "goal_outside_the_area",
+    "goals_killed",
+    "commands_of_wrong_length",
+    "commands_from_another_node",
+    "bundle_refused_with_fallback",
+    "swap_to_the_same_policy",
+)
 KEYS = [
     "name",
     "detected_by",
@@ -129,3 +146,15 @@ def test_every_other_fault_is_survived(robot: str, fault: Fault, ros_domain: Ros
     if fault.name == "cable_cut" and robot == "floating_platform":
         assert found.limit_s == pytest.approx(0.42)
         assert found.detected_by == "plant"
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(240)
+@pytest.mark.skipif(
+    shipped_policy(SPACECRAFT, "go_to_pose_3d") is None, reason=f"no policy is shipped for {SPACECRAFT}"
+)
+@pytest.mark.parametrize("fault", IN_SPACE)
+def test_a_spacecraft_survives_what_differs_in_space(fault: str, ros_domain: RosDomain) -> None:
+    (found,) = run_faults(SPACECRAFT, faults_of(SPACECRAFT, [fault])[0], lambda _done: None)
+    assert found.passed, found
+    assert found.bag_intact

@@ -128,6 +128,34 @@ def test_goals_of_a_file_are_taken_one_after_another_inside_a_box(
     assert "z = 0.3 m lies outside the area" in done.stderr
 
 
+VALVES = """
+title: sixteen valves on a GPIO chip
+robot: spacecraft_16
+driver:
+  kind: gpio_valves
+  port: /dev/gpiochip0
+  lines: [LINES]
+  order: [ORDER]
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.real_time
+def test_a_run_through_sixteen_emulated_valves_meets_its_goal_by_motion_capture_alone(
+    ros_domain: RosDomain, tmp_path: Path
+) -> None:
+    lines = ", ".join(f"'{number}'" for number in range(16))
+    order = ", ".join(map(str, reversed(range(16))))
+    (tmp_path / "valves.yaml").write_text(VALVES.replace("LINES", lines).replace("ORDER", order))
+    asked = ("run", "spacecraft_16", "--backend", "hardware", "--hardware", "valves.yaml", "--emulate")
+    goal = ("--controller", "lqr", "--goal", "0.6,0.3,-0.4,0,0,40", "--duration", "30")
+    done = fulmar(*asked, *goal, "--record", "bag", "--json", env=ros_domain.env, cwd=tmp_path)
+    summary = json_of(done.stdout)
+    assert summary["failure"] is None, done.stderr
+    assert summary["final_position_error_m"] < 0.05
+    assert summary["final_attitude_error_deg"] < 5.0
+
+
 @pytest.mark.parametrize(
     ("command", "words"),
     [

@@ -58,10 +58,11 @@ class Tumble:
     def stamp_ns(self) -> int:
         return BEGIN_NS + round(1e9 * self.time)
 
-    def measure(self, *, pose: bool, stars: bool = False) -> None:
+    def measure(self, *, pose: bool, stars: bool = False, inertial: bool = True) -> None:
         force = rotate_inverse(self.quat, self.push) + self.noise(FORCE_STD)
         sample = ImuSample(force, self.rate + self.gyro_bias + self.noise(GYRO_STD))
-        assert self.estimator.take("imu", Reading(sample, self.stamp_ns)) is None
+        if inertial:
+            assert self.estimator.take("imu", Reading(sample, self.stamp_ns)) is None
         if pose:
             seen = np.asarray(product(tuple(self.quat), exponential(tuple(self.noise(TURN_STD)))))
             value = np.concatenate((self.position + self.noise(PLACE_STD), seen))
@@ -71,15 +72,15 @@ class Tumble:
             reading = Reading(seen, self.stamp_ns, 0.0005**2 * np.eye(3))
             assert self.estimator.take("star_tracker", reading) is None
 
-    def run(self, seconds: float, *, every: int = 8, stars_every: int = 0) -> None:
+    def run(self, seconds: float, *, every: int = 8, stars_every: int = 0, inertial: bool = True) -> None:
         for number in range(round(seconds / DT)):
             self.step()
             stars = bool(stars_every) and number % stars_every == 0
-            self.measure(pose=number % every == 0, stars=stars)
+            self.measure(pose=number % every == 0, stars=stars, inertial=inertial)
 
     def errors(self) -> tuple[np.ndarray, np.ndarray]:
         """Error of the estimate (12,), and its covariance."""
-        estimate = self.estimator.estimate()
+        estimate = self.estimator.estimate(self.stamp_ns)
         assert estimate is not None, self.estimator.problem
         state: RigidBodyState = estimate.value
         turn = rotate(self.quat, np.asarray(rotation_error(tuple(state.quat_xyzw), tuple(self.quat))))
@@ -105,6 +106,30 @@ def test_a_tumbling_body_is_followed_in_all_thirteen_numbers():
     assert spread[3:6].max() < 0.002  # [rad]
     assert spread[6:9].max() < 0.01  # [m/s]
     assert spread[9:].max() < 2.0 * GYRO_STD  # [rad/s]
+
+
+def test_without_an_inertial_unit_the_turn_rate_follows_from_poses():
+    errors, ratios = [], []
+    for seed in range(20):
+        track = Tumble(seed)
+        track.run(6.0, inertial=False)
+        error, covariance = track.errors()
+        errors.append(error)
+        ratios.append(error[9:] @ np.linalg.solve(covariance[9:, 9:], error[9:]))
+    spread = np.sqrt(np.mean(np.square(errors), axis=0))
+    assert spread[:3].max() < 0.003  # [m]
+    assert spread[3:6].max() < 0.005  # [rad]
+    assert spread[9:].max() < 0.08  # of rates up to 0.4 [rad/s]
+    assert np.mean(ratios) < 3.0 + 3.0 * np.sqrt(2.0 * 3.0 / 20.0)
+
+
+def test_a_gyroscope_that_falls_silent_leaves_its_bias_and_no_phantom_rate():
+    track = Tumble(3, gyro_bias=0.02)
+    track.run(8.0)
+    track.run(3.0, inertial=False)
+    assert np.abs(track.errors()[0][9:]).max() < 0.1
+    track.run(1.0)
+    assert np.abs(track.errors()[0][9:]).max() < 0.02
 
 
 def test_the_covariance_is_honest_or_careful():

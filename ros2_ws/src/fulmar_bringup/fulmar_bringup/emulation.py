@@ -62,7 +62,11 @@ def emulation_of(hardware: Hardware, folder: Path) -> Emulation:
         return Emulation(driver.kind, driver.topic, "", {"sides": list(driver.wiring)})
     if isinstance(driver, GpioValves):
         pins = folder / "gpio"
-        more: Parameters = {"order": list(driver.order), "active_low": driver.active_low}
+        more: Parameters = {
+            "order": list(driver.order),
+            "active_low": driver.active_low,
+            "bearing": driver.bearing is not None,
+        }
         return Emulation("valves", str(pins), f"file://{pins}", more)
     more = {"sides": list(driver.wiring)}
     if isinstance(driver, MavlinkBoat):

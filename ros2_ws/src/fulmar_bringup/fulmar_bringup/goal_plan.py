@@ -70,6 +70,7 @@ def task_of_run(
     goal: tuple[float, ...] | None,
     goals: str | None,
     policy: Path | None,
+    hardware: str | None = None,
 ) -> tuple[str, str]:
     """Name of the task of a run, and a note where a part of its goal has no effect.
 
@@ -81,6 +82,7 @@ def task_of_run(
         goal: A place [m] or a pose [m, deg], as `State.NUMBERS`.
         goals: Name or path of a goal file; without a task it decides.
         policy: Bundle that was given.
+        hardware: Hardware file that was given.
 
     Raises:
         ConfigError: As of `default_task`, `whole_pose` and `check_heading`.
@@ -91,7 +93,7 @@ def task_of_run(
         return task, "" if goal is None else check_heading(task, goal)
     if goals:
         return task_of_goals(goals), ""
-    return default_task(robot, controller, backend, goal=goal, policy=policy), ""
+    return default_task(robot, controller, backend, goal=goal, policy=policy, hardware=hardware), ""
 
 
 def default_task(
@@ -101,16 +103,18 @@ def default_task(
     *,
     goal: tuple[float, ...] | None = None,
     policy: Path | None = None,
+    hardware: str | None = None,
 ) -> str:
     """Name of the task that a goal asks for: a place is a position, with angles it is a pose, as without a goal.
 
-    The goal is as `State.NUMBERS` of the robot; a bundle that was given is checked later.
+    The goal is as `State.NUMBERS` of the robot; a bundle that was given is checked later. Without a hardware file the
+    robot has to have its own.
 
     Raises:
         ConfigError: The controller does not do that task with this robot, but another one; with what to say instead.
     """
     if backend == "hardware":
-        default_hardware(robot)
+        default_hardware(robot, hardware)
     form = load_robot(robot).state_type
     pose, position = (name + SUFFIX[form] for name in (POSE, POSITION))
     asked = position if goal is not None and len(goal) == form.AXES else pose

@@ -144,7 +144,7 @@ def plan_run(
     """
     if lockstep and rate != 1.0:
         raise ConfigError("--lockstep runs as fast as it goes; it takes no --rate.")
-    check_names(robot, task, controller, backend)
+    check_names(robot, task, controller, backend, hardware)
     own_name = "" if name is None else checked_name(name)
     hardware = checked_hardware(robot, backend, hardware, emulate=emulate, hurried=lockstep or rate != 1.0)
     check_arming(hardware, arm=arm)

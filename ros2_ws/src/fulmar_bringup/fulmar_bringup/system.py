@@ -8,7 +8,7 @@ from typing import Any
 from fulmar_core.config import load_config
 from fulmar_core.controllers.classical import default_gains_note
 from fulmar_core.errors import ConfigError, UnknownNameError, did_you_mean
-from fulmar_core.estimation.kinds import estimator_kind
+from fulmar_core.estimation.kinds import default_estimator, estimator_kind
 from fulmar_core.paths import config_names, config_path
 from fulmar_core.recording import Recording
 from fulmar_core.robot import load_robot
@@ -52,7 +52,6 @@ class Guards:
 
 
 NONE = Guards()
-DEFAULT_ESTIMATOR = "mocap_imu"
 
 
 @dataclass(frozen=True)
@@ -130,7 +129,7 @@ def varied_system(
     chosen = (robot or base.robot, task or base.task, controller or base.controller, backend or base.backend)
     if chosen == (base.robot, base.task, base.controller, base.backend):
         return base
-    check_names(*chosen)
+    check_names(*chosen, hardware)
     guards = base.guards
     if chosen[3] == "hardware" and base.backend != "hardware":
         guards = default_guards(chosen[2], "hardware", default_hardware(chosen[0], hardware))
@@ -161,8 +160,10 @@ def system_of(controller: str, backend: str) -> System | None:
     return load_system(name) if name in config_names("systems") else None
 
 
-def check_names(robot: str, task: str, controller: str, backend: str) -> None:
+def check_names(robot: str, task: str, controller: str, backend: str, hardware: str | None = None) -> None:
     """Refuse unknown names, and controllers and backends that do not exist for a robot and a task.
+
+    Hardware is a file that was asked for; without one the robot has to have its own.
 
     Raises:
         ConfigError: On the first wrong one.
@@ -173,7 +174,7 @@ def check_names(robot: str, task: str, controller: str, backend: str) -> None:
     if backend not in BACKENDS:
         raise UnknownNameError("backend", backend, BACKENDS)
     if backend == "hardware":
-        default_hardware(robot)
+        default_hardware(robot, hardware)
 
 
 def gains_note(robot: str, controller: str | None) -> str:
@@ -222,5 +223,6 @@ def default_guards(controller: str, backend: str, hardware: str = "") -> Guards:
         return system.guards
     if backend != "hardware":
         return NONE
-    seen = load_hardware(hardware).seen_from_outside
-    return Guards(estop=True, estimator=DEFAULT_ESTIMATOR if seen else None)
+    device = load_hardware(hardware)
+    estimator = default_estimator(load_robot(device.robot)) if device.seen_from_outside else None
+    return Guards(estop=True, estimator=estimator)

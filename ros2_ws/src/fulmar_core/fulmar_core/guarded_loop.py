@@ -30,7 +30,7 @@ class Refusal:
     """A goal that does not count."""
 
     stamp_ns: int = 0
-    reason: str = ""  # of the area or of the e-stop; empty if the newest goal counts
+    reason: str = ""  # of the area, of the e-stop or of its message; empty if the newest goal counts
 
 
 class Estop(Protocol):
@@ -59,7 +59,8 @@ class GuardedLoop:
         switch: The controller that acts, and its fallback.
         newest: The newest usable measurement since the activation.
         acted: Control steps with a command of the controller's own since the activation.
-        refusal: Why the newest goal does not count: it is out of bounds, or the e-stop refused it or took it away.
+        refusal: Why the newest goal does not count: it is invalid or out of bounds, or the e-stop refused it or took it
+            away.
     """
 
     def __init__(
@@ -179,6 +180,11 @@ class GuardedLoop:
             if self._settings.lockstep:
                 self._gate.forget()
         return ""
+
+    def refuse_goal(self, reason: str, stamp_ns: int) -> None:
+        """Report a goal whose message is invalid; the one before stays."""
+        with self._lock:
+            self.refusal = Refusal(stamp_ns, reason)
 
     def take_obstacles(self, discs: np.ndarray, stamp_ns: int) -> None:
         """Take all obstacles that there are, shape (m, 3), in place of those known so far."""

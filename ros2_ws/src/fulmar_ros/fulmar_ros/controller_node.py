@@ -212,8 +212,11 @@ class ControllerNode(LifecycleNode):
 
     def _on_goal(self, message: GoalMessage) -> None:
         targets, problem = goal_of(message, self._frames)
-        if targets is not None:
-            problem = self._guarded.take_goal(targets, stamp_ns(message.header.stamp), time.monotonic_ns())
+        stamp = stamp_ns(message.header.stamp)
+        if targets is None:
+            self._guarded.refuse_goal(problem, stamp)
+        else:
+            problem = self._guarded.take_goal(targets, stamp, time.monotonic_ns())
         if problem:
             self.get_logger().warning(f"goal refused: {problem}")
         self._publish_status()

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.table import Table
 
-from fulmar_bringup.console import log_line, output, print_json
+from fulmar_bringup.console import output, print_json
 from fulmar_bringup.progress import work_bar
 from fulmar_cli.commands.arguments import JsonOption, option
 from fulmar_core.errors import FAILED
@@ -30,6 +30,7 @@ def faults(
     Each fault has a system of its own, which runs in real time in MuJoCo with the shipped policy. The time to
     the safe state goes from the fault to the first applied state that is safe and stays so. Afterwards the bag is
     opened and compared with what an observer received. The exit code is 1 if a fault fails or cannot be injected.
+    Faults that do not apply to the robot or to this computer are listed with the reason.
 
     Try:
 
@@ -79,8 +80,11 @@ def _print(robot: str, results: list[FaultResult], skipped: list[Skipped]) -> No
             result.status,
         )
     output.print(table)
-    for fault in skipped:
-        log_line(f"skipped: {fault.name}: {fault.reason}")
+    if skipped:
+        left_out = Table("fault", "why", title=f"faults that do not apply to {robot} here")
+        for fault in skipped:
+            left_out.add_row(fault.name, fault.reason)
+        output.print(left_out)
 
 
 def _time_to_safe(result: FaultResult) -> str:

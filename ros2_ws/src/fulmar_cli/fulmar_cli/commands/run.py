@@ -17,6 +17,8 @@ RUN_TASK_HELP = (
     f"{cli.TASK_HELP} By default the goal decides: go_to_position for x,y, go_to_pose for x,y,deg and without a goal, "
     "and the task that takes the goals of --goals."
 )
+BACKEND_HELP = "mujoco, mock (Fulmar's own dynamics, perfect sensors) or hardware."
+DURATION_HELP = "Simulated seconds; the task's episode by default."
 GOAL_HELP = "Where to go, in space x,y,z[,roll,pitch,yaw]; drawn from the seed by default."
 START_HELP = "Where to begin, in space x,y,z[,roll,pitch,yaw]; drawn from the seed by default."
 GOALS_HELP = "Goals one after another, or a path to follow: a name from `fulmar list goals`, or a .yaml file."
@@ -43,9 +45,7 @@ def run(
     name: cli.NameOption = None,
     task: Annotated[str | None, option("T", RUN_TASK_HELP)] = None,
     controller: cli.ControllerOption = "policy",
-    backend: Annotated[
-        str, option("B", "mujoco, mock (Fulmar's own dynamics, perfect sensors) or hardware.")
-    ] = "mujoco",
+    backend: Annotated[str, option("B", BACKEND_HELP)] = "mujoco",
     hardware: cli.HardwareOption = None,
     emulate: cli.EmulateOption = False,
     arm: cli.ArmOption = False,
@@ -53,9 +53,7 @@ def run(
     goal: Annotated[str | None, option("x,y[,deg]", GOAL_HELP)] = None,
     goals: Annotated[str | None, option("NAME", GOALS_HELP)] = None,
     start: Annotated[str | None, option("x,y,deg", START_HELP)] = None,
-    duration: Annotated[
-        float | None, option("S", "Simulated seconds; the task's episode by default.", min=0.1)
-    ] = None,
+    duration: Annotated[float | None, option("S", DURATION_HELP, min=0.1)] = None,
     lockstep: Annotated[
         bool, flag("--lockstep", "As fast as possible; one seed gives the same bytes.")
     ] = False,
@@ -126,7 +124,9 @@ def run(
 
     use_calibration(calibration, robot)
     place = read_goal(goal)
-    task, note = task_of_run(task, robot, controller, backend, goal=place, goals=goals, policy=policy)
+    task, note = task_of_run(
+        task, robot, controller, backend, goal=place, goals=goals, policy=policy, hardware=hardware
+    )
     if note:
         log_line(note)
     guards = {

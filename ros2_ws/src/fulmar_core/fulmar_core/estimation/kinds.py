@@ -19,6 +19,8 @@ from fulmar_core.state import State
 from fulmar_core.topics import IMU, MOCAP, ODOMETRY, SENSOR_WIRES, Wire
 
 DEFAULT_KIND = "planar_motion"  # of a file that names none
+# Files of configs/estimators that make odometry of motion capture and inertial readings.
+DEFAULT_FILES: Mapping[type[State], str] = {PlanarState: "mocap_imu", SpatialState: "mocap_imu_3d"}
 
 
 @dataclass(frozen=True)
@@ -70,6 +72,11 @@ KINDS: dict[str, EstimatorKind] = {
         needs=("filterpy",),
     ),
 }
+
+
+def default_estimator(robot: Robot) -> str:
+    """Name of the file of a robot that names no estimator, by its state type."""
+    return DEFAULT_FILES[robot.state_type]
 
 
 def estimator_path(name: str) -> Path:

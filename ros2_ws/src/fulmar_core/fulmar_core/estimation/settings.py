@@ -68,7 +68,7 @@ class SpatialMotionSettings(EstimatorSettings):
     gyroscope_noise: float  # density of the same [rad/s/√Hz]
     acceleration_noise: float  # of the inertial unit, with what its mounting adds [m/s²/√Hz]
     manoeuvre: float  # acceleration that nobody measures, where there is no inertial unit [m/s²/√Hz]
-    spin: float  # how the attitude spreads where nobody measures the turn rate [rad/s/√Hz]
+    spin: float  # how fast the turn rate may change, where there is no inertial unit [rad/s²/√Hz]
     accelerometer_drift: float  # of its bias [m/s²/√s]
     gyroscope_drift: float  # of its bias [rad/s/√s]
     gate: float  # squared Mahalanobis distance of a pose beyond which it is an outlier; 6 degrees of freedom [-]

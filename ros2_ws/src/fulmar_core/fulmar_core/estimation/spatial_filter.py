@@ -8,7 +8,7 @@ the model is that of section 5 with the attitude's error in the body's frame; co
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -23,7 +23,8 @@ from fulmar_core.sensors.imu import ImuSample
 
 ERRORS = 15
 PLACE, VELOCITY, TURN, FORCE_BIAS, RATE_BIAS = (slice(i, i + 3) for i in range(0, ERRORS, 3))
-SPREAD_AT_START = (1.0, 1.0, 1.0, 0.05, 0.02)  # m, m/s, rad, m/s², rad/s
+SPREAD_AT_START = (1.0, 1.0, 1.0, 0.05, 1.0)  # m, m/s, rad, m/s², rad/s without an inertial reading
+RATE_BIAS_STD = 0.02  # of a gyroscope whose readings begin [rad/s]
 _POSE_ROWS = np.eye(ERRORS)[[0, 1, 2, 6, 7, 8]]
 _TURN_ROWS = np.eye(ERRORS)[TURN]
 
@@ -37,11 +38,17 @@ class Belief:
     quat_xyzw: np.ndarray  # (4,)
     force_bias: np.ndarray  # (3,) of the accelerometer [m/s²]
     rate_bias: np.ndarray  # (3,) of the gyroscope [rad/s]
-    rate: np.ndarray  # (3,) turn rate in the body, of the newest inertial reading [rad/s]
+    rate: np.ndarray  # (3,) turn rate in the body [rad/s]
+    measured: (
+        bool  # whether it comes from an inertial reading; else poses and attitudes correct it as they turn
+    )
 
 
 class SpatialFilter(ExtendedKalmanFilter, Filter):  # type: ignore[misc]
     """Position, velocity, attitude and biases; `x` holds their errors, which are zero between corrections.
+
+    A turn rate that comes from no inertial reading is off by the negative of the error in the place of the gyroscope's
+    bias, as one that does.
 
     Events: a pose, shape (7,); an `ImuSample`; an attitude with its covariance about the body's axes, shapes (4,) and
     (3, 3) [rad²].
@@ -52,7 +59,7 @@ class SpatialFilter(ExtendedKalmanFilter, Filter):  # type: ignore[misc]
         super().__init__(dim_x=ERRORS, dim_z=6)
         self._settings = settings
         zero = np.zeros(3)
-        self.belief = Belief(pose[:3], zero, _unit(pose[3:]), zero, zero, zero)
+        self.belief = Belief(pose[:3], zero, _unit(pose[3:]), zero, zero, zero, measured=False)
         self.x = np.zeros(ERRORS)
         spread = np.repeat(SPREAD_AT_START, 3)
         spread[PLACE], spread[TURN] = settings.position_std, settings.attitude_std
@@ -63,12 +70,13 @@ class SpatialFilter(ExtendedKalmanFilter, Filter):  # type: ignore[misc]
         """Predict by a reading of the inertial unit; see `Filter.move_on`."""
         if seconds <= 0.0:
             return
+        if inertial is not None:
+            self._begin_to_measure()
         t, s, now = seconds, self._settings, self.belief
         rate, force, noise = now.rate, np.zeros(3), s.manoeuvre
-        spin = s.spin
         if inertial is not None:
             rate, force = inertial.angular_velocity - now.rate_bias, inertial.specific_force - now.force_bias
-            noise, spin = s.acceleration_noise, s.gyroscope_noise
+            noise = s.acceleration_noise
         axes = rotate(now.quat_xyzw, np.eye(3)).T  # body to world
         push = axes @ force
         turned = exponential(tuple(t * rate))
@@ -78,9 +86,9 @@ class SpatialFilter(ExtendedKalmanFilter, Filter):  # type: ignore[misc]
             lever = -axes @ _skew(force)
             F[PLACE, TURN], F[VELOCITY, TURN] = 0.5 * t * t * lever, t * lever
             F[PLACE, FORCE_BIAS], F[VELOCITY, FORCE_BIAS] = -0.5 * t * t * axes, -t * axes
-            F[TURN, RATE_BIAS] = -t * np.eye(3)
+        F[TURN, RATE_BIAS] = -t * np.eye(3)
         F[TURN, TURN] = rotate(np.asarray(turned), np.eye(3))  # of the inverse rotation: rows are turned axes
-        self.F, self.Q = F, self._noise(t, noise, spin)
+        self.F, self.Q = F, self._noise(t, noise, measured=inertial is not None)
         self.belief = Belief(
             now.position + t * now.velocity + 0.5 * t * t * push,
             now.velocity + t * push,
@@ -88,6 +96,7 @@ class SpatialFilter(ExtendedKalmanFilter, Filter):  # type: ignore[misc]
             now.force_bias,
             now.rate_bias,
             rate,
+            measured=inertial is not None,
         )
         self.predict()
 
@@ -96,6 +105,8 @@ class SpatialFilter(ExtendedKalmanFilter, Filter):  # type: ignore[misc]
 
     def correct(self, kind: int, value: Any) -> None:
         """Correct by an event; an inertial reading has moved the filter to its time already."""
+        if kind == events.IMU:
+            self._begin_to_measure()
         now = self.belief
         if kind == events.IMU:
             self.belief = Belief(
@@ -105,6 +116,7 @@ class SpatialFilter(ExtendedKalmanFilter, Filter):  # type: ignore[misc]
                 now.force_bias,
                 now.rate_bias,
                 value.angular_velocity - now.rate_bias,
+                measured=True,
             )
             return
         residual, rows, noise = self._residual(kind, value)
@@ -145,23 +157,38 @@ class SpatialFilter(ExtendedKalmanFilter, Filter):  # type: ignore[misc]
             now.velocity + error[VELOCITY],
             np.asarray(normalised(turned)),
             now.force_bias + error[FORCE_BIAS],
-            now.rate_bias + error[RATE_BIAS],
+            now.rate_bias + error[RATE_BIAS] if now.measured else now.rate_bias,
             now.rate - error[RATE_BIAS],
+            now.measured,
         )
         G = np.eye(ERRORS)
         G[TURN, TURN] -= _skew(0.5 * error[TURN])
         self.P = G @ self.P @ G.T
         self.x = np.zeros(ERRORS)
 
-    def _noise(self, t: float, acceleration: float, spin: float) -> np.ndarray:
-        """What noise adds to the covariance in a time [s]."""
+    def _begin_to_measure(self) -> None:
+        """Know of a turn rate only the bias of its gyroscope from now on, where none was measured before."""
+        if self.belief.measured:
+            return
+        P = self.P.copy()
+        P[RATE_BIAS], P[:, RATE_BIAS] = 0.0, 0.0
+        P[RATE_BIAS, RATE_BIAS] = RATE_BIAS_STD**2 * np.eye(3)
+        self.belief, self.P = replace(self.belief, measured=True), P
+
+    def _noise(self, t: float, acceleration: float, *, measured: bool) -> np.ndarray:
+        """What noise adds to the covariance in a time [s]; `measured`: by an inertial reading."""
         Q, one, s = np.zeros((ERRORS, ERRORS)), np.eye(3), self._settings
         q = acceleration**2
         Q[PLACE, PLACE], Q[VELOCITY, VELOCITY] = q * t**3 / 3.0 * one, q * t * one
         Q[PLACE, VELOCITY] = Q[VELOCITY, PLACE] = q * t * t / 2.0 * one
-        Q[TURN, TURN] = spin**2 * t * one
         Q[FORCE_BIAS, FORCE_BIAS] = s.accelerometer_drift**2 * t * one
-        Q[RATE_BIAS, RATE_BIAS] = s.gyroscope_drift**2 * t * one
+        if measured:
+            Q[TURN, TURN] = s.gyroscope_noise**2 * t * one
+            Q[RATE_BIAS, RATE_BIAS] = s.gyroscope_drift**2 * t * one
+        else:
+            spin = s.spin**2
+            Q[TURN, TURN], Q[RATE_BIAS, RATE_BIAS] = spin * t**3 / 3.0 * one, spin * t * one
+            Q[TURN, RATE_BIAS] = Q[RATE_BIAS, TURN] = -spin * t * t / 2.0 * one
         return Q
 
 

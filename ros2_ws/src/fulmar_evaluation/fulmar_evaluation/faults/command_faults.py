@@ -59,7 +59,7 @@ def commands_from_another_node(live: LiveSystem) -> Outcome:
     node = rclpy.create_node("stranger", namespace=live.plan.namespace)
     over = threading.Event()
     try:
-        since_s = live.until_it_moves()
+        since_s = live.until_a_move_is_on_record()
         publisher = node.create_publisher(type(message), wire.name, publisher_qos(wire))
 
         def talk() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 from collections import deque
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,13 @@ from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
 from fulmar_bringup.planning import RunRequest, plan_run
-from fulmar_core.topics import COMMAND, MOCAP, ODOMETRY, VELOCITY_COMMAND, Wire
+from fulmar_core.estimation.kinds import default_estimator
+from fulmar_core.planar import PlanarState
+from fulmar_core.robot import Robot, load_robot
+from fulmar_core.spatial import SpatialState
+from fulmar_core.state import State
+from fulmar_core.tasks import Task, load_task
+from fulmar_core.topics import COMMAND, GOAL_POINT, GOAL_POSE, MOCAP, ODOMETRY, VELOCITY_COMMAND, Wire
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 from policy_server.controllers import shipped_policy
 
@@ -68,14 +74,28 @@ class FaultInjector:
 
 
 FAR_M = 6.0  # the robot is under way for seconds
-CORNERS_M = ((FAR_M, 0.0), (FAR_M, 1.0))  # where a node of goals sends it
+# So far away, as people write it; in space along every axis, and with another attitude [m, deg].
+GOALS: Mapping[type[State], tuple[float, ...]] = {
+    PlanarState: (FAR_M, 0.0, 0.0),
+    SpatialState: (4.0, 4.0, 2.0, 20.0, -30.0, 90.0),
+}
+CORNER_M = 1.0  # from there to the second place that a node of goals sends it to, along y
+ROOM_M = 2.0  # of an area beyond start and goal
+TASKS = (
+    "go_to_pose",
+    "go_to_pose_3d",
+    "go_to_position",
+    "go_to_position_3d",
+)  # the first with a shipped policy
 
 
 @dataclass(frozen=True)
 class FaultEnvironment:
     """What is unusual about a system; the usual one has an e-stop, and its odometry may be intercepted."""
 
-    guards: Mapping[str, Any] = field(default_factory=dict)  # beside the e-stop
+    estimated: bool = False  # odometry comes from the robot's default estimator
+    has_area: bool = False  # the robot must not leave the surroundings of start and goal
+    fallback: str | None = None  # classical controller behind the policy
     # The wire that passes through the injector; None: the robot's commands.
     intercepted: Wire | None = ODOMETRY
     answers_pass: bool = False  # the robot's commands, too, pass through an injector of their own
@@ -86,27 +106,57 @@ class FaultEnvironment:
     two_hosts: bool = False  # the controller is on another one
     bundle: Callable[[Path], None] | None = None  # what is done to the bundle before the start
 
+    def guards_of(self, robot: Robot) -> dict[str, Any]:
+        """What replaces guards of the system, by name."""
+        return {
+            "estop": True,
+            **({"estimator": default_estimator(robot)} if self.estimated else {}),
+            **({"fallback": self.fallback} if self.fallback else {}),
+            **({"area": area_of(robot)} if self.has_area else {}),
+        }
+
 
 USUAL = FaultEnvironment()
 
 
-def request_of(robot: str, record: Path, about: FaultEnvironment = USUAL) -> RunRequest:
+def task_of(robot: Robot) -> Task:
+    """What a robot does when a fault comes: the first of `TASKS` in its world that a policy is shipped for."""
+    fitting = [task for task in map(load_task, TASKS) if task.state_type is robot.state_type]
+    return next((task for task in fitting if shipped_policy(robot.name, task.name)), fitting[0])
+
+
+def goal_of(robot: Robot) -> tuple[float, ...]:
+    """Where it goes, as people write it [m, deg]."""
+    return GOALS[robot.state_type]
+
+
+def area_of(robot: Robot) -> tuple[float, ...]:
+    """The surroundings of start and goal: two sides for each axis [m]."""
+    goal = goal_of(robot)[: robot.state_type.AXES]
+    return tuple(side for far in goal for side in (-ROOM_M, far + ROOM_M))
+
+
+def request_of(name: str, record: Path, about: FaultEnvironment = USUAL) -> RunRequest:
     """A robot that has far to go, with an e-stop.
 
     Args:
-        robot: Its name.
+        name: The robot's.
         record: Folder of the bag; files that are needed are made beside it.
         about: What is unusual.
+
+    Raises:
+        FulmarError: The robot has no policy to run.
     """
-    task = "go_to_pose" if shipped_policy(robot, "go_to_pose") else "go_to_position"
+    robot = load_robot(name)
+    task = task_of(robot)
     request = plan_run(
-        robot=robot,
-        task=task,
+        robot=name,
+        task=task.name,
         controller="policy",
         backend="hardware" if about.emulated else "mujoco",
         policy=None,
-        goal=None if about.by_goal_node else (FAR_M, 0.0, 0.0),
-        start=(0.0, 0.0, 0.0),
+        goal=None if about.by_goal_node else goal_of(robot),
+        start=(0.0,) * robot.state_type.AXES,
         duration_s=None,
         lockstep=False,
         rate=1.0,
@@ -115,17 +165,21 @@ def request_of(robot: str, record: Path, about: FaultEnvironment = USUAL) -> Run
         seed=0,
         record=record,
         command="fulmar faults",
-        goals=_goals_file(record.parent, task) if about.by_goal_node else None,
+        goals=_goals_file(record.parent, robot, task) if about.by_goal_node else None,
         emulate=about.emulated,
-        guards={"estop": True, **about.guards},
+        guards=about.guards_of(robot),
     )
-    policy = _harmed_bundle(robot, task, record.parent, about.bundle) if about.bundle else request.plan.policy
+    policy = (
+        _harmed_bundle(name, task.name, record.parent, about.bundle) if about.bundle else request.plan.policy
+    )
     return replace(request, plan=replace(request.plan, duration_s=0.0, policy=policy))
 
 
-def _goals_file(folder: Path, task: str) -> str:
-    kind = {"go_to_pose": "poses", "go_to_position": "positions"}[task]
-    places = [[*corner, 0.0] if kind == "poses" else list(corner) for corner in CORNERS_M]
+def _goals_file(folder: Path, robot: Robot, task: Task) -> str:
+    kind = {GOAL_POSE.name: "poses", GOAL_POINT.name: "positions"}[task.goal_topic]
+    far = list(goal_of(robot))
+    corner = [far[0], far[1] + CORNER_M, *far[2:]]
+    places = [place if kind == "poses" else place[: robot.state_type.AXES] for place in (far, corner)]
     path = folder / "goals.yaml"
     path.write_text(yaml.safe_dump({"kind": kind, "title": "far away", kind: places}))
     return str(path)

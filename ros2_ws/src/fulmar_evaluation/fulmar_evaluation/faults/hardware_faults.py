@@ -14,7 +14,7 @@ from fulmar_core.robot import Robot
 from fulmar_core.safety.arbiter import BEARING_OFF
 from fulmar_core.topics import AIR_BEARING, TRUTH
 from fulmar_evaluation.faults.fault import Fault, Outcome
-from fulmar_evaluation.faults.fault_environment import FAR_M, FaultEnvironment
+from fulmar_evaluation.faults.fault_environment import FaultEnvironment, goal_of
 from fulmar_evaluation.faults.live_system import LiveSystem
 from fulmar_evaluation.faults.observer import wait_for
 from fulmar_evaluation.faults.process_faults import signalled
@@ -32,13 +32,14 @@ def bearing_late(live: LiveSystem) -> Outcome:
     """Air comes 3 s after the start: no valve opens before it, and the goal is reached afterwards."""
     air: list[tuple[float, bool]] = []
     distance: list[float] = [math.inf]
+    goal = goal_of(live.robot)[: live.robot.state_type.AXES]
 
     def on_air(message: Bool) -> None:
         air.append((time.monotonic(), bool(message.data)))
 
     def on_truth(message: Odometry) -> None:
         place = message.pose.pose.position
-        distance[0] = math.hypot(place.x - FAR_M, place.y)
+        distance[0] = math.dist((place.x, place.y, place.z)[: len(goal)], goal)
 
     subscribe, observer = live.bystander.create_subscription, live.observer
     subscribe(Bool, AIR_BEARING.name, on_air, subscriber_qos(AIR_BEARING))

@@ -25,14 +25,22 @@ EPOCH_S = 6.0  # in which it is seen whether a robot goes on
 BACK_NS = 1_000_000  # so little, with each message, that it is no jump of time
 
 
-def _intercept(live: LiveSystem, change: Injection, detection_s: float) -> Outcome:
-    """Change every message from now on; the controller commands what is safe with its next beat."""
+def intercept(live: LiveSystem, change: Injection, detection_s: float) -> Outcome:
+    """Change every message from now on; the controller commands what is safe with its next beat.
+
+    Args:
+        live: The system.
+        change: What is done to each message.
+        detection_s: The longest time until the controller notices [s].
+    """
     since_s = live.until_it_moves()
     live.injector.change = change
     return stopped(live, since_s, detection_s + live.corrected_s)
 
 
-def _changed(change: Callable[[Any], None]) -> Injection:
+def changing(change: Callable[[Any], None]) -> Injection:
+    """Pass every message on after a change in place."""
+
     def changed(message: Any) -> Any:
         change(message)
         return message
@@ -42,7 +50,7 @@ def _changed(change: Callable[[Any], None]) -> Injection:
 
 def odometry_silent(live: LiveSystem) -> Outcome:
     """Nothing comes any more."""
-    return _intercept(live, lost, live.watchdog_s)
+    return intercept(live, lost, live.watchdog_s)
 
 
 def odometry_frozen(live: LiveSystem) -> Outcome:
@@ -55,7 +63,7 @@ def odometry_frozen(live: LiveSystem) -> Outcome:
         frozen.header.stamp = message.header.stamp
         return frozen
 
-    return _intercept(live, change, (FROZEN_AFTER + 1) * live.tick_s)
+    return intercept(live, change, (FROZEN_AFTER + 1) * live.tick_s)
 
 
 def odometry_not_a_number(live: LiveSystem) -> Outcome:
@@ -64,7 +72,7 @@ def odometry_not_a_number(live: LiveSystem) -> Outcome:
     def change(message: Odometry) -> None:
         message.twist.twist.linear.x = math.nan
 
-    return _intercept(live, _changed(change), live.tick_s)
+    return intercept(live, changing(change), live.tick_s)
 
 
 def odometry_in_a_wrong_frame(live: LiveSystem) -> Outcome:
@@ -73,16 +81,18 @@ def odometry_in_a_wrong_frame(live: LiveSystem) -> Outcome:
     def change(message: Odometry) -> None:
         message.header.frame_id = "map"
 
-    return _intercept(live, _changed(change), live.tick_s)
+    return intercept(live, changing(change), live.tick_s)
 
 
 def odometry_with_a_wrong_quaternion(live: LiveSystem) -> Outcome:
-    """The quaternion has no unit length."""
+    """The quaternion has twice the unit length."""
 
     def change(message: Odometry) -> None:
-        message.pose.pose.orientation.w += 1.0
+        attitude = message.pose.pose.orientation
+        for part in "xyzw":
+            setattr(attitude, part, 2.0 * getattr(attitude, part))
 
-    return _intercept(live, _changed(change), live.tick_s)
+    return intercept(live, changing(change), live.tick_s)
 
 
 def odometry_out_of_order(live: LiveSystem) -> Outcome:
@@ -93,7 +103,7 @@ def odometry_out_of_order(live: LiveSystem) -> Outcome:
         first.append(stamp_ns(message.header.stamp))
         message.header.stamp = stamp_of(first[0] - BACK_NS * len(first))
 
-    return _intercept(live, _changed(change), live.tick_s)
+    return intercept(live, changing(change), live.tick_s)
 
 
 def odometry_late(live: LiveSystem) -> Outcome:
@@ -103,7 +113,7 @@ def odometry_late(live: LiveSystem) -> Outcome:
     """
     limit_s = live.watchdog_s + live.corrected_s
     late_s = limit_s + STAYS_S + MARGIN_S
-    return _intercept(live, delayed(round(late_s / live.tick_s)), live.watchdog_s)
+    return intercept(live, delayed(round(late_s / live.tick_s)), live.watchdog_s)
 
 
 def odometry_dated_back(live: LiveSystem) -> Outcome:
@@ -151,7 +161,7 @@ def _stamped(by_ns: int) -> Injection:
     def change(message: Any) -> None:
         message.header.stamp = stamp_of(stamp_ns(message.header.stamp) + by_ns)
 
-    return _changed(change)
+    return changing(change)
 
 
 def _epoch(live: LiveSystem, since_s: float) -> tuple[str, str]:

@@ -39,6 +39,7 @@ from fulmar_evaluation.faults.two_hosts import TwoHosts
 from fulmar_ros.runtime import spinning
 
 MOVING_S = 20.0  # a robot that has far to go moves by then
+RECORD_S = 1.0  # and the next state that moves it comes
 
 
 class NothingShown(RunFailed):
@@ -127,6 +128,19 @@ class LiveSystem:
         if not wait_for(self.observer.moves, MOVING_S):
             raise NothingShown(f"the robot did not move within {MOVING_S:g} s; the fault would show nothing")
         return time.monotonic()
+
+    def until_a_move_is_on_record(self) -> float:
+        """As `until_it_moves`, and a state that moves the robot comes after that time.
+
+        For faults whose very next tick may be safe. The time is at most two ticks ago.
+
+        Raises:
+            NothingShown: As of `until_it_moves`.
+        """
+        since_s = self.until_it_moves()
+        if not wait_for(lambda: any(moves for _, moves in self.observer.applied_since(since_s)), RECORD_S):
+            raise NothingShown("the robot stopped by itself before the fault; the fault would show nothing")
+        return since_s
 
     def send(self, name: str, number: signal.Signals) -> None:
         """Send a signal to a node."""

@@ -14,7 +14,7 @@ from std_msgs.msg import Bool
 from fulmar_core.errors import RunFailed
 from fulmar_core.teleop import JoyLayout
 from fulmar_core.topics import ESTOP, JOY
-from fulmar_evaluation.faults.fault import STAYS_S, Fault, Outcome, stopped
+from fulmar_evaluation.faults.fault import Fault, Outcome, stopped
 from fulmar_evaluation.faults.fault_environment import FaultEnvironment
 from fulmar_evaluation.faults.live_system import LiveSystem
 from fulmar_evaluation.faults.observer import wait_for
@@ -33,9 +33,7 @@ def estop_pressed_once_by_a_volatile_publisher(live: LiveSystem) -> Outcome:
         # A volatile publisher matches one of the two subscriptions of each node.
         if not wait_for(lambda: publisher.get_subscription_count() >= NODES, MATCH_S):
             raise RunFailed(f"fewer than {NODES} nodes subscribe {publisher.topic_name} within {MATCH_S:g} s")
-        since_s = live.until_it_moves()
-        # The very next tick may be safe: a state that still moves the robot must be on record, at most two ticks old.
-        wait_for(lambda: any(moves for _, moves in live.observer.applied_since(since_s)), STAYS_S)
+        since_s = live.until_a_move_is_on_record()
         publisher.publish(Bool(data=True))
         return stopped(live, since_s, live.silenced_s)
     finally:

@@ -91,7 +91,7 @@ def bundle_refused_with_fallback(live: LiveSystem) -> Outcome:
 
 POLICY_FAULTS = (
     Fault(bundle_refused, FaultEnvironment(bundle=flip_a_byte), begins=False),
-    Fault(bundle_refused_with_fallback, FaultEnvironment({"fallback": "classical"}, bundle=flip_a_byte)),
+    Fault(bundle_refused_with_fallback, FaultEnvironment(fallback="classical", bundle=flip_a_byte)),
     Fault(swap_to_the_same_policy),
     Fault(swap_to_a_wrong_hash),
     Fault(swap_to_another_robot),

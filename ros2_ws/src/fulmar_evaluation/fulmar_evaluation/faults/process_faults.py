@@ -9,8 +9,7 @@ from collections.abc import Callable
 
 import psutil
 
-from fulmar_bringup.system import DEFAULT_ESTIMATOR
-from fulmar_core.estimation.kinds import load_estimator
+from fulmar_core.estimation.kinds import default_estimator, load_estimator
 from fulmar_core.safety.estop import TIMEOUT_NS
 from fulmar_core.topics import MOCAP
 from fulmar_evaluation.faults.fault import STAYS_S, WORDS_S, Fault, Outcome, stopped, went_on
@@ -55,7 +54,7 @@ def estimator_hangs(live: LiveSystem) -> Outcome:
 
 def mocap_lost(live: LiveSystem) -> Outcome:
     """No pose comes any more: the estimator bridges a gap of moments, and then says what it lacks."""
-    bridge_s = load_estimator(DEFAULT_ESTIMATOR).bridge_s
+    bridge_s = load_estimator(default_estimator(live.robot)).bridge_s
     since_s = live.until_it_moves()
     live.injector.change = lost
     return stopped(live, since_s, bridge_s + live.watchdog_s + live.corrected_s)
@@ -172,11 +171,10 @@ PLAIN: tuple[Callable[[LiveSystem], Outcome], ...] = (
     recorder_hangs,
     disk_full,
 )
-ESTIMATED = {"estimator": DEFAULT_ESTIMATOR}
 PROCESS_FAULTS = (
     *map(Fault, PLAIN),
     Fault(goals_killed, FaultEnvironment(by_goal_node=True)),
-    Fault(estimator_killed, FaultEnvironment(ESTIMATED)),
-    Fault(estimator_hangs, FaultEnvironment(ESTIMATED)),
-    Fault(mocap_lost, FaultEnvironment(ESTIMATED, intercepted=MOCAP)),
+    Fault(estimator_killed, FaultEnvironment(estimated=True)),
+    Fault(estimator_hangs, FaultEnvironment(estimated=True)),
+    Fault(mocap_lost, FaultEnvironment(estimated=True, intercepted=MOCAP)),
 )

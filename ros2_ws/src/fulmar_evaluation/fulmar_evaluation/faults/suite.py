@@ -18,6 +18,7 @@ from fulmar_evaluation.faults.fault import Fault, FaultResult, Outcome
 from fulmar_evaluation.faults.fault_environment import request_of
 from fulmar_evaluation.faults.hardware_faults import HARDWARE_FAULTS
 from fulmar_evaluation.faults.input_faults import INPUT_FAULTS
+from fulmar_evaluation.faults.limit_faults import LIMIT_FAULTS
 from fulmar_evaluation.faults.live_system import NothingShown, live_system
 from fulmar_evaluation.faults.observer import BagEvidence, bag_evidence
 from fulmar_evaluation.faults.operator_faults import OPERATOR_FAULTS
@@ -30,6 +31,7 @@ EVERY = (
     *OPERATOR_FAULTS,
     *HARDWARE_FAULTS,
     *INPUT_FAULTS,
+    *LIMIT_FAULTS,
     *COMMAND_FAULTS,
     *POLICY_FAULTS,
     *CABLE_FAULTS,
@@ -81,7 +83,7 @@ def modules_for(robot: str, faults: list[Fault]) -> tuple[str, ...]:
     needed: dict[str, None] = {}
     for about in (fault.about for fault in faults):
         backend, hardware = ("hardware", default_hardware(robot)) if about.emulated else ("mujoco", "")
-        guards = Guards(**about.guards)
+        guards = Guards(**about.guards_of(load_robot(robot)))
         modules = modules_of("policy", backend, guards=guards, hardware=hardware, emulated=about.emulated)
         needed |= dict.fromkeys(modules)
     return tuple(needed)

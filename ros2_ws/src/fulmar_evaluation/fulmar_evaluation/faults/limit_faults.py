@@ -1,0 +1,161 @@
+"""Motion that a robot cannot have, places beyond its area and its geofence, and goals that it must not take."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import rclpy
+from nav_msgs.msg import Odometry
+
+from fulmar_core.errors import RunFailed
+from fulmar_core.goal import goal_at
+from fulmar_core.robot import Robot
+from fulmar_core.safety.geofence import is_inside
+from fulmar_core.spatial import SpatialState
+from fulmar_core.topics import GOAL_POSE, GOAL_WIRES, SIMULATION_START_NS
+from fulmar_evaluation.faults.fault import STAYS_S, WORDS_S, Fault, Outcome, stopped, went_on
+from fulmar_evaluation.faults.fault_environment import ROOM_M, FaultEnvironment, goal_of, task_of
+from fulmar_evaluation.faults.input_faults import changing, intercept
+from fulmar_evaluation.faults.live_system import LiveSystem
+from fulmar_evaluation.faults.observer import wait_for
+from fulmar_ros.goal_messages import TYPES, goal_message
+from fulmar_ros.qos import publisher_qos
+
+TOO_MUCH = 2.0  # times the limit
+OF_EACH = 0.8  # of the limit, about each of three axes: together 1.39 of it
+STEP_M = 0.1  # from message to message: no jump
+CARRIED_S = 15.0  # by then it is beyond any geofence
+MATCH_S = 10.0
+
+
+def odometry_too_fast(live: LiveSystem) -> Outcome:
+    """Twice the speed that the robot can have."""
+
+    def change(message: Odometry) -> None:
+        message.twist.twist.linear.x = TOO_MUCH * live.robot.limits.speed
+
+    return _because(intercept(live, changing(change), live.tick_s), "beyond the possible")
+
+
+def odometry_turns_too_fast(live: LiveSystem) -> Outcome:
+    """A turn rate that the robot cannot have; in space the rate about each axis alone is within the limit."""
+    limit, in_space = live.robot.limits.yaw_rate, live.robot.state_type is SpatialState
+
+    def change(message: Odometry) -> None:
+        rate = message.twist.twist.angular
+        if in_space:
+            rate.x = rate.y = rate.z = OF_EACH * limit
+        else:
+            rate.z = TOO_MUCH * limit
+
+    return _because(intercept(live, changing(change), live.tick_s), "beyond the possible")
+
+
+def odometry_leaves_the_area(live: LiveSystem) -> Outcome:
+    """The robot is carried out of its area, without a jump: along y in the plane, along z in space."""
+    area = live.plan.guards.area
+    return _because(_carried_off(live, lambda place: not is_inside(place, area)), "outside its area")
+
+
+def odometry_leaves_the_geofence(live: LiveSystem) -> Outcome:
+    """The same, until it is too far from its goal."""
+    goal, radius = goal_of(live.robot)[: live.robot.state_type.AXES], live.robot.limits.geofence
+    outcome = _carried_off(live, lambda place: math.dist(place, goal) > radius)
+    return _because(outcome, "beyond the geofence")
+
+
+def _carried_off(live: LiveSystem, is_beyond: Callable[[list[float]], bool]) -> Outcome:
+    axes = "xyz"[: live.robot.state_type.AXES]
+    way_m, beyond_s = [0.0], list[float]()
+
+    def change(message: Odometry) -> None:
+        place = message.pose.pose.position
+        way_m[0] += STEP_M
+        setattr(place, axes[-1], getattr(place, axes[-1]) - way_m[0])
+        if not beyond_s and is_beyond([getattr(place, axis) for axis in axes]):
+            beyond_s.append(time.monotonic())
+
+    live.until_it_moves()
+    live.injector.change = changing(change)
+    if not wait_for(lambda: bool(beyond_s), CARRIED_S):
+        raise RunFailed(f"the robot was not carried beyond its limit within {CARRIED_S:g} s")
+    return stopped(live, beyond_s[0], live.tick_s + live.corrected_s)
+
+
+def _because(outcome: Outcome, words: str) -> Outcome:
+    """Fail where it was stopped for another reason."""
+    return replace(outcome, passed=outcome.passed and words in outcome.reaction)
+
+
+def goal_with_a_wrong_quaternion(live: LiveSystem) -> Outcome:
+    """A goal whose quaternion has twice the unit length."""
+
+    def change(message: Any) -> None:
+        attitude = message.pose.orientation
+        for part in "xyzw":
+            setattr(attitude, part, TOO_MUCH * getattr(attitude, part))
+
+    return _offer_goal(live, list(goal_of(live.robot)), change, "quaternion")
+
+
+def goal_outside_the_area(live: LiveSystem) -> Outcome:
+    """A goal beyond the area: along y in the plane, along z in space."""
+    axes, place = live.robot.state_type.AXES, list(goal_of(live.robot))
+    place[axes - 1] += TOO_MUCH * ROOM_M
+    return _offer_goal(live, place, lambda _message: None, "outside the area")
+
+
+def _offer_goal(live: LiveSystem, numbers: list[float], change: Callable[[Any], None], words: str) -> Outcome:
+    """Another node publishes a goal: it is rejected with the reason, and the robot goes on to the one before."""
+    wire, form = GOAL_WIRES[task_of(live.robot).goal_topic], live.robot.state_type
+    goal = goal_at(form.target_at(numbers).tolist())
+    message = goal_message(goal, wire.name, SIMULATION_START_NS + 1, live.plan.frames, form=form)
+    change(message)
+    node = rclpy.create_node("stranger", namespace=live.plan.namespace)
+    try:
+        publisher = node.create_publisher(TYPES[wire.name], wire.name, publisher_qos(wire))
+        wait_for(lambda: publisher.get_subscription_count() > 0, MATCH_S)
+        since_s = live.until_it_moves()
+        publisher.publish(message)
+        wait_for(lambda: bool(_refusal(live, since_s)), WORDS_S)
+        time.sleep(STAYS_S)
+    finally:
+        node.destroy_node()
+    reaction = _refusal(live, since_s)
+    return went_on(
+        live,
+        since_s,
+        detected_by="controller" if reaction else "",
+        reaction=reaction,
+        correct=words in reaction,
+    )
+
+
+def _refusal(live: LiveSystem, since_s: float) -> str:
+    """Why the controller refused the newest goal, as it has reported since then; empty if it did not."""
+    statuses = [status for status in live.observer.statuses_since(since_s) if status.who == "controller"]
+    return next(
+        (text for status in reversed(statuses) if (text := status.values.get("goal_refused", ""))), ""
+    )
+
+
+def _without_attitude(robot: Robot) -> str:
+    task = task_of(robot)
+    if task.goal_topic == GOAL_POSE.name:
+        return ""
+    return f"its policy does '{task.name}', whose goals have no attitude"
+
+
+IN_AN_AREA = FaultEnvironment(has_area=True)
+LIMIT_FAULTS = (
+    Fault(odometry_too_fast),
+    Fault(odometry_turns_too_fast),
+    Fault(odometry_leaves_the_area, IN_AN_AREA),
+    Fault(odometry_leaves_the_geofence),
+    Fault(goal_with_a_wrong_quaternion, why_not=_without_attitude),
+    Fault(goal_outside_the_area, IN_AN_AREA),
+)

@@ -1,0 +1,95 @@
+"""Which faults apply to which robots, by what the robots have."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from fulmar_core.paths import config_names
+from fulmar_core.planar import PlanarState
+from fulmar_core.robot import load_robot
+from fulmar_core.safety.geofence import is_inside
+from fulmar_core.spatial import SpatialState
+from fulmar_evaluation.faults import command_faults
+from fulmar_evaluation.faults.fault import possible
+from fulmar_evaluation.faults.fault_environment import USUAL, FaultEnvironment, area_of, goal_of, task_of
+from fulmar_evaluation.faults.suite import EVERY, faults_of, modules_for
+
+DOCUMENT = Path(__file__).parents[2] / "docs" / "safety.md"
+ROBOTS = config_names("robots")
+IN_SPACE = [name for name in ROBOTS if load_robot(name).state_type is SpatialState]
+MOST_LEFT_OUT = 4
+
+
+@pytest.fixture(autouse=True)
+def two_hosts_are_possible(monkeypatch) -> None:
+    monkeypatch.setattr(command_faults, "why_not", lambda: "")
+
+
+def left_out(robot: str) -> dict[str, str]:
+    return {fault.name: fault.reason for fault in faults_of(robot)[1]}
+
+
+@pytest.mark.parametrize("robot", IN_SPACE)
+def test_at_most_four_faults_do_not_apply_in_space_and_each_has_a_reason(robot: str):
+    reasons = left_out(robot)
+    assert len(reasons) <= MOST_LEFT_OUT
+    assert all(reasons.values())
+
+
+def test_a_spacecraft_has_every_fault_of_the_platform_but_that_of_its_air_bearing():
+    assert set(left_out("spacecraft_16")) == {"driver_killed", "driver_hangs", "bearing_late"}
+    platform = {fault.name for fault in faults_of("floating_platform")[0]}
+    spacecraft = {fault.name for fault in faults_of("spacecraft_16")[0]}
+    assert platform - spacecraft == {"bearing_late"}
+
+
+def test_what_applies_follows_from_what_a_robot_has_not_from_its_name():
+    platform = load_robot("floating_platform")
+    (late,) = (fault for fault in EVERY if fault.name == "bearing_late")
+    assert not late.why_not(platform)
+    assert late.why_not(replace(platform, air_bearing=False))
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_every_robot_has_a_task_and_a_goal_of_its_own_world_within_its_geofence_and_its_area(robot: str):
+    the_robot = load_robot(robot)
+    form = the_robot.state_type
+    assert task_of(the_robot).state_type is form
+    target = form.target_at(goal_of(the_robot))
+    assert form.resting(target[None]).distance_to(0.0 * target) < the_robot.limits.geofence
+    area = area_of(the_robot)
+    assert len(area) == 2 * form.AXES
+    assert is_inside(goal_of(the_robot)[: form.AXES], area)
+    assert is_inside((0.0,) * form.AXES, area)
+
+
+@pytest.mark.parametrize(
+    ("robot", "form", "estimator"),
+    [("floating_platform", PlanarState, "mocap_imu"), ("spacecraft_16", SpatialState, "mocap_imu_3d")],
+)
+def test_an_estimator_of_the_robots_own_world_runs_where_a_fault_needs_one(robot, form, estimator):
+    the_robot = load_robot(robot)
+    assert the_robot.state_type is form
+    assert FaultEnvironment(estimated=True).guards_of(the_robot)["estimator"] == estimator
+    assert USUAL.guards_of(the_robot) == {"estop": True}
+    assert "filterpy" in modules_for(robot, faults_of(robot)[0])
+
+
+def test_the_document_lists_every_fault_and_those_that_may_not_apply():
+    text = DOCUMENT.read_text()
+    section = text[text.index("## Fault suite") :]
+    assert [fault.name for fault in EVERY if f"`{fault.name}`" not in section] == []
+    table = section[section.index("| Does not apply |") :]
+    rows = re.findall(r"^\| (`[^|]+) \|", table[: table.index("\n\n")], re.MULTILINE)
+    listed = {name for row in rows for name in re.findall(r"`(\w+)`", row)}
+    assert listed == {fault.name for fault in EVERY if fault.why_not is not possible}
+
+    for robot in re.findall(r"`(\w+)`", table.split("\n")[0]):
+        column = [cell.strip(" `") for cell in table.split("\n")[0].split("|")].index(robot)
+        cells = [line.split("|") for line in table[: table.index("\n\n")].split("\n")[2:]]
+        said = {name for row in cells if row[column].strip() for name in re.findall(r"`(\w+)`", row[1])}
+        assert said == set(left_out(robot)), robot
