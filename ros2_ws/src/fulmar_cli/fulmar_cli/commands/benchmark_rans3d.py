@@ -83,8 +83,7 @@ def rans3d(
 
     def name_of(unit: Unit) -> str:
         plan = unit.trial.plan
-        task = display_name(plan.task).lower()
-        return f"{display_name(plan.robot)}, {task}, {plan.controller}, {plan.scenario}"
+        return f"{display_name(plan.robot)}, {display_name(plan.task)}, {plan.controller}, {plan.scenario}"
 
     run_campaign(
         run_rans3d, request, name_of=name_of, print_tables=print_tables, check=check, as_json=as_json,
