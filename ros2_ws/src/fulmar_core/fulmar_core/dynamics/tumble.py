@@ -108,7 +108,7 @@ def drift_over(
         time_s += stretch
         now = state.in_float64()
         away = np.linalg.norm(np.array(now.rate) - jacobi_rate(first.rate, time_s)) / RATE
-        found = np.maximum(found, (*drifts(first, now, exact), away))
+        found = np.maximum(found, np.array((*drifts(first, now, exact), float(away))))
         progress(time_s)
     return Drift(*(float(value) for value in found))
 
