@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated, Any
 
-from rich.table import Table
-
 from fulmar_bringup.console import console, output, print_result
 from fulmar_bringup.progress import step_bar
 from fulmar_cli.commands.arguments import JsonOption, ScenarioOption, option
@@ -66,6 +64,7 @@ def throughput(
     require("mujoco", *([] if library == "numpy" else ["torch"]))
     _check_machine(device, library, worlds, cores)
     from fulmar_benchmarks.throughput import Library, measure
+    from fulmar_benchmarks.throughput_table import print_table
 
     with step_bar("measuring", len(pairs) * ROUNDS) as progress:
         done = iter(range(1, len(pairs) * ROUNDS + 1))
@@ -88,7 +87,7 @@ def throughput(
         "scenario": scenario,
         "cores": cores,
     }
-    print_result(figures, _print, as_json=as_json)
+    print_result(figures, lambda figures: print_table(figures, output), as_json=as_json)
 
 
 def _pairs(names: Sequence[str], task: str | None, *, named: bool) -> list[tuple[Robot, Task]]:
@@ -138,44 +137,3 @@ def _check_machine(device: str, library: str, worlds: int, cores: int) -> None:
 
     if not torch.cuda.is_available():
         raise ConfigError("--device cuda: torch sees no graphics card here.")
-
-
-def _print(figures: dict[str, Any]) -> None:
-    table = Table(
-        title=f"steps/s · {figures['worlds']:,} worlds · {figures['task']} · {figures['scenario']} · "
-        f"{figures['library']} on {figures['device']} · {figures['cores']} cores"
-    )
-    table.add_column("robot")
-    for column in ("batch", "MuJoCo", "ratio", "otherwise", "ratio then"):
-        table.add_column(column, justify="right")
-    for name, found in figures["robots"].items():
-        table.add_row(
-            name,
-            f"{found['batch_steps_per_s']:,.0f}",
-            f"{found['mujoco_steps_per_s']:,.0f}",
-            f"{found['ratio']:.1f}",
-            *_otherwise(found),
-        )
-    output.print(table)
-    for line in dict.fromkeys(
-        f"MuJoCo of {', '.join(n for n, f in figures['robots'].items() if _method(f) == _method(found))}: "
-        f"{_method(found)}"
-        for found in figures["robots"].values()
-    ):
-        output.print(line, markup=False, soft_wrap=True)
-
-
-def _method(found: dict[str, Any]) -> str:
-    """How MuJoCo integrates a robot."""
-    return f"{found['mujoco_integrator']}, steps of {found['mujoco_step_s']:g} s"
-
-
-def _otherwise(found: dict[str, Any]) -> tuple[str, ...]:
-    """Figures of robots on water and in space; none for others."""
-    for pace, ratio, how in (
-        ("mujoco_with_water_steps_per_s", "ratio_with_water", "in water"),
-        ("mujoco_euler_steps_per_s", "ratio_with_euler", "Euler"),
-    ):
-        if ratio in found:
-            return f"{how} {found[pace]:,.0f}", f"{found[ratio]:.1f}"
-    return ()
