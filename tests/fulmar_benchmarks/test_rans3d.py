@@ -102,7 +102,7 @@ def test_what_was_evaluated_before_is_taken_from_the_folder_and_drawn(evaluated,
     assert "Go to pose 3-D" in again.stdout
     assert "there is no bundle spacecraft_16_go_to_pose_3d" in again.stdout
     assert (folder / "index.html").is_file()
-    assert (folder / "pictures" / "spacecraft_16_over_time.png").is_file()
+    assert (folder / "pictures" / "spacecraft_16_over_time.png").is_file()  # word: folder of reports
 
 
 def test_a_check_with_a_missing_bundle_ends_with_one(evaluated, folder):
