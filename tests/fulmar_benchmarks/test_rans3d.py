@@ -79,6 +79,14 @@ def test_the_integrator_is_named_with_its_order_steps_and_drifts_in_both_precisi
     assert set(craft["float64"]) == {"energy", "momentum", "from_jacobi"}
 
 
+def test_mujoco_keeps_the_tumble_by_runge_kutta_as_we_do_and_not_by_euler(evaluated):
+    found = json.loads(evaluated.stdout)["integrator"]
+    ours, theirs = found["robots"]["spacecraft_16"], found["mujoco"]
+    assert theirs["step_s"] == ours["step_s"]
+    assert theirs["RK4"]["from_jacobi"] == pytest.approx(ours["float64"]["from_jacobi"], rel=0.1)
+    assert theirs["Euler"]["energy"] > 1e-3
+
+
 def test_requirements_count_what_was_measured(evaluated):
     document = json.loads(evaluated.stdout)
     lines = {line["name"]: line for line in document["requirements"]}

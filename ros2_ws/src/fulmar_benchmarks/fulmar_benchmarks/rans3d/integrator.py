@@ -11,6 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from fulmar_benchmarks.mujoco_pace import INTEGRATORS
+from fulmar_benchmarks.rans3d.mujoco_tumble import MOST_S, mujoco_drift
 from fulmar_benchmarks.workers import begin_worker, counted, ended_with_us, one_thread_each
 from fulmar_core.dynamics.tumble import AXIS, MOMENTS, RATE, Drift, drift_over, measured_order
 from fulmar_core.robot import Robot
@@ -32,7 +34,8 @@ def measure_integrator(
 
     Returns:
         JSON-ready: method, order and body; by robot the `step_s`, and in each precision the largest relative drifts
-        `energy`, `momentum` and `from_jacobi`.
+        `energy`, `momentum` and `from_jacobi`. Under `mujoco` the same of MuJoCo's methods in float64, at the step of
+        the first robot, for ten minutes at most.
     """
     spawn = get_context("spawn")
     work = [(robot.timing.physics_dt, name) for robot in robots for name in TYPES]
@@ -53,6 +56,13 @@ def measure_integrator(
         "rate_rad_s": RATE,
         "axis": list(AXIS),
         "seconds": seconds,
+        "mujoco": {
+            "step_s": robots[0].timing.physics_dt,
+            "seconds": min(seconds, MOST_S),
+            **{
+                name: asdict(mujoco_drift(name, seconds, robots[0].timing.physics_dt)) for name in INTEGRATORS
+            },
+        },
         "robots": {
             robot.name: {"step_s": robot.timing.physics_dt, **{name: next(of_each) for name in TYPES}}
             for robot in robots

@@ -146,6 +146,13 @@ def other_lines(document: dict[str, Any]) -> list[str]:
             for robot, one in found["robots"].items()
             for name in ("float64", "float32")
         ]
+        other = found["mujoco"]
+        lines += [
+            f"  MuJoCo's {name}, steps of {other['step_s']:g} s for {other['seconds']:g} s: energy "
+            f"{other[name]['energy']:.1e}, angular momentum {other[name]['momentum']:.1e}, from Jacobi's closed form "
+            f"{other[name]['from_jacobi']:.1e}"
+            for name in ("RK4", "Euler")
+        ]
     if (found := document["throughput"]) is not None:
         for name in ("numpy", "compiled"):
             one = found[name]
