@@ -40,7 +40,7 @@ def mujoco_drift(integrator: str, seconds: float, dt: float) -> Drift:
         mujoco.mj_step(model, data, count)
         time_s += count * dt
         w, x, y, z = data.qpos[3:]
-        now = SpatialState(*data.qpos[:3], x, y, z, w, *data.qvel)
+        now = SpatialState(*np.concatenate((data.qpos[:3], (x, y, z, w), data.qvel)))
         away = np.linalg.norm(np.array(now.rate) - jacobi_rate(start.rate, time_s)) / RATE
         found = np.maximum(found, np.array((*drifts(start, now, body), float(away))))
     return Drift(*(float(value) for value in found))
