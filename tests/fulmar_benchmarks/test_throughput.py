@@ -58,6 +58,34 @@ def test_the_json_has_both_paces_of_each_robot_and_their_ratio(command, cores):
     assert (figures["worlds"], figures["scenario"], figures["cores"]) == (16, "randomised", int(cores))
 
 
+def test_robots_in_space_get_their_own_task_and_both_integrators_of_mujoco(command):
+    small = "--worlds", "16", "--seconds", "0.05", "--cores", "1"
+    done = command("--robots", "spacecraft_16,turtlebot2", *small, "--json")
+    figures = json.loads(done.stdout)
+    craft, wheels = figures["robots"]["spacecraft_16"], figures["robots"]["turtlebot2"]
+    assert (craft["task"], wheels["task"]) == ("go_to_pose_3d", "go_to_pose")
+    assert (craft["mujoco_integrator"], wheels["mujoco_integrator"]) == ("RK4", "Euler")
+    assert craft["mujoco_step_s"] == load_robot("spacecraft_16").timing.physics_dt
+    assert craft["ratio_with_euler"] == pytest.approx(
+        craft["batch_steps_per_s"] / craft["mujoco_euler_steps_per_s"]
+    )
+    assert "ratio_with_euler" not in wheels
+    table = command("--robots", "spacecraft_16", *small).stdout
+    assert "Euler" in table
+    assert "RK4, steps of 0.04 s" in table
+
+
+def test_a_task_of_the_other_space_is_refused_for_robots_that_were_named(command):
+    assert "space" in str(command("--robots", "spacecraft_16", "--task", "go_to_pose").exception)
+
+
+def test_eulers_method_takes_the_same_robot_elsewhere():
+    robot = load_robot("spacecraft_16")
+    own, other = MujocoPace(robot, threads=1), MujocoPace(robot, threads=1, integrator="Euler")
+    assert (own.integrator, other.integrator) == ("RK4", "Euler")
+    assert own.step_s == other.step_s
+
+
 def test_boats_are_rolled_out_in_the_very_water_of_the_plant():
     rolled_out = AfloatPace(BOAT, TASK, RANDOMISED, worlds=3, threads=1)
     plant, full = Scene(BOAT), np.array([1.0, -1.0])
@@ -76,7 +104,7 @@ def test_without_json_a_table_is_printed(command):
     long = "modular_freeflyer"
     done = command("--robots", f"kingfisher,{long}", "--worlds", "8", "--seconds", "0.05", "--cores", "1")
     assert long in done.stdout
-    assert "ratio there ┃" in done.stdout  # nothing is cut off in 80 columns
+    assert "ratio then ┃" in done.stdout  # nothing is cut off in 80 columns
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,12 @@ DISPLAY_NAMES = {
     "track_velocities": "Track velocities",
     "go_through_positions": "Go through positions",
     "go_to_position_with_obstacles": "Go to position with obstacles",
+    "int_ball2": "Int-Ball2",
+    "go_to_position_3d": "Go to position 3-D",
+    "go_to_pose_3d": "Go to pose 3-D",
+    "track_velocities_3d": "Track velocities 3-D",
+    "go_through_positions_3d": "Go through positions 3-D",
+    "go_through_poses_3d": "Go through poses 3-D",
 }
 GOOD, BAD = "good", "bad"
 MARKS = {GOOD: " ✓", BAD: " ✗", "": ""}  # behind a cell of that tone

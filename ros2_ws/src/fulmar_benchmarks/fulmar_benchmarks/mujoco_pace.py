@@ -1,7 +1,8 @@
 """How many control steps a second MuJoCo's batch rollout makes: physics alone.
 
 MuJoCo's own drag in a fluid stands for the water, which it would need a callback for, so that this rollout is faster
-than any boat's could be. Beside it robots on water are rolled out in the plant's own water.
+than any boat's could be. Beside it robots on water are rolled out in the plant's own water. Bodies in space are rolled
+out by Runge-Kutta, as the plant has them, and beside it by Euler's method, which costs less and gains energy.
 """
 
 from __future__ import annotations
@@ -27,18 +28,31 @@ _STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
 _CONTROL = mujoco.mjtState.mjSTATE_CTRL | mujoco.mjtState.mjSTATE_XFRC_APPLIED
 
 
-class MujocoPace:
-    """MuJoCo's batch rollout of the same robot at random commands."""
+INTEGRATORS = {"RK4": mujoco.mjtIntegrator.mjINT_RK4, "Euler": mujoco.mjtIntegrator.mjINT_EULER}
 
-    def __init__(self, robot: Robot, *, threads: int) -> None:
+
+class MujocoPace:
+    """MuJoCo's batch rollout of the same robot at random commands.
+
+    Attributes:
+        integrator: Name of MuJoCo's method, one of `INTEGRATORS`.
+        step_s: MuJoCo's time step [s].
+    """
+
+    def __init__(self, robot: Robot, *, threads: int, integrator: str = "") -> None:
         """Compile the robot and draw commands.
 
         Args:
             robot: The robot.
             threads: That MuJoCo may use.
+            integrator: One of `INTEGRATORS`; the plant's own by default.
         """
         scene = Scene(robot)
         self._model, model, data = scene.model, scene.model, scene.data
+        if integrator:
+            model.opt.integrator = INTEGRATORS[integrator]
+        self.integrator = next(name for name, kind in INTEGRATORS.items() if kind == model.opt.integrator)
+        self.step_s = float(model.opt.timestep)
         if robot.hydrodynamics is not None:
             model.opt.gravity[:] = 0.0  # what water would carry must not sink
             model.opt.density, model.opt.viscosity = robot.hydrodynamics.hydrostatics.water_density, 1e-3

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import multiprocessing
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
@@ -194,8 +194,7 @@ def _serve(pipe: Connection) -> None:
 
 
 def measure(
-    robots: list[Robot],
-    task: Task,
+    pairs: Sequence[tuple[Robot, Task]],
     scenario: Scenario,
     *,
     worlds: int,
@@ -204,12 +203,11 @@ def measure(
     seconds: float,
     rounds: int,
     progress: Callable[[], None] = lambda: None,
-) -> dict[str, dict[str, float]]:
+) -> dict[str, dict[str, Any]]:
     """Measure robots one after another.
 
     Args:
-        robots: Which.
-        task: What the batch plays.
+        pairs: Which, and what the batch of each plays.
         scenario: What its worlds are drawn from.
         worlds: Of the batch, >= 1.
         library: Of the batch.
@@ -219,40 +217,46 @@ def measure(
         progress: Called after every round.
 
     Returns:
-        For each robot's name the medians `batch_steps_per_s` and `mujoco_steps_per_s`, and their `ratio`; for robots on
-        water also `mujoco_with_water_steps_per_s` and `ratio_with_water`.
+        For each robot's name its `task`, MuJoCo's `mujoco_integrator` and `mujoco_step_s`, the medians
+        `batch_steps_per_s` and `mujoco_steps_per_s`, and their `ratio`; for robots on water also
+        `mujoco_with_water_steps_per_s` and `ratio_with_water`, for robots in space `mujoco_euler_steps_per_s` and
+        `ratio_with_euler`.
     """
-    found = {}
+    found: dict[str, dict[str, Any]] = {}
     with ExitStack() as stack:
         shared = None
         if library.device == "cpu" and cores > 1:
             shared = SharedPace(min(cores, worlds))
             stack.callback(shared.close)
-        for robot in robots:
+        for robot, task in pairs:
             if shared is not None:
                 shared.take(robot, task, scenario, worlds=worlds, library=library)
             batch = shared or BatchPace(robot, task, scenario, worlds=worlds, library=library)
-            paces: list[MujocoPace | AfloatPace | SharedPace | BatchPace] = [
-                batch,
-                MujocoPace(robot, threads=cores),
-            ]
+            rollout = MujocoPace(robot, threads=cores)
+            paces: list[MujocoPace | AfloatPace | SharedPace | BatchPace] = [batch, rollout]
+            other = ""
             if robot.hydrodynamics is not None:
+                other = "water"
                 paces.append(AfloatPace(robot, task, scenario, worlds=worlds, threads=cores))
+            elif rollout.integrator == "RK4":
+                other = "euler"
+                paces.append(MujocoPace(robot, threads=cores, integrator="Euler"))
             for pace in paces:
                 pace.steps_per_s(0.3 * seconds)  # caches and thread pools warm up
             measured = []
             for _ in range(rounds):
                 measured.append([pace.steps_per_s(seconds) for pace in paces])
                 progress()
-            ours, theirs, *wet = (float(value) for value in np.median(np.array(measured), axis=0))
+            ours, theirs, *more = (float(value) for value in np.median(np.array(measured), axis=0))
             found[robot.name] = {
+                "task": task.name,
+                "mujoco_integrator": rollout.integrator,
+                "mujoco_step_s": rollout.step_s,
                 "batch_steps_per_s": ours,
                 "mujoco_steps_per_s": theirs,
                 "ratio": ours / theirs,
             }
-            if wet:
-                found[robot.name] |= {
-                    "mujoco_with_water_steps_per_s": wet[0],
-                    "ratio_with_water": ours / wet[0],
-                }
+            if more:
+                name = f"mujoco_{other}" if other == "euler" else f"mujoco_with_{other}"
+                found[robot.name] |= {f"{name}_steps_per_s": more[0], f"ratio_with_{other}": ours / more[0]}
     return found

@@ -57,6 +57,10 @@ class Unit:
         """What is gathered beside what every benchmark keeps."""
         return Extra()
 
+    def map_place(self, drawn: Episode) -> np.ndarray:
+        """Where each episode lies in the map of successes, shape (episodes, 2)."""
+        return _map_place(drawn, self.trial)
+
     @property
     def name(self) -> str:
         """File name without suffix."""
@@ -131,14 +135,15 @@ def run_unit(
         about["same_at_64_worlds"], about["compared_episodes"] = _same_with_few_worlds(unit.trial, figures)
     about["wall_s"] = time.monotonic() - began
     sample = drawn[slice(0, KEPT)]  # type: ignore[index]
+    where = sample.start.logged()
     outcome = PairResult(
         about=about,
         succeeded=tally.succeeded,
         figures=figures,
-        map_xy=_map_place(drawn, unit.trial).astype(np.float32),
+        map_xy=unit.map_place(drawn).astype(np.float32),
         over_time=np.quantile(np.concatenate(errors), QUANTILES, axis=0).astype(np.float32),
         paths=kept.paths,
-        starts=np.stack((sample.start.x, sample.start.y, sample.start.yaw), axis=-1),
+        starts=np.stack([where[name] for name in ("x", "y", "yaw")], axis=-1),
         targets=np.asarray(sample.goal.targets),
         goals=kept.goals,
         obstacles=np.asarray(sample.goal.obstacles)[..., :3],

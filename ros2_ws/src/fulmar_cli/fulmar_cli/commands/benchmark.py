@@ -10,6 +10,7 @@ import typer
 
 from fulmar_cli.commands.benchmark_drift import drift
 from fulmar_cli.commands.benchmark_latency import endurance, latency
+from fulmar_cli.commands.benchmark_rans3d import rans3d
 from fulmar_cli.commands.benchmark_roboran import roboran
 from fulmar_cli.commands.benchmark_throughput import throughput
 from fulmar_cli.commands.benchmark_training import training
@@ -33,7 +34,7 @@ benchmark = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode=None,
 )
-for command in (drift, endurance, latency, roboran, throughput, training):
+for command in (drift, endurance, latency, rans3d, roboran, throughput, training):
     benchmark.command()(command)
 
 

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
-
-from rich.table import Table
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Annotated, Any
 
 from fulmar_bringup.console import console, output, print_result
 from fulmar_bringup.progress import step_bar
-from fulmar_cli.commands.arguments import JsonOption, ScenarioOption, TaskOption, option
+from fulmar_cli.commands.arguments import JsonOption, ScenarioOption, option
 from fulmar_cli.commands.values import read_names
 from fulmar_core.errors import ConfigError, UnknownNameError
+
+if TYPE_CHECKING:
+    from fulmar_core.robot import Robot
+    from fulmar_core.tasks import Task
 
 DEVICES, LIBRARIES = ("cpu", "cuda"), ("compiled", "numpy", "torch")
 ROUNDS = 5
@@ -28,7 +31,9 @@ def throughput(
         ),
     ] = None,
     worlds: Annotated[int, option("N", "Worlds of the batch.", min=1)] = 4096,
-    task: TaskOption = "go_to_pose",
+    task: Annotated[
+        str | None, option("T", "Task of the batch; go_to_pose by default, in space go_to_pose_3d.")
+    ] = None,
     scenario: ScenarioOption = "randomised",
     cores: Annotated[int, option("N", "Processes of the batch, and threads of MuJoCo's rollout.", min=1)] = 2,
     seconds: Annotated[float, option("S", "Time of each of the measurements [s].", min=0.05)] = 1.0,
@@ -38,7 +43,8 @@ def throughput(
 
     A step of the batch has all that training needs: disturbances, odometry, observation, reward and new episodes.
     MuJoCo's is physics alone, with its own drag for water. Both are measured in turns in this run, on the same cores;
-    the medians are printed. Robots on water are also rolled out by MuJoCo in the water of the plant ("in water").
+    the medians are printed. MuJoCo also rolls out ("otherwise") robots on water in the water of the plant, and robots
+    in space by Euler's method; the plant has Runge-Kutta's of fourth order.
     Before that a step of each robot is compiled, which takes 10 to 30 s.
 
     Try:
@@ -48,25 +54,22 @@ def throughput(
     from fulmar_cli.extras import require
     from fulmar_core.disturbances.scenario import load_scenario
     from fulmar_core.paths import config_names
-    from fulmar_core.robot import load_robot
-    from fulmar_core.tasks import load_task
 
     library = library or _fastest(device)
     for kind, name, known in (("device", device, DEVICES), ("library", library, LIBRARIES)):
         if name not in known:
             raise UnknownNameError(kind, name, known)
     names = read_names(robots or "all", "robot", config_names("robots"))
-    chosen = [load_robot(name) for name in names]
-    the_task, the_scenario = load_task(task), load_scenario(scenario)
+    pairs, the_scenario = _pairs(names, task, named=robots is not None), load_scenario(scenario)
     require("mujoco", *([] if library == "numpy" else ["torch"]))
     _check_machine(device, library, worlds, cores)
     from fulmar_benchmarks.throughput import Library, measure
+    from fulmar_benchmarks.throughput_table import print_table
 
-    with step_bar("measuring", len(chosen) * ROUNDS) as progress:
-        done = iter(range(1, len(chosen) * ROUNDS + 1))
+    with step_bar("measuring", len(pairs) * ROUNDS) as progress:
+        done = iter(range(1, len(pairs) * ROUNDS + 1))
         found = measure(
-            chosen,
-            the_task,
+            pairs,
             the_scenario,
             worlds=worlds,
             library=Library(library, device),
@@ -80,11 +83,29 @@ def throughput(
         "worlds": worlds,
         "library": library,
         "device": device,
-        "task": task,
+        "task": ", ".join(dict.fromkeys(each.name for _, each in pairs)),
         "scenario": scenario,
         "cores": cores,
     }
-    print_result(figures, _print, as_json=as_json)
+    print_result(figures, lambda figures: print_table(figures, output), as_json=as_json)
+
+
+def _pairs(names: Sequence[str], task: str | None, *, named: bool) -> list[tuple[Robot, Task]]:
+    """Robots, each with its task; of a given task those that it fits, unless they were `named`."""
+    from fulmar_core.robot import load_robot
+    from fulmar_core.spatial import SpatialState
+    from fulmar_core.tasks import load_task
+
+    robots = [load_robot(name) for name in names]
+    if task is None:
+        kinds = {True: "go_to_pose_3d", False: "go_to_pose"}
+        return [(robot, load_task(kinds[robot.state_type is SpatialState])) for robot in robots]
+    the_task = load_task(task)
+    if not named:
+        robots = [robot for robot in robots if robot.state_type is the_task.state_type]
+    for robot in robots:
+        the_task.check(robot)
+    return [(robot, the_task) for robot in robots]
 
 
 def _fastest(device: str) -> str:
@@ -116,29 +137,3 @@ def _check_machine(device: str, library: str, worlds: int, cores: int) -> None:
 
     if not torch.cuda.is_available():
         raise ConfigError("--device cuda: torch sees no graphics card here.")
-
-
-def _print(figures: dict[str, Any]) -> None:
-    table = Table(
-        title=f"steps/s · {figures['worlds']:,} worlds · {figures['task']} · {figures['scenario']} · "
-        f"{figures['library']} on {figures['device']} · {figures['cores']} cores"
-    )
-    table.add_column("robot")
-    for column in ("batch", "MuJoCo", "ratio", "in water", "ratio there"):
-        table.add_column(column, justify="right")
-    for name, found in figures["robots"].items():
-        table.add_row(
-            name,
-            f"{found['batch_steps_per_s']:,.0f}",
-            f"{found['mujoco_steps_per_s']:,.0f}",
-            f"{found['ratio']:.1f}",
-            *_afloat(found),
-        )
-    output.print(table)
-
-
-def _afloat(found: dict[str, float]) -> tuple[str, ...]:
-    """Figures of robots on water; none for others."""
-    if "ratio_with_water" not in found:
-        return ()
-    return f"{found['mujoco_with_water_steps_per_s']:,.0f}", f"{found['ratio_with_water']:.1f}"

@@ -1,0 +1,1 @@
+"""Our controllers at the 3-D tasks of RANS: bodies in space, evaluated in MuJoCo."""

@@ -1,0 +1,158 @@
+"""The benchmark after the 3-D tasks of RANS: every controller at every task, the integrator and the pace."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from fulmar_benchmarks.pairs import Pair, code_hash, hash_of, with_law, with_policy
+from fulmar_benchmarks.rans3d.document import Key, document_of
+from fulmar_benchmarks.rans3d.integrator import measure_integrator
+from fulmar_benchmarks.rans3d.pace import measure_pace
+from fulmar_benchmarks.rans3d.targets import (
+    CONTROLLERS,
+    DEAD,
+    DEAD_CONTROLLER,
+    DEAD_TASK,
+    EPISODES,
+    HOUR_S,
+    ROBOTS,
+    SCENARIOS,
+    TASKS,
+    WORLDS,
+    how_to_make,
+)
+from fulmar_benchmarks.rans3d.unit import SpaceTrial, SpaceUnit
+from fulmar_benchmarks.results import PairResult
+from fulmar_benchmarks.unit import Unit
+from fulmar_benchmarks.workers import Outcome, evaluate_units
+from fulmar_bringup.run_plan import RunPlan
+from fulmar_core.counts import check_episodes
+from fulmar_core.episode import episode_steps
+from fulmar_core.robot import load_robot
+from fulmar_core.tasks import load_task
+from policy_server.controllers import policies_directory
+
+PARTS = ("tasks", "dead", "integrator", "throughput")
+WAY = "mujoco"
+
+
+@dataclass(frozen=True)
+class Request:
+    """What to measure."""
+
+    folder: Path  # outcomes are kept below it
+    episodes: int
+    seed: int
+    parts: Sequence[str] = PARTS
+    robots: Sequence[str] = ROBOTS
+    tasks: Sequence[str] = TASKS
+    controllers: Sequence[str] = CONTROLLERS
+    scenarios: Sequence[str] = SCENARIOS
+    policies: Path | None = None  # folder of bundles; the shipped ones by default
+    jobs: int = 2
+    fresh: bool = False  # evaluate again what was evaluated before
+    tumble_s: float = HOUR_S  # length of the tumble [s]
+    worlds: int = WORLDS  # of the batch whose pace is measured
+    seconds: float = 1.0  # of each measurement of the pace [s]
+    command: str = ""  # for the record
+
+
+@dataclass(frozen=True)
+class CampaignResult:
+    """The document, and what plots are drawn from."""
+
+    document: dict[str, Any]
+    outcomes: dict[Key, PairResult] = field(default_factory=dict)  # by robot, task, controller and scenario
+
+
+def run_rans3d(
+    request: Request,
+    *,
+    progress: Callable[[float, float], None],
+    on_done: Callable[[Unit, Outcome, bool], None],
+) -> CampaignResult:
+    """Measure everything that is asked for; evaluations with the same code and configuration are not repeated.
+
+    Arguments beside the request as of `evaluate_units`.
+    """
+    began = time.monotonic()
+    keys = _keys(request)
+    _check(request, keys)
+    pairs = {key[:3]: _pair(request, *key[:3]) for key in keys}
+    code = code_hash(WAY) if keys else ""
+    units = {key: _unit(request, pairs[key[:3]], key[3], code) for key in keys if not pairs[key[:3]].missing}
+    outcomes = evaluate_units(
+        list(units.values()), jobs=request.jobs, fresh=request.fresh, progress=progress, on_done=on_done
+    )
+    found = {key: outcomes[unit] for key, unit in units.items()}
+    parts: dict[str, Any] = {"integrator": None, "throughput": None}
+    if "integrator" in request.parts:
+        robots = [load_robot(name) for name in request.robots]
+        parts["integrator"] = measure_integrator(
+            robots, request.tumble_s, jobs=request.jobs, progress=progress
+        )
+    if "throughput" in request.parts:  # last and alone
+        parts["throughput"] = measure_pace(
+            worlds=request.worlds, cores=request.jobs, seconds=request.seconds, progress=progress
+        )
+    document = document_of(
+        request, pairs=pairs, keys=keys, found=found, wall_s=time.monotonic() - began, **parts
+    )
+    return CampaignResult(document, {key: one for key, one in found.items() if isinstance(one, PairResult)})
+
+
+def _keys(request: Request) -> list[Key]:
+    keys: list[Key] = []
+    if "tasks" in request.parts:
+        keys += [
+            (robot, task, controller, scenario)
+            for robot in request.robots
+            for task in request.tasks
+            for controller in request.controllers
+            for scenario in request.scenarios
+        ]
+    if "dead" in request.parts and ROBOTS[0] in request.robots:
+        keys += [(ROBOTS[0], DEAD_TASK, DEAD_CONTROLLER, scenario) for scenario in DEAD]
+    return keys
+
+
+def _check(request: Request, keys: list[Key]) -> None:
+    for name in dict.fromkeys(key[0] for key in keys):
+        robot = load_robot(name)
+        steps = max(
+            episode_steps(load_task(key[1]), robot.timing.control_s) for key in keys if key[0] == name
+        )
+        at_once = min(request.jobs, len(keys))
+        check_episodes(robot, episodes=request.episodes, steps=steps, jobs=request.jobs, at_once=at_once)
+
+
+def _pair(request: Request, robot: str, task: str, controller: str) -> Pair:
+    if controller != "policy":
+        return with_law(robot, task, controller)
+    folder = (request.policies or policies_directory()) / f"{robot}_{task}"
+    pair = with_policy(robot, task, folder)
+    if folder.is_dir():
+        return pair
+    return Pair(robot, task, "policy", reason=f"there is no bundle {folder.name}: {how_to_make(robot, task)}")
+
+
+def _unit(request: Request, pair: Pair, scenario: str, code: str) -> SpaceUnit:
+    farthest, seconds = EPISODES.get(pair.robot, (0.0, 0.0))
+    plan = RunPlan(
+        robot=pair.robot,
+        task=pair.task,
+        controller=pair.controller,
+        backend="mujoco",
+        control_hz=load_robot(pair.robot).timing.control_hz,
+        policy=pair.policy,
+        scenario=scenario,
+        seed=request.seed,
+        duration_s=seconds or load_task(pair.task).episode_s,
+        lockstep=True,
+    )
+    trial = SpaceTrial(plan, WAY, request.episodes, request.episodes, farthest_m=farthest)
+    return SpaceUnit(trial, hash_of(pair.sha256, code, f"{farthest:g}"), request.folder / "outcomes")

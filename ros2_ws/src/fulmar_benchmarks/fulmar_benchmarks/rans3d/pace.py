@@ -1,0 +1,75 @@
+"""How fast the batch of the spacecraft steps, with NumPy and compiled, beside MuJoCo's rollout in the same run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib.util import find_spec
+from typing import Any
+
+from fulmar_benchmarks.rans3d.targets import RANDOMISED, ROBOTS
+from fulmar_benchmarks.throughput import Library, measure
+from fulmar_core.disturbances.scenario import load_scenario
+from fulmar_core.robot import load_robot
+from fulmar_core.tasks import load_task
+
+TASK = "go_to_pose_3d"
+LIBRARIES = ("numpy", "compiled")
+ROUNDS = 5
+
+
+def measure_pace(
+    *, worlds: int, cores: int, seconds: float, progress: Callable[[float, float], None]
+) -> dict[str, Any]:
+    """Measure the batch with every disturbance of `randomised`.
+
+    Args:
+        worlds: Of the batch.
+        cores: Processes of the batch, and threads of MuJoCo's rollout.
+        seconds: Of each measurement [s].
+        progress: Called with how much is done, and of how much.
+
+    Returns:
+        JSON-ready: what was measured, and by library the figures of `throughput.measure`, or null with a `reason`.
+    """
+    robot, task, scenario = load_robot(ROBOTS[0]), load_task(TASK), load_scenario(RANDOMISED)
+    found: dict[str, Any] = {
+        "robot": robot.name,
+        "task": task.name,
+        "scenario": RANDOMISED,
+        "worlds": worlds,
+        "cores": cores,
+    }
+    for number, name in enumerate(LIBRARIES):
+        reason = why_not(name)
+        done = iter(range(number * ROUNDS + 1, (number + 1) * ROUNDS + 1))
+
+        def further(done: Any = done) -> None:
+            progress(float(next(done)), float(len(LIBRARIES) * ROUNDS))
+
+        found[name] = None
+        if reason:
+            found["reason"] = reason
+            continue
+        figures = measure(
+            [(robot, task)],
+            scenario,
+            worlds=worlds,
+            library=Library(name),
+            cores=cores,
+            seconds=seconds,
+            rounds=ROUNDS,
+            progress=further,
+        )
+        found[name] = figures[robot.name]
+    return found
+
+
+def why_not(library: str) -> str:
+    """Why a library cannot compute here; empty where it can."""
+    if library == "numpy":
+        return ""
+    if find_spec("torch") is None:
+        return "nothing is compiled without torch"
+    from training.kernel import compiler_found
+
+    return "" if compiler_found() else "nothing is compiled without g++ and Python's headers (python3-dev)"
