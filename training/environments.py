@@ -10,35 +10,45 @@ from typing import Any
 
 import gymnasium
 
-from fulmar_core.disturbances.scenario import load_scenario
+from fulmar_core.disturbances.scenario import Scenario, load_scenario
 from fulmar_core.paths import config_names
-from fulmar_core.robot import load_robot
-from fulmar_core.tasks import load_task
+from fulmar_core.planar import PlanarState
+from fulmar_core.robot import Robot, load_robot
+from fulmar_core.spatial import SpatialState
+from fulmar_core.state import State
+from fulmar_core.tasks import Task, load_task
 from training.gym_env import TaskEnv, TaskVectorEnv
 
+DEFAULT_ROBOTS: dict[type[State], str] = {PlanarState: "floating_platform", SpatialState: "spacecraft_16"}
 
-def task_env(
-    task: str, robot: str = "floating_platform", scenario: str = "randomised", **options: Any
-) -> TaskEnv:
+
+def task_env(task: str, robot: str | None = None, scenario: str = "randomised", **options: Any) -> TaskEnv:
     """Build the environment of one world from names of configuration files.
 
     Args:
         task: Name that `fulmar list tasks` shows.
-        robot: Name that `fulmar list robots` shows.
+        robot: Name that `fulmar list robots` shows; of `DEFAULT_ROBOTS` by default.
         scenario: Name that `fulmar list scenarios` shows.
         **options: `seed` and `training` of `TaskEnv`.
 
     Raises:
-        ConfigError: Unknown name, or a mistake in a file.
+        ConfigError: Unknown name, a mistake in a file, or a robot that the task is not for.
     """
-    return TaskEnv(load_robot(robot), load_task(task), load_scenario(scenario), **options)
+    return TaskEnv(*_parts(task, robot, scenario), **options)
 
 
 def task_vector_env(
-    task: str, robot: str = "floating_platform", scenario: str = "randomised", **options: Any
+    task: str, robot: str | None = None, scenario: str = "randomised", **options: Any
 ) -> TaskVectorEnv:
     """Build the environment of many worlds; as `task_env`, with `num_envs` among the options."""
-    return TaskVectorEnv(load_robot(robot), load_task(task), load_scenario(scenario), **options)
+    return TaskVectorEnv(*_parts(task, robot, scenario), **options)
+
+
+def _parts(task: str, robot: str | None, scenario: str) -> tuple[Robot, Task, Scenario]:
+    the_task = load_task(task)
+    the_robot = load_robot(robot or DEFAULT_ROBOTS[the_task.state_type])
+    the_task.check(the_robot)
+    return the_robot, the_task, load_scenario(scenario)
 
 
 def environment_id(task: str) -> str:

@@ -152,7 +152,9 @@ class Session(BaseCallback):
         due = over or progress >= self._next_check
         if due:
             self._check()
-            self._plan_check(self._limits.progress(self.elapsed_s, history.updates))  # a check takes time itself
+            self._plan_check(
+                self._limits.progress(self.elapsed_s, history.updates)
+            )  # a check takes time itself
             over = over or self._learned()
         if over or stopped or self.elapsed_s >= self._next_checkpoint:
             self.save()

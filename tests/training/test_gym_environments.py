@@ -25,9 +25,17 @@ GO_TO_POSE = environment_id("go_to_pose")
 
 
 @pytest.mark.filterwarnings("error", "ignore:.*(too low|too high):UserWarning")  # terms have no bounds
-@pytest.mark.parametrize("robot", ["floating_platform", "turtlebot2", "kingfisher"])
-def test_the_checker_of_gymnasium_accepts_it(robot):
-    check_env(gymnasium.make(GO_TO_POSE, robot=robot).unwrapped)
+@pytest.mark.parametrize(
+    ("task", "robot"),
+    [("go_to_pose", "floating_platform"), ("go_to_pose", "turtlebot2"), ("go_to_pose_3d", "int_ball2")],
+)
+def test_the_checker_of_gymnasium_accepts_it(task, robot):
+    check_env(gymnasium.make(environment_id(task), robot=robot).unwrapped)
+
+
+def test_each_space_has_a_robot_by_default():
+    assert gymnasium.make(GO_TO_POSE).action_space.n == 8
+    assert gymnasium.make(environment_id("go_to_pose_3d")).action_space.n == 16
 
 
 def test_every_task_is_registered_and_registering_again_changes_nothing():
@@ -117,6 +125,8 @@ def test_without_a_seed_every_reset_of_many_worlds_begins_the_next_episodes():
 def test_mistakes_name_what_is_allowed():
     with pytest.raises(UnknownNameError, match="turtlebot2"):
         gymnasium.make(GO_TO_POSE, robot="turtlebot")
+    with pytest.raises(ConfigError, match="Did you mean 'go_to_pose_3d'"):
+        gymnasium.make(GO_TO_POSE, robot="spacecraft_16")
     with pytest.raises(ConfigError, match="num_envs: found 0, need at least 1"):
         gymnasium.make_vec(GO_TO_POSE, num_envs=0)
     with pytest.raises(ConfigError, match="seed: found -1, need 0 or more"):
