@@ -14,7 +14,6 @@ from fulmar_evaluation.faults.fault import Fault, Outcome, stopped
 from fulmar_evaluation.faults.fault_environment import request_of
 from fulmar_evaluation.faults.live_system import LiveSystem, NothingShown, live_system
 from fulmar_evaluation.faults.suite import EVERY, faults_of, run_faults
-from policy_server.controllers import shipped_policy
 from tests.conftest import RosDomain
 from tests.ros.cli import fulmar, json_of
 
@@ -150,9 +149,6 @@ def test_every_other_fault_is_survived(robot: str, fault: Fault, ros_domain: Ros
 
 @pytest.mark.slow
 @pytest.mark.timeout(240)
-@pytest.mark.skipif(
-    shipped_policy(SPACECRAFT, "go_to_pose_3d") is None, reason=f"no policy is shipped for {SPACECRAFT}"
-)
 @pytest.mark.parametrize("fault", IN_SPACE)
 def test_a_spacecraft_survives_what_differs_in_space(fault: str, ros_domain: RosDomain) -> None:
     (found,) = run_faults(SPACECRAFT, faults_of(SPACECRAFT, [fault])[0], lambda _done: None)
