@@ -136,10 +136,10 @@ def _path(axes: Axes, runs: Sequence[View], side: Side, *, reach: float) -> None
                 _target(axes, result, target, columns, 1.3 * length, PAPER)
             if order == 0:
                 goal = result.targets[-1, columns]
-                up = bool(goal[1] >= float(np.mean(np.append(seen[:, 1], goal[1]))))
+                over = bool(goal[1] >= float(np.mean(np.append(seen[:, 1], goal[1]))))
                 if np.linalg.norm(goal - seen[0]) < 3.0 * length:  # the two words keep apart
-                    up = not above
-                _word(axes, "goal", goal, 1.5 * length, up=up)
+                    over = not above
+                _word(axes, "goal", goal, 1.5 * length, up=over)
     across, up = side.labels
     axes.set_xlabel(f"{across} [m]")
     axes.set_ylabel(f"{up} [m]")
