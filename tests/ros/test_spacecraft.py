@@ -198,3 +198,6 @@ def test_a_law_follows_a_target_that_moves_in_lock_step(
         "bag", "rerun", "bag", "--controller", controller, "--json", env=ros_domain.env, cwd=tmp_path
     )
     assert done.returncode == 0, done.stdout + done.stderr
+    done = fulmar("report", "bag", env=ros_domain.env, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "The goal moves" in (tmp_path / "bag" / "report.html").read_text(encoding="utf-8")

@@ -76,9 +76,14 @@ class RunResult:
         return float(np.mean(np.min(gap, axis=1)))
 
     @property
+    def target_moves(self) -> bool:
+        """Whether the goal is a place that moves along a path."""
+        return bool(len(self.path)) and self.task.goal_topic in ("goal_pose", "goal_point")
+
+    @property
     def tracking_error(self) -> tuple[float | None, float | None]:
         """Mean distance and angle from a target that moves along a path [m, rad]; None where there is none."""
-        if not len(self.path) or self.task.goal_topic not in ("goal_pose", "goal_point"):
+        if not self.target_moves:
             return None, None
         angle = self.run.attitude_error if self.task.goal_topic == "goal_pose" else None
         return float(np.mean(self.run.position_error)), None if angle is None else float(np.mean(angle))

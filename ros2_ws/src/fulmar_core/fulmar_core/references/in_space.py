@@ -34,7 +34,7 @@ class SpaceCurve(ABC):
 
     def points(self, count: int) -> np.ndarray:
         """Equally spaced points, shape (count, 3) [m]; see `spread_along`."""
-        return spread_along(self.at, count, closed=self.closed) + np.array(self.centre)
+        return np.asarray(spread_along(self.at, count, closed=self.closed) + np.array(self.centre))
 
 
 @dataclass(frozen=True)

@@ -262,7 +262,7 @@ class OwnTask(Task[Any]):
         found = self._ask(member, state, *more) if self._has(member) else None
         return None if found is None else self._numbers(member, found, state, "the result")
 
-    def _numbers(self, member: str, value: Any, state: State, what: str) -> Array:
+    def _numbers(self, member: str, value: Any, state: Any, what: str) -> Array:
         """A result as finite numbers in the shape of the state that it is for."""
         xp, shape = array_namespace(state.x), tuple(state.x.shape)
         try:
@@ -277,7 +277,7 @@ class OwnTask(Task[Any]):
             raise self._wrong(member, f"returned {what} that is not finite")
         return numbers
 
-    def _goal(self, member: str, found: Any, state: State) -> Goal:
+    def _goal(self, member: str, found: Any, state: Any) -> Goal:
         if not isinstance(found, Goal):
             raise self._wrong(member, f"returned {_kind(found)}, it must be a Goal")
         lead = tuple(np.shape(state.x))

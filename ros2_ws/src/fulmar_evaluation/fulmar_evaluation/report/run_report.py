@@ -221,7 +221,10 @@ def _space_path(runs: Sequence[View]) -> Plot:
         caption += (
             " Numbered circles are the targets, as large as the tolerance; those that were reached are grey."
         )
-    if near:
+    if any(result.target_moves for _, result in evaluated(runs)):
+        caption += """ The goal moves: the dashed line is its path, the white dot its end. Below, the way as seen from
+        the goal: bold is the closing window, the dashed circle is the tolerance."""
+    elif near:
         caption += """ The white dot is the goal, as large as the tolerance; where an attitude is asked for, thin
         strokes are the wanted axes. Below, the last stretch: bold is the closing window, the dot is the end, the dashed
         circle is the tolerance."""

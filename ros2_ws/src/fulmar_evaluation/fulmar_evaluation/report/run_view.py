@@ -16,6 +16,7 @@ from fulmar_evaluation.run_summary import latencies_ms, summarise
 
 DISPLAY_NAMES = {
     "lqr": "LQR",
+    "pd": "PD",
     "mpc": "MPC",
     "lqr_drift": "DRIFT's LQR",
     "policy": "policy",

@@ -124,24 +124,30 @@ def _path(axes: Axes, runs: Sequence[View], side: Side, *, reach: float) -> None
             axes.add_patch(Circle(tuple(way[index, columns]), radius, **look, zorder=3))
             _body_axes(axes, way[index], motion.quat_xyzw[result.samples[index]], columns, length)
         if order == 0:
-            _word(axes, "start", way[:, columns], 0, 1.3 * length)
+            if len(result.path):
+                axes.plot(*result.path[:, columns].T, color=INK, linestyle=DASHED, linewidth=0.8, zorder=5)
+            seen = way[:, columns]
+            above = bool(seen[0, 1] >= float(np.mean(seen[:, 1])))
+            _word(axes, "start", seen[0], 1.3 * length, up=above)
         if result.counts:
             _waypoints(axes, result, columns, length, named=order == 0)
         elif has_place(result):
             for target in given_targets(result):
                 _target(axes, result, target, columns, 1.3 * length, PAPER)
             if order == 0:
-                goal = np.concatenate((result.targets[-1:, columns], way[:, columns]))
-                _word(axes, "goal", goal, 0, 1.5 * length)
+                goal = result.targets[-1, columns]
+                over = bool(goal[1] >= float(np.mean(np.append(seen[:, 1], goal[1]))))
+                if np.linalg.norm(goal - seen[0]) < 3.0 * length:  # the two words keep apart
+                    over = not above
+                _word(axes, "goal", goal, 1.5 * length, up=over)
     across, up = side.labels
     axes.set_xlabel(f"{across} [m]")
     axes.set_ylabel(f"{up} [m]")
 
 
-def _word(axes: Axes, text: str, places: np.ndarray, which: int, away: float) -> None:
-    """A word at one of some places, on the side where the others are not."""
-    x, y = places[which]
-    up = y >= float(np.mean(places[:, 1]))
+def _word(axes: Axes, text: str, place: np.ndarray, away: float, *, up: bool) -> None:
+    """A word so far above a place, or below it."""
+    x, y = place
     axes.text(x, y + (away if up else -away), text, ha="center", va="bottom" if up else "top", zorder=7)
 
 

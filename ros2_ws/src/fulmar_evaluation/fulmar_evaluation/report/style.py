@@ -24,6 +24,7 @@ VARIABLES = {INK: "var(--ink)", FAINT: "var(--faint)", PAPER: "var(--paper)"}
 CONTROLLER_COLOURS = {
     "policy": "#3b7ddd",
     "lqr": "#d9780f",
+    "pd": "#7c8a14",
     "mpc": "#a23b9e",
     "lqr_drift": "#8a6d3b",
     "classical": "#1a9e84",

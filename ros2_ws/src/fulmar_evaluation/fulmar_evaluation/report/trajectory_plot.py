@@ -68,7 +68,8 @@ def draw_near(axes: Axes, runs: Sequence[View], columns: tuple[int, int]) -> Non
         places = run.record.motion.position[result.samples]
         if result.task.subject in result.things:
             places = result.things[result.task.subject]
-        x, y = 100.0 * (places[:, shown] - result.targets[-1, shown]).T
+        centre = result.aims[:, shown] if result.target_moves else result.targets[-1, shown]
+        x, y = 100.0 * (places[:, shown] - centre).T
         late = result.time_s >= result.window_start_s
         axes.plot(x, y, color=run.colour, linewidth=1.0, alpha=0.35)
         axes.plot(x[late], y[late], color=run.colour, linewidth=1.8)
@@ -109,6 +110,8 @@ def _waypoints(axes: Axes, result: RunResult, *, named: bool) -> None:
 
 
 def given_targets(result: RunResult) -> np.ndarray:
-    """Every target that was a goal at some time, in their order, shape (k, 3) or (k, 7)."""
+    """Every target that was a goal at some time, in their order, shape (k, 3) or (k, 7); of one that moves the last."""
+    if result.target_moves:
+        return result.targets[-1:]
     changed = np.any(np.diff(result.aims, axis=0, prepend=np.nan) != 0.0, axis=1)
     return result.aims[changed]
