@@ -122,8 +122,8 @@ def notes(document: dict[str, Any]) -> list[str]:
         "percentile), at the last step; those of velocities over the whole episode. By RANS: share of episodes within "
         f"{RANS_POSITION_M:g} m and {RANS_ATTITUDE_RAD:g} rad for {RANS_STEPS} steps in a row. Goals: mean, of the "
         "mean bound of the first episodes by time-optimal travel of a point mass, turning not counted. Duty: mean "
-        "share of full command, of valves the share of time that they are open. Of holdable: success among the randomised "
-        "episodes whose pose the linear programme can hold.",
+        "share of full command, of valves the share of time that they are open. Of holdable: success among the "
+        "randomised episodes whose pose the linear programme can hold.",
         document["published_note"],
     ]
 
