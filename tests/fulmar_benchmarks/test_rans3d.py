@@ -8,21 +8,25 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rich.console import Console
 from typer.testing import CliRunner
 
 pytest.importorskip("mujoco")
 
 from fulmar_benchmarks.rans3d import pace
+from fulmar_benchmarks.rans3d.bound import most_targets
 from fulmar_benchmarks.rans3d.campaign import Request, _pair, _unit
 from fulmar_benchmarks.rans3d.document import document_of, figures_of
+from fulmar_benchmarks.rans3d.tables import print_tables
 from fulmar_benchmarks.rans3d.targets import DEAD, EPISODES, ROBOTS, SHIPPED, TASKS, published
 from fulmar_benchmarks.rans3d.unit import HELD, SpaceExtra, longest_run, started_within
 from fulmar_benchmarks.results import PairResult
 from fulmar_cli.main import app
 from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.episode import draw_episodes
+from fulmar_core.episode import Episode, draw_episodes
 from fulmar_core.errors import UnknownNameError
 from fulmar_core.robot import load_robot
+from fulmar_core.spatial import SpatialState
 from fulmar_core.tasks import load_task
 
 FEW = "benchmark rans3d --episodes 2 --robots spacecraft_16 --tasks go_to_pose_3d --controllers lqr,policy"
@@ -209,6 +213,44 @@ def test_nothing_that_can_be_held_is_no_success():
     assert (found["holdable"]["episodes"], found["holdable"]["success_rate"]) == (0, None)
 
 
+def to_and_fro(distance):
+    """One episode that starts at the second of two waypoints, which lie along the world's z."""
+    robot, task = load_robot("spacecraft_16"), load_task("go_through_poses_3d")
+    drawn = draw_episodes(robot, task, load_scenario("nominal"), seed=1, numbers=np.arange(1))
+    targets = np.zeros((1, 2, 7))
+    targets[..., 6], targets[0, 1, 2] = 1.0, distance
+    start = SpatialState.resting(targets[:, 1])
+    return robot, task, Episode(start, replace(drawn.goal, targets=targets), drawn.world)
+
+
+def test_the_bound_counts_what_a_point_mass_passes_along_a_line():
+    robot, task, drawn = to_and_fro(4.0)
+    found = most_targets(robot, task, drawn)
+    # From rest to rest and back, full thrust to the middle; it need not stop inside of the spheres.
+    way = 4.0 - 2.0 * task.tolerance.position
+    leg_s = 2.0 * np.sqrt(way * robot.body.mass / robot.performance.force)
+    assert task.episode_s / leg_s - 1.0 <= found[0] <= 1.5 * task.episode_s / leg_s + 1.0
+
+
+def test_targets_are_printed_beside_their_bound(tmp_path, capsys):
+    request = Request(
+        tmp_path, 2, 1, robots=("spacecraft_16",), tasks=("go_through_poses_3d",), controllers=("lqr",),
+        scenarios=("nominal",), parts=("tasks",),
+    )  # fmt: skip
+    place = ("spacecraft_16", "go_through_poses_3d", "lqr")
+    result = result_of([True, True])
+    result.figures["goals_reached"] = np.array([5.0, 10.0])
+    document = document_of(
+        request, pairs={place: _pair(request, *place)}, keys=[(*place, "nominal")],
+        found={(*place, "nominal"): result}, bounds={place[:2]: np.array([10, 20])}, integrator=None,
+        throughput=None, wall_s=1.0,
+    )  # fmt: skip
+    cell = document["tasks"]["go_through_poses_3d"]["lqr"]
+    assert (cell["goals_reached"], cell["goals_bound"], cell["share_of_bound"]) == (7.5, 15.0, 0.5)
+    print_tables(document, Console())
+    assert "7.5 of 15.0" in capsys.readouterr().out
+
+
 def test_an_evaluation_that_fails_is_named_and_open(tmp_path):
     request = Request(
         tmp_path, 1, 1, robots=("spacecraft_16",), tasks=("go_to_pose_3d",), controllers=("lqr",),
@@ -218,7 +260,7 @@ def test_an_evaluation_that_fails_is_named_and_open(tmp_path):
     key = (*place, "nominal")
     document = document_of(
         request, pairs={place: _pair(request, *place)}, keys=[key], found={key: "RunFailed: it fell"},
-        integrator=None, throughput=None, wall_s=1.0,
+        bounds={}, integrator=None, throughput=None, wall_s=1.0,
     )  # fmt: skip
     cell = document["tasks"]["go_to_pose_3d"]["lqr"]
     assert (cell["status"], cell["reason"]) == ("failed", "nominal: RunFailed: it fell")

@@ -6,9 +6,10 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from fulmar_benchmarks.pairs import Pair, code_hash, hash_of, with_law, with_policy
+from fulmar_benchmarks.rans3d.bound import bounds_of
 from fulmar_benchmarks.rans3d.document import Key, document_of
 from fulmar_benchmarks.rans3d.integrator import measure_integrator
 from fulmar_benchmarks.rans3d.pace import measure_pace
@@ -89,7 +90,16 @@ def run_rans3d(
         list(units.values()), jobs=request.jobs, fresh=request.fresh, progress=progress, on_done=on_done
     )
     found = {key: outcomes[unit] for key, unit in units.items()}
-    parts: dict[str, Any] = {"integrator": None, "throughput": None}
+    counting = {
+        key[:2]: cast(SpaceTrial, unit.trial)
+        for key, unit in units.items()
+        if unit.trial.task.required is not None
+    }
+    parts: dict[str, Any] = {
+        "bounds": bounds_of(counting, jobs=request.jobs),
+        "integrator": None,
+        "throughput": None,
+    }
     if "integrator" in request.parts:
         robots = [load_robot(name) for name in request.robots]
         parts["integrator"] = measure_integrator(

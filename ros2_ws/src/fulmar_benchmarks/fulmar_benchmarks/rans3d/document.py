@@ -57,6 +57,7 @@ def document_of(
     pairs: dict[tuple[str, str, str], Pair],
     keys: list[Key],
     found: dict[Key, PairResult | str],
+    bounds: dict[tuple[str, str], np.ndarray],
     integrator: dict[str, Any] | None,
     throughput: dict[str, Any] | None,
     wall_s: float,
@@ -68,11 +69,12 @@ def document_of(
         pairs: Who drives, by robot, task and controller.
         keys: What was to be evaluated.
         found: Results, or why there is none.
+        bounds: Most targets of the first episodes, by robot and task that counts them.
         integrator: Of `measure_integrator`; None: not measured.
         throughput: Of `measure_pace`; None: not measured.
         wall_s: How long it took [s].
     """
-    cells = {robot: _cells(request, robot, pairs, found) for robot in ROBOTS}
+    cells = {robot: _cells(request, robot, pairs, found, bounds) for robot in ROBOTS}
     dead = {
         scenario: figures_of(found.get((ROBOTS[0], DEAD_TASK, DEAD_CONTROLLER, scenario)))
         | {"dead": count, "of": 16, "task": DEAD_TASK, "controller": DEAD_CONTROLLER}
@@ -111,12 +113,15 @@ def _cells(
     robot: str,
     pairs: dict[tuple[str, str, str], Pair],
     found: dict[Key, PairResult | str],
+    bounds: dict[tuple[str, str], np.ndarray],
 ) -> Cells:
     if robot not in request.robots or "tasks" not in request.parts:
         return {}
     return {
         task: {
-            name: _cell(request, pairs[robot, task, name], (robot, task, name), found)
+            name: _cell(
+                request, pairs[robot, task, name], (robot, task, name), found, bounds.get((robot, task))
+            )
             for name in request.controllers
         }
         for task in request.tasks
@@ -124,7 +129,11 @@ def _cells(
 
 
 def _cell(
-    request: Request, pair: Pair, place: tuple[str, str, str], found: dict[Key, PairResult | str]
+    request: Request,
+    pair: Pair,
+    place: tuple[str, str, str],
+    found: dict[Key, PairResult | str],
+    bound: np.ndarray | None,
 ) -> dict[str, Any]:
     outcomes = {scenario: found.get((*place, scenario)) for scenario in request.scenarios}
     faults = [f"{scenario}: {one}" for scenario, one in outcomes.items() if isinstance(one, str)]
@@ -136,6 +145,11 @@ def _cell(
         "law": pair.law or None,
         "sha256": pair.sha256 or None,
     }
+    nominal = outcomes.get(NOMINAL)
+    if bound is not None and isinstance(nominal, PairResult):
+        reached = nominal.figures["goals_reached"][: len(bound)]
+        entry["goals_bound"] = float(np.mean(bound))
+        entry["share_of_bound"] = float(np.mean(reached / np.maximum(bound, 1)))
     if RANDOMISED in outcomes:
         entry[RANDOMISED] = figures_of(outcomes[RANDOMISED])
     return entry

@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
 
 from fulmar_benchmarks.cells import display_name
 from fulmar_benchmarks.rans3d.document import Key
@@ -64,7 +65,9 @@ def draw_glance(document: dict[str, Any]) -> Figure:
             at += 1.0
         axes.set_title(display_name(robot), loc="left")
         axes.set_ylim(at - 0.4, -0.6)
-        axes.set_xlim(-0.02, 1.02)
+        low = _lowest(tasks)
+        axes.set_xlim(low - 0.02 * (1.0 - low), 1.0 + 0.02 * (1.0 - low))
+        axes.xaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
         axes.set_yticks(ticks, labels)
         axes.xaxis.set_major_formatter(lambda value, _: f"{100.0 * value:.0f} %")
         quiet_grid(axes)
@@ -79,8 +82,11 @@ def _row(axes: Axes, at: float, name: str, cell: dict[str, Any], limit: float | 
     colour = COLOURS[name]
     axes.axhline(at, color=FAINT, linewidth=0.5, alpha=0.35, zorder=1)
     if cell["success_rate"] is None:
-        axes.text(0.5, at, cell["status"], va="center", ha="center", color=FAINT, fontsize=8.5)
-    held = cell.get(RANDOMISED, {}).get("holdable", {}).get("success_rate")
+        middle = axes.get_yaxis_transform()
+        axes.text(
+            0.5, at, cell["status"], transform=middle, va="center", ha="center", color=FAINT, fontsize=8.5
+        )
+    held = _held(cell)
     if held is not None:
         axes.plot(
             held, at, "D", color=colour, markerfacecolor="none", markersize=8.0, zorder=5, clip_on=False
@@ -89,6 +95,21 @@ def _row(axes: Axes, at: float, name: str, cell: dict[str, Any], limit: float | 
         axes.plot(cell["success_rate"], at, "o", color=colour, markersize=5.0, zorder=6, clip_on=False)
     if limit is not None:
         axes.plot(limit, at, "|", color=INK, markersize=11, markeredgewidth=1.6, zorder=4)
+
+
+def _held(cell: dict[str, Any]) -> float | None:
+    """Success among the randomised episodes that can be held."""
+    share: float | None = cell.get(RANDOMISED, {}).get("holdable", {}).get("success_rate")
+    return share
+
+
+def _lowest(tasks: dict[str, dict[str, Any]]) -> float:
+    """Left end of the scale: a tenth at or below the lowest value, and below all that is required."""
+    values = [0.9]
+    for cells in tasks.values():
+        for cell in cells.values():
+            values += [share for share in (cell["success_rate"], _held(cell)) if share is not None]
+    return math.floor(10.0 * min(values)) / 10.0
 
 
 _KEY = [
@@ -132,6 +153,7 @@ def _over_time(axes: Axes, task: str, found: dict[str, PairResult]) -> None:
     if its.required is not None:
         limit_line(axes, its.required, "required")
         axes.set_ylim(bottom=0.0)
+        axes.yaxis.set_major_locator(MaxNLocator("auto", integer=True))
         axes.set_ylabel("targets reached")
     elif its.tolerance.position:
         limit_line(axes, its.tolerance.position)

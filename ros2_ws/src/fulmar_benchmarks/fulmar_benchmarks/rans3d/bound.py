@@ -1,0 +1,68 @@
+"""The most targets that physics allows a body in space to pass, from the bound in the plane.
+
+The shadow of a path on a plane is a path there: its acceleration is no larger, and it passes the shadows of the
+spheres. So whatever is too much in the plane is too much in space, for any plane; the least of several planes counts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+
+import numpy as np
+
+from fulmar_benchmarks.rans3d.unit import SpaceTrial
+from fulmar_benchmarks.workers import one_thread_each
+from fulmar_core.episode import Episode
+from fulmar_core.robot import Robot
+from fulmar_core.tasks import Task
+from fulmar_evaluation.bounds.time_optimal import time_optimal_bound
+
+Pair = tuple[str, str]  # robot and task
+
+PLANES = ((0, 1), (1, 2), (2, 0))  # by their axes in the world
+BOUNDED = 64  # episodes, from the first on: each takes a tenth of a second
+
+
+def bounds_of(trials: Mapping[Pair, SpaceTrial], *, jobs: int) -> dict[Pair, np.ndarray]:
+    """Bound the first `BOUNDED` episodes of some trials, by what they are called."""
+    if not trials:
+        return {}
+    with one_thread_each(), ProcessPoolExecutor(jobs, get_context("spawn")) as pool:
+        return dict(zip(trials, pool.map(_bound, trials.values()), strict=True))
+
+
+def _bound(trial: SpaceTrial) -> np.ndarray:
+    drawn = trial.drawn(np.arange(min(trial.episodes, BOUNDED)))
+    return most_targets(trial.robot, trial.task, drawn)
+
+
+def most_targets(robot: Robot, task: Task, drawn: Episode) -> np.ndarray:
+    """Bound the targets of some episodes: time-optimal travel of a point mass, turning not counted.
+
+    Args:
+        robot: The robot in space; its nominal body, with the force of its `performance` in every direction.
+        task: A task that counts targets; its tolerance is how near counts.
+        drawn: The episodes, with their batch axis.
+
+    Returns:
+        Whole targets, shape (episodes,).
+    """
+    start = np.stack((drawn.start.x, drawn.start.y, drawn.start.z), axis=-1)
+    places = np.asarray(drawn.goal.targets)[..., :3]
+    found = []
+    for axes in map(list, PLANES):
+        flat, shadows = start[..., axes], places[..., axes]
+        if np.any(np.ptp(shadows, axis=1).max(axis=-1) <= 2.0 * task.tolerance.position):
+            continue  # the shadows of all targets lie together: this plane has no bound
+        bound = time_optimal_bound(
+            flat,
+            np.zeros(2),
+            shadows,
+            radius=task.tolerance.position,
+            acceleration=robot.performance.force / robot.body.mass,
+            duration_s=task.episode_s,
+        )
+        found.append(bound.goals)
+    return np.asarray(np.min(found, axis=0))
