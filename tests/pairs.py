@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Hashable, Iterable, Mapping
+from collections.abc import Hashable, Iterable, Mapping
 from typing import Any
 
 import pytest
 
-from fulmar_core.robot import Robot
 from tests.spaces import shared_space
 
 
-def covering(
-    pairs: Iterable[tuple[Hashable, Hashable]], *, costly: Collection[Hashable] = ()
-) -> set[tuple[Hashable, Hashable]]:
+def covering(pairs: Iterable[tuple[Hashable, Hashable]]) -> set[tuple[Hashable, Hashable]]:
     """Choose few pairs that hold every robot and every task of all pairs, with the robots taking turns.
 
     Args:
         pairs: Names of a robot and of a task.
-        costly: Robots that take a task only where no other does it, or once.
 
     Returns:
         Those chosen, the same ones each time.
@@ -26,8 +22,7 @@ def covering(
     pairs, chosen = list(pairs), dict[tuple[Hashable, Hashable], None]()
     turns = dict.fromkeys((robot for robot, _ in pairs), 0)
     for task in dict.fromkeys(task for _, task in pairs):
-        able = [robot for robot, other in pairs if other == task]
-        robot = min(able, key=lambda robot: (robot in costly, turns[robot]))
+        robot = min((robot for robot, other in pairs if other == task), key=turns.__getitem__)
         turns[robot] += 1
         chosen[robot, task] = None
     for robot, task in pairs:
@@ -45,7 +40,7 @@ def each_pair(robots: Mapping[str, Any], tasks: Mapping[str, Any]) -> pytest.Mar
         tasks: Same.
     """
     names = shared_space(robots, tasks)
-    quick = covering(names, costly=stepped_finely(robots))
+    quick = covering(names)
     return pytest.mark.parametrize(
         ("robot", "task"),
         [
@@ -58,13 +53,3 @@ def each_pair(robots: Mapping[str, Any], tasks: Mapping[str, Any]) -> pytest.Mar
             for robot, task in names
         ],
     )
-
-
-def stepped_finely(robots: Mapping[str, Robot]) -> set[str]:
-    """Names of robots with many physics steps to a control step, which cost most to simulate."""
-    return {name for name, robot in robots.items() if robot.timing.substeps(robot.timing.control_hz) > 20}
-
-
-def slow_if_stepped_finely(robot: Robot) -> tuple[pytest.MarkDecorator, ...]:
-    """Marks of a test that simulates a robot for long."""
-    return (pytest.mark.slow,) if stepped_finely({robot.name: robot}) else ()

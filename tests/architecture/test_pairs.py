@@ -24,15 +24,6 @@ def test_a_robot_is_included_even_if_all_its_tasks_are_taken():
     assert covering([("a", 1), ("b", 1), ("c", 2)]) == {("a", 1), ("b", 1), ("c", 2)}
 
 
-def test_a_costly_robot_takes_a_task_once_or_where_no_other_does():
-    pairs = [("cheap", task) for task in range(4)] + [("costly", task) for task in range(5)]
-    assert covering(pairs, costly={"costly"}) == {*(("cheap", task) for task in range(4)), ("costly", 4)}
-    assert covering(pairs[:6], costly={"costly"}) == {
-        *(("cheap", task) for task in range(4)),
-        ("costly", 0),
-    }
-
-
 def test_robots_meet_the_tasks_of_their_space_alone():
     robots = {name: load_robot(name) for name in ("turtlebot2", "spacecraft_16")}
     tasks = {name: load_task(name) for name in ("go_to_pose", "go_to_pose_3d", "push_block")}

@@ -20,7 +20,6 @@ from fulmar_core.robot import load_robot
 from fulmar_core.rollout import roll_out_in_backends, roll_out_in_batch
 from fulmar_core.tasks import load_task
 from sim_nodes.mock_backend import MockBackend
-from tests.pairs import slow_if_stepped_finely
 from tests.spaces import shared_space
 
 ROBOT, TASK = load_robot("floating_platform"), load_task("go_to_pose")
@@ -175,10 +174,7 @@ ALIKE = {name: load_robot(name) for name in ("turtlebot2", "modular_freeflyer", 
 
 @pytest.mark.parametrize(
     ("robot", "name"),
-    [
-        pytest.param(robot, name, marks=slow_if_stepped_finely(ALIKE[robot]))
-        for robot, name in shared_space(ALIKE, {name: load_task(name) for name in config_names("tasks")})
-    ],
+    shared_space(ALIKE, {name: load_task(name) for name in config_names("tasks")}),
 )
 def test_episodes_go_alike_in_the_batch_and_one_by_one(robot, name):
     robot, task = ALIKE[robot], replace(load_task(name), episode_s=8.0)

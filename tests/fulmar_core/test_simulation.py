@@ -13,7 +13,6 @@ from fulmar_core.planar import PlanarState, at_rest
 from fulmar_core.robot import load_robot
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import load_task
-from tests.pairs import slow_if_stepped_finely
 from tests.simulations import BASE, RANDOMISED, ROBOTS, STILL, build, commands, run
 from tests.spaces import task_for
 
@@ -244,10 +243,7 @@ def test_the_floating_type_is_kept_through_steps_and_resets(robot, dtype):
     assert {values.dtype for values in everything(simulation).values()} == {np.dtype(dtype)}
 
 
-@pytest.mark.parametrize(
-    "robot",
-    [pytest.param(robot, id=name, marks=slow_if_stepped_finely(robot)) for name, robot in ROBOTS.items()],
-)
+@EACH_ROBOT
 def test_single_precision_follows_double_over_a_whole_episode(robot):
     single, double = (build(STILL, robot, dtype=dtype) for dtype in (np.float32, np.float64))
     for command in commands(single, 300):

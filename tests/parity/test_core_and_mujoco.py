@@ -21,7 +21,6 @@ from fulmar_core.spatial import SpatialState
 from fulmar_core.tasks import load_task
 from sim_nodes.mock_backend import MockBackend
 from tests.new_robots import new_robot
-from tests.pairs import slow_if_stepped_finely
 from tests.spaces import SPACECRAFT, task_for
 
 mujoco = pytest.importorskip("mujoco")
@@ -171,7 +170,7 @@ class Swaying:
 
 
 EVERY_ROBOT = [
-    pytest.param(name, marks=slow_if_stepped_finely(load_robot(name)))
+    name
     for name in config_names("robots")
     if name != "floating_platform_roboran"  # the platform with other numbers
 ]

@@ -14,7 +14,7 @@ from fulmar_core.robot import load_robot
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import load_task
 from tests.new_robots import new_robot
-from tests.pairs import covering, slow_if_stepped_finely
+from tests.pairs import covering
 from tests.spaces import robot_for
 
 torch = pytest.importorskip("torch")
@@ -71,9 +71,7 @@ def busiest(robot):
     [
         pytest.param(
             *case,
-            marks=slow_if_stepped_finely(load_robot(case[0]))
-            if case in covering(CASES)
-            else pytest.mark.slow,
+            marks=() if case in covering(CASES) else pytest.mark.slow,
         )
         for case in CASES
     ],
