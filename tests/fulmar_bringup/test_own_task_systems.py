@@ -22,7 +22,7 @@ control_hz: 10
 
 
 def test_a_system_file_of_the_user_s_own_starts_nodes_with_task_and_controller(tmp_path, monkeypatch):
-    task, controller, _ = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+    task, controller, *_ = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
     (tmp_path / "my_task.py").write_text(task)
     (tmp_path / "my_orbit.py").write_text(controller)
     (tmp_path / "systems").mkdir()

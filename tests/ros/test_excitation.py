@@ -31,6 +31,7 @@ def test_an_excited_run_succeeds_without_a_goal_and_its_bag_states_thrust_and_in
     assert estimates["yaw_inertia"]["value"] == pytest.approx(0.2045, rel=0.03)
 
 
+@pytest.mark.slow
 def test_a_spacecraft_is_excited_and_its_bag_states_mass_thrust_inertia_and_centre_of_mass(
     ros_domain: RosDomain, tmp_path: Path
 ) -> None:

@@ -142,6 +142,7 @@ def test_a_task_that_fails_on_the_way_ends_its_run_with_one_line_and_a_robot_tha
     assert not commanded[-1].any()
 
 
+@pytest.mark.slow
 def test_the_task_in_space_of_the_page_is_done_by_a_controller_and_learned(
     ros_domain: RosDomain, folder: Path
 ) -> None:

@@ -42,6 +42,11 @@ def test_the_table_names_every_policy_that_shall_ship():
     }
     wanted |= {f"{robot}_go_to_position" for robot in ("modular_freeflyer", "jetbot", "leatherback")}
     wanted |= {"floating_platform_drift_go_to_pose", "floating_platform_drift_track_velocities"}
+    positions, poses = "go_to_position_3d", "go_to_pose_3d"
+    wanted |= {f"int_ball2_{task}" for task in (positions, poses)}
+    wanted |= {
+        f"spacecraft_16_{task}" for task in (positions, poses, "track_velocities_3d", "go_through_poses_3d")
+    }
     assert names == wanted
 
 
