@@ -179,6 +179,13 @@ def test_inputs_of_an_unknown_state_and_goal_are_not_a_number():
     assert (inputs.previous.tolist(), inputs.stamp_ns) == ([[0.0, 0.0]], 7 * S)
 
 
+@pytest.mark.parametrize(("task", "numbers"), [("go_to_pose_3d", 7), ("track_velocities_3d", 6)])
+def test_unknown_inputs_in_space_have_targets_of_their_space(task, numbers):
+    robot = load_robot("spacecraft_16")
+    loop = loop_of(Scripted(np.zeros(16), robot=robot), task=load_task(task), goal=None, robot=robot)
+    assert np.isnan(unknown_inputs(loop, 0).goal.current).tolist() == [[True] * numbers]
+
+
 # What an estimator learns from
 
 ESTIMATOR, POSE_GOAL = HealthSettings(retry_s=0.0), goal_at((0.0, 0.0, 0.0))[None]

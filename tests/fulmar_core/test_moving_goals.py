@@ -10,12 +10,15 @@ import pytest
 from fulmar_core.attitude import turn
 from fulmar_core.controllers.target_motion import TargetMotion
 from fulmar_core.errors import ConfigError
+from fulmar_core.goal import goal_at
 from fulmar_core.goal_files import Trajectory, load_goals
 from fulmar_core.goal_sequence import goal_sequence
 from fulmar_core.references.in_space import Helix, TiltedCircle
 from fulmar_core.robot import load_robot
 from fulmar_core.spatial import SpatialState
-from tests.fulmar_core.test_guards_in_space import Bench
+from tests.fulmar_core.test_guarded_loop import LAB, S
+from tests.fulmar_core.test_guarded_loop import Bench as PlanarBench
+from tests.fulmar_core.test_guards_in_space import STEP_NS, Bench
 
 CRAFT = load_robot("spacecraft_16")
 CIRCLE = Trajectory("trajectory", "t", TiltedCircle("tilted_circle", radius=2.0, tilt_deg=90.0), speed=0.1)
@@ -124,6 +127,33 @@ def test_a_goal_that_moves_a_little_goes_on_and_one_that_moves_more_begins_anew(
         begun += 1
         assert len(forgotten) == begun
     assert bench.guard.mission.goals_received == 3
+
+
+@pytest.mark.parametrize(("after_s", "moved"), [(0.2, True), (2.0, False)])
+def test_in_the_plane_a_goal_near_the_one_before_begins_anew_unless_it_is_streamed(after_s, moved):
+    bench = PlanarBench()
+    bench.give(goal_at((0.5, 0.0, 0.0)), S)
+    bench.give(goal_at((0.55, 0.0, 0.0)), S + round(after_s * S))
+    assert (bench.guard.mission.moved, bench.guard.mission.goals_received) == (moved, 2 - moved)
+
+
+def test_a_gate_that_turns_where_it_stands_is_another_goal():
+    bench = PlanarBench(task="race_gates")
+    bench.give(goal_at((1.0, 0.0, 0.0)), S)
+    bench.give(goal_at((1.0, 0.1, np.pi)), S + 1)
+    assert (bench.guard.mission.moved, bench.guard.mission.goals_received) == (False, 2)
+
+
+def test_a_target_that_moves_does_not_release_a_robot_that_left_its_area():
+    bench = PlanarBench(area=LAB)
+    bench.give(goal_at((-0.9, 0.0, 0.0)), S)
+    assert bench.step(0.9)[1] is not None
+    assert bench.step(1.1)[1] is None
+    for number in range(1, 4):
+        bench.give(goal_at((-0.9, 0.001 * number, 0.0)), S + number * STEP_NS)
+        assert bench.step(0.9)[1] is None
+    bench.give(goal_at((-0.9, 0.0, 0.0)), 9 * S)
+    assert bench.step(0.9)[1] is not None
 
 
 def test_a_repeated_goal_of_an_operator_begins_anew_as_before():

@@ -44,7 +44,7 @@ from fulmar_bringup.system_rows import own_nodes
 from fulmar_core.disturbances.scenario import Scenario, load_scenario
 from fulmar_core.episode import draw_episode
 from fulmar_core.errors import ConfigError, UnknownNameError
-from fulmar_core.goal import Goal, PoseTuple
+from fulmar_core.goal import PLACES, Goal, PoseTuple
 from fulmar_core.goal_files import GoalFile
 from fulmar_core.recording import MODES, Mode, Recording
 from fulmar_core.robot import Robot, load_robot
@@ -53,7 +53,6 @@ from fulmar_core.safety.geofence import check_places, check_starts, unreachable
 from fulmar_core.tasks import Task, load_task
 
 DRAWS = 1000  # of a start and a goal, before an area counts as too small for them
-PLACES = ("goal_pose", "goal_point")  # goals that a person can say in one line
 
 
 @dataclass(frozen=True)

@@ -180,8 +180,10 @@ class ControlLoop:
 
 def unknown_inputs(loop: ControlLoop, stamp_ns: int) -> Inputs:
     """Inputs of one robot whose state and goal are not known: NaN."""
-    state = loop.task.state_type.unknown()
-    things = {thing.name: np.full((1, 3), np.nan) for thing in loop.task.things}
-    goal = Goal(np.full((1, 1, 3), np.nan), np.zeros(1), np.zeros((1, 0, 3)), things)
+    form = loop.task.state_type
+    twist = loop.task.goal_topic == "goal_velocity"
+    things = {thing.name: form.targets_of(np.full((1, 7), np.nan)) for thing in loop.task.things}
+    target = form.targets_of(np.full((1, 1, 6 if twist else 7), np.nan))
+    goal = Goal(target, np.zeros(1), np.zeros((1, 0, 3)), things)
     observation = np.full((1, len(loop.observer.names)), np.nan)
-    return Inputs(state, goal, observation, loop.previous, None, stamp_ns, loop.dt)
+    return Inputs(form.unknown(), goal, observation, loop.previous, None, stamp_ns, loop.dt)

@@ -12,6 +12,7 @@ from fulmar_core.arrays import array_namespace
 from fulmar_core.planar import PlanarState
 from fulmar_core.rotation import Array
 
+PLACES = ("goal_pose", "goal_point")  # topics of goals that are one place
 PoseTuple = tuple[float, ...]  # as people write a pose: `State.NUMBERS` [m, deg]
 
 
@@ -19,17 +20,18 @@ PoseTuple = tuple[float, ...]  # as people write a pose: `State.NUMBERS` [m, deg
 class Goal:
     """Targets of one episode, or of many at once.
 
-    A target is a pose (x [m], y [m], yaw [rad]) in the world, or, for tasks that track velocities, a velocity
-    (ahead [m/s], to the left [m/s], turn rate [rad/s]) in the body's frame.
+    A target in the plane is a pose (x [m], y [m], yaw [rad]) in the world, or, for tasks that track velocities, a
+    velocity (ahead [m/s], to the left [m/s], turn rate [rad/s]) in the body's frame. In space it has seven numbers,
+    place [m] and unit quaternion x, y, z, w, or six, velocity [m/s] and turn rate [rad/s] along the body's axes.
     """
 
-    targets: Array  # (..., k, 3), k >= 1; after the last one the first comes again
+    targets: Array  # (..., k, 3; 7 or 6 in space), k >= 1; after the last one the first comes again
     done: Array  # (...,) targets already reached, whole numbers
     # (..., m, 3 or more) x [m], y [m], radius [m] of discs, and what a task adds to them; m may be 0, a radius of 0 is
     # no obstacle.
     obstacles: Array
-    # Poses (..., 3) x [m], y [m], yaw [rad] in the world by name: of what `Task.things` declares, and of whatever else
-    # a task keeps from step to step.
+    # Poses (..., 3) x [m], y [m], yaw [rad], in space (..., 7), in the world by name: of what `Task.things` declares,
+    # and of whatever else a task keeps from step to step.
     things: Mapping[str, Array] = field(default_factory=dict)
 
     def write(self, index: Any, other: Goal) -> None:

@@ -173,7 +173,7 @@ class GuardedLoop:
             self.refusal = Refusal()
             if self.mission.give(goal, stamp_ns):
                 self._anew = self._anew or not self.mission.moved
-                if not self._settings.goals_streamed:
+                if not (self._settings.goals_streamed or self.mission.moved):
                     # A new goal after a look at the robot: one that was outside its area may go on, if it is back.
                     self._change(outside=self._outside())
             self._follow_mission()

@@ -10,7 +10,7 @@ from typing import Generic, TypeVar
 import numpy as np
 
 from fulmar_core.control_loop import ControlLoop
-from fulmar_core.goal import Goal, stack_goals
+from fulmar_core.goal import PLACES, Goal, stack_goals
 from fulmar_core.state import State
 
 # A stamp further ahead is of another clock, as a person's beside a simulation's.
@@ -52,6 +52,10 @@ class Schedule(Generic[T]):
 GOALS_REMEMBERED = 200  # stamps of goals; publishers repeat at most the last 100
 THING_LASTS_NS = 1_000_000_000  # where a thing was longer ago, it need not be any more
 
+STREAM_NS = (
+    1_000_000_000  # between the stamps of a target that moves, at most; a person's goals are farther apart
+)
+
 GoalKey = tuple[int, int]  # stamp [ns] and hash of the targets
 
 
@@ -62,7 +66,8 @@ class Mission:
         goal_stamp_ns: Of the newest goal; 0 without one [ns].
         obstacles_stamp_ns: Of the newest obstacles [ns].
         goals_received: Goals that began something new; of velocities that follow one another, the first.
-        moved: Whether the newest goal goes on from the one before: the target moved by no more than the tolerance.
+        moved: Whether the newest goal goes on from the one before: a stream whose target moved by no more than the
+            tolerance.
     """
 
     def __init__(self, loop: ControlLoop, *, streamed: bool = False) -> None:
@@ -106,7 +111,7 @@ class Mission:
             if key in self._given:
                 return False
             self._given.append(key)
-        self.goal_stamp_ns = stamp_ns
+        since_ns, self.goal_stamp_ns = stamp_ns - self.goal_stamp_ns, stamp_ns
         if self._schedule is not None:
             self.goals_received += self._given_goal is None
             self._schedule.give(goal, stamp_ns)
@@ -114,7 +119,7 @@ class Mission:
         same = self._given_goal is not None and np.array_equal(self._given_goal.targets, goal.targets)
         if self._streamed and same:
             return False
-        self.moved = not same and self._goes_on(goal)
+        self.moved = not same and 0 < since_ns <= STREAM_NS and self._goes_on(goal)
         self.goals_received += not self.moved
         self._take(goal, anew=not self.moved)
         return True
@@ -122,8 +127,8 @@ class Mission:
     def _goes_on(self, goal: Goal) -> bool:
         """Whether a robot that is at the goal's target so far is at that of another goal, too."""
         given, task = self._given_goal, self._task
-        alone = len(goal.targets) == 1 and not task.things and not task.sees_obstacles
-        if given is None or self._loop.goal is None or not alone or len(given.targets) > 1:
+        place = task.goal_topic in PLACES and not task.things and not task.sees_obstacles
+        if given is None or self._loop.goal is None or not place:
             return False
         there = task.state_type.resting(np.asarray(given.targets, dtype=float))
         return bool(task.tolerance.holds(task.errors(there, stack_goals([goal])))[0])

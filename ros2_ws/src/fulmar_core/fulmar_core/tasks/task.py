@@ -143,7 +143,10 @@ class Task(ABC, Generic[S]):
         """How far a state is from the current target."""
 
     def begun(self, goal: Goal, state: S) -> Goal:
-        """A goal that was received, for a robot that is somewhere, before its first step."""
+        """A goal that was received, for a robot that is somewhere, before its first step.
+
+        Not called for a target that moves and goes on from the goal before.
+        """
         return goal
 
     def advance(self, goal: Goal, state: S, time_s: Array) -> Goal:
