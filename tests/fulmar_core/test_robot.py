@@ -32,6 +32,20 @@ def test_a_flat_disc_is_a_body():
     assert replace(ROBOT.body, inertia=(0.1, 0.2, 0.3)).inertia == (0.1, 0.2, 0.3)
 
 
+@pytest.mark.parametrize("name", ["floating_platform", "turtlebot2", "kingfisher"])
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"inertia": (0.1, 0.1, 0.1, 0.01, 0.0, 0.0)}, "'body.inertia' has 6 values and 'body.center_of_mass' 2"),
+        ({"center_of_mass": (0.0, 0.0, 0.01)}, "'body.inertia' has 3 values and 'body.center_of_mass' 3"),
+    ],
+)
+def test_a_robot_in_the_plane_has_no_mass_properties_of_space(name, change, words):
+    robot = load_robot(name)
+    with pytest.raises(ValueError, match=f"{words}; a robot in the plane has xx, yy, zz and x, y"):
+        replace(robot, body=replace(robot.body, **change))
+
+
 @pytest.mark.parametrize("span", [(2.0, 1.0), (0.0, 1.0), (-1.0, 1.0)])
 def test_an_empty_or_impossible_span_is_refused(span):
     with pytest.raises(ValueError, match="'mass' must be"):
