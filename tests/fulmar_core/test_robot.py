@@ -36,7 +36,10 @@ def test_a_flat_disc_is_a_body():
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"inertia": (0.1, 0.1, 0.1, 0.01, 0.0, 0.0)}, "'body.inertia' has 6 values and 'body.center_of_mass' 2"),
+        (
+            {"inertia": (0.1, 0.1, 0.1, 0.01, 0.0, 0.0)},
+            "'body.inertia' has 6 values and 'body.center_of_mass' 2",
+        ),
         ({"center_of_mass": (0.0, 0.0, 0.01)}, "'body.inertia' has 3 values and 'body.center_of_mass' 3"),
     ],
 )

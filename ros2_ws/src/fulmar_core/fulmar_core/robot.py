@@ -244,7 +244,10 @@ class Robot:
         return self.actuators.recipe if self.state_type is PlanarState else "free_flyer"
 
     def __post_init__(self) -> None:
-        if self.state_type is PlanarState and (len(self.body.inertia), len(self.body.center_of_mass)) != (3, 2):
+        if self.state_type is PlanarState and (len(self.body.inertia), len(self.body.center_of_mass)) != (
+            3,
+            2,
+        ):
             raise ValueError(
                 f"'body.inertia' has {len(self.body.inertia)} values and 'body.center_of_mass' "
                 f"{len(self.body.center_of_mass)}; a robot in the plane has xx, yy, zz and x, y. Leave out the others."
