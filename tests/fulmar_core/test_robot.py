@@ -120,6 +120,17 @@ def test_a_robot_that_is_never_drawn_or_cannot_exist_is_refused(tmp_path, monkey
         load_robot("turtlebot2")
 
 
+def test_the_span_of_a_whole_tensor_is_not_bound_by_the_nominal_moments(tmp_path, monkeypatch):
+    (tmp_path / "robots").mkdir()
+    text = (config_directory() / "robots" / "spacecraft_16.yaml").read_text()
+    flat = text.replace("inertia: [0.2045, 0.2045, 0.2045]", "inertia: [0.1, 0.11, 0.2045]")
+    assert flat != text
+    (tmp_path / "robots" / "spacecraft_16.yaml").write_text(flat)
+    monkeypatch.setenv("FULMAR_CONFIGS", str(tmp_path))
+    robot = load_robot("spacecraft_16")
+    assert robot.uncertainty.yaw_inertia[1] > sum(robot.body.inertia[:2])
+
+
 def test_wheels_outside_of_the_outline_are_refused():
     robot = load_robot("turtlebot2")
     with pytest.raises(ValueError, match="'track' = 23 m puts the wheels outside of the outline"):

@@ -341,7 +341,8 @@ def _check_spans(robot: Robot, path: Path) -> None:
                 f"{path}: 'uncertainty' has {name}: [{low:g}, {high:g}], which does not hold the body's own "
                 f"{nominal:g}."
             )
-    if spans.yaw_inertia[1] > roll + pitch:
+    # In space the whole tensor grows and shrinks with `yaw_inertia`: any factor leaves a body a body.
+    if robot.state_type is PlanarState and spans.yaw_inertia[1] > roll + pitch:
         raise ImplausibleError(
             f"{path}: 'uncertainty' has yaw_inertia up to {spans.yaw_inertia[1]:g}; no body has a moment beyond "
             f"the sum of the two others, {roll + pitch:g}."
