@@ -199,7 +199,9 @@ def test_pairs_without_a_law_are_refused_with_what_to_use_instead(name):
     assert lacking
     for robot, task in lacking:
         if name == "lqr" and robot.actuators.kind not in families_of("lqr"):
-            expected = rf"'lqr' is for robots with thrusters or fans; '{robot.name}' .*Use --controller classical"
+            expected = (
+                rf"'lqr' is for robots with thrusters or fans; '{robot.name}' .*Use --controller classical"
+            )
         elif task.state_type is robot.state_type:
             expected = rf"on '{robot.name}' .*there is one for: go_to_.*Use --controller policy"
         else:
