@@ -144,6 +144,18 @@ def test_what_is_no_inertia_at_all_is_one_problem_with_what_was_found(fulmar, tm
     assert not fulmar("check", "robot", str(path))[2]
 
 
+@pytest.mark.parametrize(
+    "change", [{"body__inertia": [0.2, 0.2, 0.2, 0.01, 0.0, 0.0]}, {"body__center_of_mass": [0.0, 0.0, 0.02]}]
+)
+def test_mass_properties_of_space_in_the_plane_are_one_problem(fulmar, tmp_path, change):
+    path = altered(tmp_path, "floating_platform", **change)
+    code, found = checked(fulmar, path)
+    assert (code, found["passed"], found["wrench"]) == (1, False, None)
+    (problem,) = found["problems"]
+    assert str(path) in problem
+    assert "a robot in the plane has xx, yy, zz and x, y" in problem
+
+
 def test_a_gyroscope_that_cannot_see_what_the_gates_reject_is_one_problem(fulmar, tmp_path):
     path = altered(tmp_path, sensors__imu__gyroscope={"limit": 4.0})
     code, found = checked(fulmar, path)

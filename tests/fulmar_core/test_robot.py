@@ -32,6 +32,23 @@ def test_a_flat_disc_is_a_body():
     assert replace(ROBOT.body, inertia=(0.1, 0.2, 0.3)).inertia == (0.1, 0.2, 0.3)
 
 
+@pytest.mark.parametrize("name", ["floating_platform", "turtlebot2", "kingfisher"])
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (
+            {"inertia": (0.1, 0.1, 0.1, 0.01, 0.0, 0.0)},
+            "'body.inertia' has 6 values and 'body.center_of_mass' 2",
+        ),
+        ({"center_of_mass": (0.0, 0.0, 0.01)}, "'body.inertia' has 3 values and 'body.center_of_mass' 3"),
+    ],
+)
+def test_a_robot_in_the_plane_has_no_mass_properties_of_space(name, change, words):
+    robot = load_robot(name)
+    with pytest.raises(ValueError, match=f"{words}; a robot in the plane has xx, yy, zz and x, y"):
+        replace(robot, body=replace(robot.body, **change))
+
+
 @pytest.mark.parametrize("span", [(2.0, 1.0), (0.0, 1.0), (-1.0, 1.0)])
 def test_an_empty_or_impossible_span_is_refused(span):
     with pytest.raises(ValueError, match="'mass' must be"):
@@ -101,6 +118,17 @@ def test_a_robot_that_is_never_drawn_or_cannot_exist_is_refused(tmp_path, monkey
     monkeypatch.setenv("FULMAR_CONFIGS", str(tmp_path))
     with pytest.raises(ConfigError, match=rf"robots/turtlebot2\.yaml: 'uncertainty' .*{words}"):
         load_robot("turtlebot2")
+
+
+def test_the_span_of_a_whole_tensor_is_not_bound_by_the_nominal_moments(tmp_path, monkeypatch):
+    (tmp_path / "robots").mkdir()
+    text = (config_directory() / "robots" / "spacecraft_16.yaml").read_text()
+    flat = text.replace("inertia: [0.2045, 0.2045, 0.2045]", "inertia: [0.1, 0.11, 0.2045]")
+    assert flat != text
+    (tmp_path / "robots" / "spacecraft_16.yaml").write_text(flat)
+    monkeypatch.setenv("FULMAR_CONFIGS", str(tmp_path))
+    robot = load_robot("spacecraft_16")
+    assert robot.uncertainty.yaw_inertia[1] > sum(robot.body.inertia[:2])
 
 
 def test_wheels_outside_of_the_outline_are_refused():

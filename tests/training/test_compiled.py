@@ -16,6 +16,7 @@ from fulmar_core.paths import config_names
 from fulmar_core.robot import load_robot
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import load_task
+from tests.new_robots import new_robot
 from tests.pairs import each_pair
 from training import kernel
 from training.compiled import CompiledStep
@@ -36,9 +37,9 @@ EACH_PAIR = each_pair(
 )
 
 
-def assert_moves_as_in_numpy(robot, task, steps=60, control_hz=None):
+def assert_moves_as_in_numpy(robot, task, steps=60, control_hz=None, scenario=RANDOMISED):
     plain, batch = (
-        BatchSimulation(robot, task, RANDOMISED, worlds=WORLDS, seed=5, training=True, control_hz=control_hz)
+        BatchSimulation(robot, task, scenario, worlds=WORLDS, seed=5, training=True, control_hz=control_hz)
         for _ in range(2)
     )
     compiled, rng = CompiledStep(batch), np.random.default_rng(6)
@@ -88,6 +89,14 @@ def test_one_trace_moves_worlds_of_every_pair_as_in_numpy(robot, task, traced):
     (made,) = traced[0].graph.output_node().args
     assert len(set(made)) == len(made)  # nothing is copied, neither what stays nor what two names have
     assert all(node.op != "placeholder" for node in made)
+
+
+def test_a_gravity_gradient_is_traced(traced):
+    probe = new_robot("lopsided_probe")
+    assert_moves_as_in_numpy(
+        probe, load_task("go_to_pose_3d"), steps=12, scenario=replace(RANDOMISED, orbit_rate=0.1)
+    )
+    assert len(traced) == 1
 
 
 def test_worlds_at_another_rate_are_traced_at_that_rate(traced):

@@ -96,7 +96,8 @@ def exponential(rotation: Vector) -> Quaternion:
     """Unit quaternion of a rotation vector (Solà eq. 101).
 
     Args:
-        rotation: Axis times angle [rad]; to the last bit up to half a turn, to 1e-12 up to a turn.
+        rotation: Axis times angle [rad]; to the last bit up to half a turn, to 1e-12 up to 4.5 rad, and to
+            1e-9 up to a turn.
     """
     half_squared = 0.25 * dot(rotation, rotation)
     # Powers instead of sine over angle: no division by zero, and at 1 rad exact to the last bit of float64.

@@ -174,7 +174,7 @@ class Mission:
         self._refresh()
 
     def see_thing(self, name: str, pose: np.ndarray, stamp_ns: int) -> None:
-        """Take the pose of a thing, shape (3,) [m, m, rad]."""
+        """Take the pose of a thing: the task's own, 3 numbers in the plane [m, m, rad], 7 in space [m, -]."""
         self._things[name] = pose, stamp_ns
         self._refresh()
 

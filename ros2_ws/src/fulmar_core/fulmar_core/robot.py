@@ -244,6 +244,14 @@ class Robot:
         return self.actuators.recipe if self.state_type is PlanarState else "free_flyer"
 
     def __post_init__(self) -> None:
+        if self.state_type is PlanarState and (len(self.body.inertia), len(self.body.center_of_mass)) != (
+            3,
+            2,
+        ):
+            raise ValueError(
+                f"'body.inertia' has {len(self.body.inertia)} values and 'body.center_of_mass' "
+                f"{len(self.body.center_of_mass)}; a robot in the plane has xx, yy, zz and x, y. Leave out the others."
+            )
         if isinstance(self.actuators, Rolling) and self.actuators.track > 2.0 * self.body.radius:
             raise ValueError(
                 f"'track' = {self.actuators.track:g} m puts the wheels outside of the outline, whose 'radius' is "
@@ -333,7 +341,8 @@ def _check_spans(robot: Robot, path: Path) -> None:
                 f"{path}: 'uncertainty' has {name}: [{low:g}, {high:g}], which does not hold the body's own "
                 f"{nominal:g}."
             )
-    if spans.yaw_inertia[1] > roll + pitch:
+    # In space the whole tensor grows and shrinks with `yaw_inertia`: any factor leaves a body a body.
+    if robot.state_type is PlanarState and spans.yaw_inertia[1] > roll + pitch:
         raise ImplausibleError(
             f"{path}: 'uncertainty' has yaw_inertia up to {spans.yaw_inertia[1]:g}; no body has a moment beyond "
             f"the sum of the two others, {roll + pitch:g}."

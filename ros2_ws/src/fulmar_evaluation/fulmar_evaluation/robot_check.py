@@ -150,8 +150,8 @@ def wrench_json(robot: Robot, wrenches: WrenchSet) -> dict[str, Any]:
 def least_time(robot: Robot, wrenches: WrenchSet) -> dict[str, list[float | None]]:
     """Least time from rest to rest for a metre along each axis and a quarter turn about each; null: it cannot [s].
 
-    Full force one way and then the other, by the pure limits; of wheels with the top speed between. Lag, delay, water
-    and the rhythm of control are left aside.
+    Full force one way and then the other, by the pure limits; of wheels with the top speed between. Lag, delay, water,
+    products of inertia, the offset of the centre of mass and the rhythm of control are left aside.
     """
     body, wheels = robot.body, robot.actuators if isinstance(robot.actuators, Rolling) else None
     limits = dict(zip(wrenches.axes, wrenches.limits, strict=True))

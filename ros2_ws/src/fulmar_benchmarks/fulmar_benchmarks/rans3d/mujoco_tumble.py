@@ -1,4 +1,4 @@
-"""The tumble of `fulmar_core.dynamics.tumble` by MuJoCo's own methods: what its rollout is worth at a time step."""
+"""The tumble of `fulmar_core.dynamics.tumble` by MuJoCo's own methods: drifts of its rollout at a time step."""
 
 from __future__ import annotations
 

@@ -23,7 +23,8 @@ POSITION_LIMIT, ATTITUDE_LIMIT_DEG = 1.0, 45.0
 OVERSHOOT = 0.5  # of a waypoint, in errors at which cruising begins
 CARRIED = 0.6, 0.48  # of the strongest force and torque of one valve
 TRIES = 4096  # directions of the sphere
-# Of an open valve, where missing the weakest force costs 1: a third less gas for a millimetre and half a degree.
+# Of an open valve, where missing the weakest force costs 1: valves are open a third less, at the price of a millimetre
+# and half a degree of error.
 LQR_VALVE, PD_VALVE = 0.2, 0.1
 TORQUE_ERROR = (
     2.0  # what the PD law pays for a missed torque, in Bryson's: one step of one valve turns a light body far

@@ -18,6 +18,7 @@ import numpy as np
 from fulmar_core.estimation.estimator import Estimate
 from fulmar_core.robot import Limits
 from fulmar_core.safety.input_gate import BACK_NS, FORWARD_NS
+from fulmar_core.sensors.imu import ImuSample
 from fulmar_core.sensors.reading import Reading
 
 KEPT_NS = 1_000_000_000  # how far back an estimate can be corrected
@@ -158,12 +159,17 @@ class HistoryEstimator(ABC):
             return f"reading of '{name}' has no stamp"
         kind, value_of = self._kinds[name]
         stamp_ns = reading.stamp_ns - (self._latency_ns if kind == POSE else 0)
-        if kind == IMU:
-            self._saturated = self._saturation(reading)
-        problem = self._problem_of(kind, reading) or self._time_problem(stamp_ns, WHAT[kind])
-        if problem:
+        problem = self._problem_of(kind, reading)
+        saturated = self._saturation(reading) if kind == IMU else ""
+        if problem and not saturated:
             return problem
+        if time_problem := self._time_problem(stamp_ns, WHAT[kind]):
+            return time_problem
         self._newest_ns[WHAT[kind]] = stamp_ns
+        if kind == IMU:
+            self._saturated = saturated
+        if problem or saturated:
+            return problem or saturated
         return self._see(Event(stamp_ns, kind, None), value_of, reading) or None
 
     def _see(self, event: Event, value_of: Callable[[Reading], Any], reading: Reading) -> str:
@@ -190,12 +196,12 @@ class HistoryEstimator(ABC):
     def _problem_of(self, kind: int, reading: Reading) -> str:
         value = reading.value
         if kind == IMU:
-            if not (np.isfinite(value.specific_force).all() and np.isfinite(value.angular_velocity).all()):
+            if not _is_finite(value):
                 return "inertial reading holds a value that is not finite"
             rate = self._turn_rate(reading)
             if abs(rate) > 2.0 * self._limits.yaw_rate:
                 return f"turn rate {rate:.1f} rad/s is beyond the possible {self._limits.yaw_rate:g} rad/s"
-            return self._saturated
+            return ""
         if not np.isfinite(value).all():
             return f"{WHAT[kind]} holds a value that is not finite"
         norm = float(np.linalg.norm(value[-4:]))
@@ -206,9 +212,9 @@ class HistoryEstimator(ABC):
         )
 
     def _saturation(self, reading: Reading) -> str:
-        """Why the turn rate of an inertial reading is unknown; empty if it lies within the range."""
+        """Why the turn rate of an inertial reading is unknown; empty if it lies within the range or is not finite."""
         largest = float(np.max(np.abs(reading.value.angular_velocity)))
-        if not largest >= self._gyroscope_range:
+        if largest < self._gyroscope_range or not _is_finite(reading.value):
             return ""
         return (
             f"the gyroscope reads {largest:.2f} rad/s, the end of its range: the body tumbles too fast for it"
@@ -337,3 +343,7 @@ class HistoryEstimator(ABC):
             if abs(event.stamp_ns - stamp_ns) <= READING_LASTS_NS:
                 return event.value
         return None
+
+
+def _is_finite(sample: ImuSample) -> bool:
+    return bool(np.isfinite(sample.specific_force).all() and np.isfinite(sample.angular_velocity).all())

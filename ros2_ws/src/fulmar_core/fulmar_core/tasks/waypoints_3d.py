@@ -34,7 +34,7 @@ CANDIDATES = 12  # places tried for each waypoint; that all leave the cube is ra
 
 
 @dataclass(frozen=True)
-class SpaceCourse:
+class SpaceWaypoints:
     """A closed sequence of waypoints in a cube, with attitudes that are uniform over SO(3)."""
 
     count: int  # waypoints; after the last one the first comes again
@@ -86,7 +86,7 @@ class SpaceWaypointTask(Task[SpatialState]):
     title: str
     episode_s: float  # length of an episode [s]
     start_distance: tuple[float, float]  # from the first target, in any direction [m]
-    course: SpaceCourse
+    course: SpaceWaypoints
     reach: float  # radius within which a target counts as reached for a controller [m]
     reach_attitude_deg: float = 0.0  # same of the angle between attitudes; 0: any [deg]
     tolerance: Tolerance  # same, for evaluation
