@@ -201,11 +201,11 @@ def test_a_target_that_turns_beyond_the_tolerance_from_step_to_step_is_refused(p
 
     with pytest.raises(ConfigError, match=r"turn by up to 27.5 deg in a control step at 5 Hz.* is 5 deg"):
         planned(0.24, "along_path", 0.1)
-    with pytest.raises(ConfigError, match="turn by up to 5.2 deg"):
+    with pytest.raises(ConfigError, match=r"turn by up to 5.2 deg"):
         planned(0.09, "along_path", 0.2)
     planned(0.08, "along_path", 0.2)
     planned(0.24, "fixed", 0.1)
-    with pytest.raises(ConfigError, match="turn by up to 13.8 deg in a control step at 10 Hz"):
+    with pytest.raises(ConfigError, match=r"turn by up to 13.8 deg in a control step at 10 Hz"):
         planned(0.24, "along_path", 0.1, control_hz=25.0)  # goals come at 10 Hz
 
 
@@ -217,6 +217,6 @@ def test_the_pace_of_a_target_is_that_of_the_runs_goals(plan, tmp_path):
         plan(**request)
     plan(**request, control_hz=12.5)
     goals.write_text(CIRCLE.format(0.6, "along_path", 2.0))
-    with pytest.raises(ConfigError, match="at 10 Hz by more than .* at most 0.5 m/s"):
+    with pytest.raises(ConfigError, match=r"at 10 Hz by more than .* at most 0.5 m/s"):
         plan(**request, control_hz=12.5)
     plan(**request, control_hz=12.5, lockstep=True)

@@ -26,19 +26,18 @@ from fulmar_core.goal_sequence import goal_sequence
 from fulmar_core.paths import config_path
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot, load_robot
-from fulmar_core.spatial import SpatialState, quat_of
+from fulmar_core.spatial import quat_of
 from fulmar_core.state import State
 from fulmar_core.tasks import Task, load_task
 from policy_server.controllers import CONTROLLERS, shipped_policy
 
 POSE, POSITION = "go_to_pose", "go_to_position"
-SUFFIX = {PlanarState: "", SpatialState: "_3d"}  # of the names of tasks, by what their robots move in
 
 
 def goal_options(form: type[State]) -> dict[str, str]:
     """What to say for a pose and for a position, by the names of the tasks."""
     pose, place = ",".join(form.NUMBERS), ",".join(form.NUMBERS[: form.AXES])
-    return {POSE + SUFFIX[form]: f"--goal {pose}", POSITION + SUFFIX[form]: f"--goal {place}"}
+    return {POSE + form.SUFFIX: f"--goal {pose}", POSITION + form.SUFFIX: f"--goal {place}"}
 
 
 def whole_pose(numbers: Sequence[float], robot: Robot, option: str) -> PoseTuple:
@@ -117,7 +116,7 @@ def default_task(
     if backend == "hardware":
         default_hardware(robot, hardware)
     form = load_robot(robot).state_type
-    pose, position = (name + SUFFIX[form] for name in (POSE, POSITION))
+    pose, position = (name + form.SUFFIX for name in (POSE, POSITION))
     asked = position if goal is not None and len(goal) == form.AXES else pose
     reason = why_not(robot, asked, controller, policy)
     if not reason:
@@ -159,7 +158,7 @@ def check_heading(task: str, goal: tuple[float, ...]) -> str:
     what = "heading" if form is PlanarState else "attitude"
     angles = goal[form.AXES :]
     if not angles and wants == "goal_pose":
-        usual = POSITION + SUFFIX[form]
+        usual = POSITION + form.SUFFIX
         raise ConfigError(
             f"task '{task}' needs a{'n' if what == 'attitude' else ''} {what}: --goal {','.join(form.NUMBERS)}. "
             f"Or use --task {usual}."
@@ -185,8 +184,8 @@ def task_of_goals(goals: str) -> str:
     """
     file = load_goals(goals)
     if isinstance(file, Trajectory):
-        return (POSITION if file.facing == "any" else POSE) + SUFFIX[file.form]
-    return DEFAULT_TASKS.get(type(file), "track_velocities") + SUFFIX[file.form]
+        return (POSITION if file.facing == "any" else POSE) + file.form.SUFFIX
+    return DEFAULT_TASKS.get(type(file), "track_velocities") + file.form.SUFFIX
 
 
 def goal_path(goals: str) -> Path:

@@ -55,6 +55,7 @@ class SpaceLaw(Law):
         self._target = TargetMotion(speed=limits.speed, rate=limits.yaw_rate)
         self._com = np.array(self.robot.body.com)
         self._inertia = self.robot.body.inertia_matrix
+        self._largest_inertia = float(np.linalg.eigvalsh(self._inertia)[-1])
 
     def allocate_by(self, weight: np.ndarray, *, lead: float, turn_lead: float) -> None:
         """Prepare the allocation and the limits of the errors.
@@ -105,10 +106,9 @@ class SpaceLaw(Law):
 
     def limited_turn(self, error: np.ndarray) -> np.ndarray:
         """An error of the attitude with the same axis, cut to the limits, shape (n, 3) [rad]."""
-        gains, inertia = self.gains, float(np.linalg.eigvalsh(self._inertia)[-1])
-        return _cut(
-            error, np.deg2rad(gains.attitude_error_limit_deg), gains.braking_torque / inertia, self._turn_lead
-        )
+        gains = self.gains
+        braking = gains.braking_torque / self._largest_inertia
+        return _cut(error, np.deg2rad(gains.attitude_error_limit_deg), braking, self._turn_lead)
 
     def turning_force(self, now: SpaceMotion) -> np.ndarray:
         """Force that keeps a velocity in the body's frame while it turns, m ω × v, shape (n, 3) [N]."""
