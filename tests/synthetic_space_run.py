@@ -14,7 +14,7 @@ from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.goal import Goal, goals_at
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.simulation import BatchSimulation
-from fulmar_core.spatial import SpatialState, at_rest_in_space, quat_of
+from fulmar_core.spatial import SpatialState, quat_of
 from fulmar_core.tasks import load_task
 from tests.synthetic_run import EPOCH_NS, LATENCY_NS, NS, RunMessages
 
@@ -96,7 +96,7 @@ def write_space_run(folder: Path, plan: SpacePlan = SpacePlan()) -> Path:
     )
     if plan.start:
         pose = _posed(plan.start)
-        start = at_rest_in_space(tuple(pose[:3]), tuple(pose[3:]))
+        start = SpatialState.at_rest(tuple(pose[:3]), tuple(pose[3:]))
         simulation.truth.write(0, start)
         simulation.measured.write(0, start)
     if plan.goal:

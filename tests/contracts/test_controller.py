@@ -20,7 +20,7 @@ from fulmar_core.paths import config_names
 from fulmar_core.planar import at_rest
 from fulmar_core.policy_bundle import read_passport
 from fulmar_core.simulation import BatchSimulation
-from fulmar_core.spatial import SpatialState, at_rest_in_space, position_of, quat_of
+from fulmar_core.spatial import SpatialState, position_of, quat_of
 from fulmar_core.tasks import load_task
 from policy_server.controllers import CONTROLLERS, Choice, load_controller, shipped_policies
 from tests.inputs import some_of
@@ -152,7 +152,7 @@ def test_it_answers_a_robot_at_rest_where_it_shall_be(case):
     targets = 0.0 * target if tracks else target
     if in_space:
         place = np.array([[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]]) if tracks else target
-        still = at_rest_in_space(position_of(place), quat_of(place))
+        still = SpatialState.at_rest(position_of(place), quat_of(place))
     else:
         still = at_rest(*targets.T)
     goal = replace(goal, targets=targets[:, None], things=dict.fromkeys(goal.things, targets))

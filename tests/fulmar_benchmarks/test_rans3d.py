@@ -129,6 +129,28 @@ def test_unknown_names_are_refused_before_anything_is_evaluated(option, tmp_path
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.parametrize(
+    ("task", "file", "settings"),
+    [
+        ("go_to_position_3d", "MFP3D_GoToXYZ.yaml", {
+            "position_tolerance_m": 0.01, "start_distance_m": [0.25, 6.0], "kill_distance_m": 8.0, "episode_steps": 450,
+        }),
+        ("go_to_pose_3d", "MFP3D_GoToPose.yaml", {
+            "position_tolerance_m": 0.01, "attitude_tolerance_rad": 0.025, "start_distance_m": [0.25, 6.0],
+            "kill_distance_m": 8.0, "episode_steps": 450,
+        }),
+        ("track_velocities_3d", "MFP3D_Track6DoFVelocity.yaml", {
+            "velocity_tolerance_m_s": 0.01, "rate_tolerance_rad_s": 0.025, "most_speed_m_s": 0.75,
+            "most_rate_rad_s": 0.75, "episode_steps": 250,
+        }),
+    ],
+)  # fmt: skip
+def test_the_spacecraft_has_all_that_rans_sets(task, file, settings):
+    shared = {"consecutive_steps": 50, "control_hz": 5.0, "physics_dt_s": 0.02}
+    source = f"elharirymatteo/RANS at 6f2720b, {file}"
+    assert published("spacecraft_16", task) == settings | shared | {"source": source}
+
+
 @pytest.mark.parametrize("robot", ROBOTS)
 @pytest.mark.parametrize("task", TASKS)
 def test_every_pair_has_published_settings_and_laws(robot, task, tmp_path):

@@ -187,3 +187,36 @@ def test_a_target_that_cannot_be_followed_is_refused(values, change, words, plan
     with pytest.raises(ConfigError) as caught:
         plan(**SPACE | {"controller": STILL} | change, goals=str(tmp_path / "fast.yaml"))
     assert words in str(caught.value)
+
+
+CIRCLE = "kind: trajectory\ntitle: t\nspeed: {}\nfacing: {}\npath: {{kind: tilted_circle, radius: {}}}\n"
+
+
+def test_a_target_that_turns_beyond_the_tolerance_from_step_to_step_is_refused(plan, tmp_path):
+    goals = tmp_path / "tight.yaml"
+
+    def planned(*values, **change):
+        goals.write_text(CIRCLE.format(*values))
+        return plan(**SPACE | {"controller": STILL} | change, goals=str(goals))
+
+    with pytest.raises(ConfigError, match=r"turn by up to 27.5 deg in a control step at 5 Hz.* is 5 deg"):
+        planned(0.24, "along_path", 0.1)
+    with pytest.raises(ConfigError, match=r"turn by up to 5.2 deg"):
+        planned(0.09, "along_path", 0.2)
+    planned(0.08, "along_path", 0.2)
+    planned(0.24, "fixed", 0.1)
+    with pytest.raises(ConfigError, match=r"turn by up to 13.8 deg in a control step at 10 Hz"):
+        planned(0.24, "along_path", 0.1, control_hz=25.0)  # goals come at 10 Hz
+
+
+def test_the_pace_of_a_target_is_that_of_the_runs_goals(plan, tmp_path):
+    goals = tmp_path / "fast.yaml"
+    goals.write_text(CIRCLE.format(0.4, "along_path", 2.0))
+    request = {**SPACE, "controller": STILL, "goals": str(goals)}
+    with pytest.raises(ConfigError, match="at 5 Hz by more than"):
+        plan(**request)
+    plan(**request, control_hz=12.5)
+    goals.write_text(CIRCLE.format(0.6, "along_path", 2.0))
+    with pytest.raises(ConfigError, match=r"at 10 Hz by more than .* at most 0.5 m/s"):
+        plan(**request, control_hz=12.5)
+    plan(**request, control_hz=12.5, lockstep=True)

@@ -107,3 +107,15 @@ def test_drawn_directions_are_uniform_over_the_sphere():
     np.testing.assert_allclose(np.linalg.norm(direction, axis=0), 1.0, atol=1e-12)
     np.testing.assert_allclose(direction.mean(axis=1), 0.0, atol=0.015)
     np.testing.assert_allclose((direction**2).mean(axis=1), 1.0 / 3.0, atol=0.01)
+
+
+@pytest.mark.parametrize("count", [60, 4096])
+def test_even_directions_leave_no_gap_on_the_sphere(count):
+    directions = attitude.even_directions(count)
+    assert directions.shape == (count, 3)
+    np.testing.assert_allclose(np.linalg.norm(directions, axis=1), 1.0, atol=1e-12)
+    np.testing.assert_allclose(directions.mean(axis=0), 0.0, atol=0.5 / count)
+    anywhere = np.random.default_rng(1).normal(size=(2000, 3))
+    anywhere /= np.linalg.norm(anywhere, axis=1, keepdims=True)
+    nearest = np.arccos(np.clip((anywhere @ directions.T).max(axis=1), -1.0, 1.0))
+    assert nearest.max() < 1.2 * np.sqrt(4.0 * np.pi / count)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import fields
 from pathlib import Path
+from typing import get_args, get_type_hints
 
 import numpy as np
 import pytest
@@ -21,8 +22,9 @@ from fulmar_core.goal_files import (
 from fulmar_core.paths import config_names
 from fulmar_core.planar import PlanarState
 from fulmar_core.references import PATHS
-from fulmar_core.references.in_space import SPACE_PATHS
+from fulmar_core.references.in_space import SpacePath
 
+SPACE_PATHS = {get_args(get_type_hints(path)["kind"])[0]: path for path in get_args(SpacePath)}
 SIZES = {
     "circle": "radius: 1.0",
     "square": "side: 1.0",

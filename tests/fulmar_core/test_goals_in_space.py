@@ -8,6 +8,7 @@ import pytest
 from fulmar_core.errors import ConfigError
 from fulmar_core.goal_files import HeldVelocity, Poses, Positions, Velocities, single_goal
 from fulmar_core.goal_sequence import goal_sequence
+from fulmar_core.paths import config_directory, config_names
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import load_robot
 from fulmar_core.spatial import SpatialState
@@ -109,3 +110,29 @@ def test_a_single_goal_says_what_it_is():
 def test_a_task_of_the_other_space_is_refused(robot, task):
     with pytest.raises(ConfigError, match=f"task '{task}' is about motion in .* robot '{robot}' moves in"):
         load_task(task).check(load_robot(robot))
+
+
+def test_names_of_tasks_end_as_their_state_type_says():
+    found = {name: load_task(name).state_type for name in config_names("tasks")}
+    assert SpatialState in found.values()
+    for name, form in found.items():
+        assert name.endswith("_3d") == (form is SpatialState)
+        assert name.endswith(form.SUFFIX)
+
+
+def test_a_task_in_space_of_any_name_is_not_proposed_for_itself(tmp_path, monkeypatch):
+    (tmp_path / "robots").mkdir()
+    (tmp_path / "tasks").mkdir()
+    text = (config_directory() / "tasks" / "go_to_pose_3d.yaml").read_text()
+    (tmp_path / "tasks" / "arrive.yaml").write_text(text.replace("name: go_to_pose_3d", "name: arrive"))
+    monkeypatch.setenv("FULMAR_CONFIGS", str(tmp_path))
+    with pytest.raises(ConfigError, match=r"shows others\. Names of tasks in space end in _3d\.$"):
+        load_task("arrive").check(load_robot("floating_platform"))
+    with pytest.raises(
+        ConfigError, match=r"Did you mean 'go_to_pose'\? Names of tasks in space end in _3d\.$"
+    ):
+        load_task("go_to_pose_3d").check(load_robot("floating_platform"))
+    with pytest.raises(
+        ConfigError, match=r"Did you mean 'go_to_pose_3d'\? Names of tasks in space end in _3d\.$"
+    ):
+        load_task("go_to_pose").check(load_robot("spacecraft_16"))

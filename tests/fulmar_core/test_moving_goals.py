@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from fulmar_core.attitude import turn
+from fulmar_core.controllers.classical import load_classical
 from fulmar_core.controllers.target_motion import TargetMotion
 from fulmar_core.errors import ConfigError
 from fulmar_core.goal import goal_at
@@ -16,9 +17,11 @@ from fulmar_core.goal_sequence import goal_sequence
 from fulmar_core.references.in_space import Helix, TiltedCircle
 from fulmar_core.robot import load_robot
 from fulmar_core.spatial import SpatialState
+from fulmar_core.tasks import load_task
 from tests.fulmar_core.test_guarded_loop import LAB, S
 from tests.fulmar_core.test_guarded_loop import Bench as PlanarBench
 from tests.fulmar_core.test_guards_in_space import STEP_NS, Bench
+from tests.inputs import inputs_at
 
 CRAFT = load_robot("spacecraft_16")
 CIRCLE = Trajectory("trajectory", "t", TiltedCircle("tilted_circle", radius=2.0, tilt_deg=90.0), speed=0.1)
@@ -99,13 +102,50 @@ def test_motion_of_targets_is_their_difference_and_a_jump_is_none():
     here = SpatialState.target_at((1.0, 0.0, 0.0, 0.0, 0.0, 0.0))
     there = SpatialState.target_at((1.0, 0.02, 0.0, 0.0, 0.0, 3.0))
     far = SpatialState.target_at((5.0, 0.0, 0.0, 0.0, 0.0, 0.0))
-    assert not np.any(motion.update(np.stack((here, here)), 0.2))
-    velocity, rate = motion.update(np.stack((there, far)), 0.2)
+    assert not np.any(motion.update(np.stack((here, here)), 0, 0.2))
+    velocity, rate = motion.update(np.stack((there, far)), 0, 0.2)
     assert velocity == pytest.approx(np.array([[0.0, 0.1, 0.0], [0.0, 0.0, 0.0]]))
     assert rate == pytest.approx(np.array([[0.0, 0.0, np.deg2rad(15.0)], [0.0, 0.0, 0.0]]))
-    assert not np.any(motion.update(np.stack((there, far)), 0.2))  # exactly
+    assert not np.any(motion.update(np.stack((there, far)), 0, 0.2))  # exactly
     motion.reset()
-    assert not np.any(motion.update(np.stack((here, here)), 0.2))
+    assert not np.any(motion.update(np.stack((here, here)), 0, 0.2))
+
+
+def test_motion_goes_by_the_time_that_has_passed():
+    motion = TargetMotion(speed=0.4, rate=0.6)
+    begin, step_ns = 3_000_000_000, 200_000_000
+
+    def moved(steps, metres, degrees, *, stamp_ns=None):
+        target = SpatialState.target_at((metres, 0.0, 0.0, 0.0, 0.0, degrees))[None]
+        velocity, rate = motion.update(target, begin + steps * step_ns if stamp_ns is None else stamp_ns, 0.2)
+        return velocity[0, 0], np.rad2deg(rate[0, 2])
+
+    assert moved(0, 0.0, 0.0) == (0.0, 0.0)
+    assert moved(1, 0.02, 1.0) == pytest.approx((0.1, 5.0))
+    assert moved(3, 0.06, 3.0) == pytest.approx((0.1, 5.0))  # one step was missed
+    assert moved(6, 0.12, 6.0) == pytest.approx((0.1, 5.0))
+    assert moved(6, 0.14, 7.0) == pytest.approx((0.1, 5.0))  # no time passed: a step
+    assert moved(0, 0.16, 8.0, stamp_ns=0) == pytest.approx((0.1, 5.0))  # nobody measures time
+    assert moved(7, 0.18, 9.0) == pytest.approx((0.1, 5.0))
+
+
+@pytest.mark.parametrize("law", ["lqr", "pd"])
+def test_laws_take_no_velocity_of_a_target_that_is_faster_than_tasks_ask(law):
+    robot, task = load_robot("int_ball2"), load_task("go_to_pose_3d")
+    resting = SpatialState.resting(SpatialState.target_at((0.0, 0.0, 0.0)))
+
+    def speed_of(shift, steps):
+        controller = load_classical(robot, task, law=law)
+        seen = []
+        controller.wrench = lambda way, now: seen.append(now.velocity[0, 0]) or np.zeros((1, 6))
+        for x, stamp_ns in ((0.5, 200_000_000), (0.5 + shift, (1 + steps) * 200_000_000)):
+            goal = goal_at(tuple(SpatialState.target_at((x, 0.0, 0.0)).tolist()))
+            controller.act(inputs_at(robot, task, resting, goal, stamp_ns=stamp_ns))
+        return -seen[-1]
+
+    assert speed_of(0.02, 1) == pytest.approx(robot.performance.speed)
+    assert speed_of(0.02, 2) == pytest.approx(0.05)
+    assert speed_of(0.04, 1) == 0.0  # a nudge, within the task's tolerance
 
 
 def test_a_goal_that_moves_a_little_goes_on_and_one_that_moves_more_begins_anew():

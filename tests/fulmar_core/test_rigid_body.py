@@ -9,7 +9,6 @@ from fulmar_core.attitude import exponential, turn, uniform_attitude
 from fulmar_core.dynamics.rigid_body import (
     gravity_gradient_torque,
     inertia_of,
-    principal_inertia,
     rigid_body_step,
     shifted,
     times,
@@ -26,7 +25,7 @@ from fulmar_core.dynamics.tumble import (
 )
 from fulmar_core.paths import config_names
 from fulmar_core.robot import load_robot
-from fulmar_core.spatial import SpatialState, at_rest_in_space
+from fulmar_core.spatial import SpatialState
 
 STEP_S = 0.05
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
@@ -99,7 +98,6 @@ def test_a_full_tensor_turns_like_the_principal_one_seen_from_its_axes():
     expected = torque_free(straight, inertia(MOMENTS), 20.0, STEP_S)
     found = torque_free(tilted, inertia(entries), 20.0, STEP_S)
     np.testing.assert_allclose(found.rate, axes @ np.array(expected.rate), atol=1e-12)
-    np.testing.assert_allclose(principal_inertia(entries), MOMENTS, atol=1e-12)
 
 
 @pytest.mark.parametrize("entries", [MOMENTS, (1.0, 2.0, 3.0, 0.1, -0.2, 0.3)])
@@ -148,8 +146,8 @@ def test_the_way_to_the_mass_center_and_back_changes_nothing():
 
 def test_the_gravity_gradient_pulls_the_long_axis_towards_the_planet():
     # A rod along x, tipped a little from the vertical: the torque turns it back.
-    tipped = at_rest_in_space(vector(*ORIGIN), exponential(vector(0.0, np.pi / 2 - 0.1, 0.0)))
-    torque = gravity_gradient_torque(tipped, inertia((0.1, 2.0, 2.0)), 1e-3)
+    tipped = SpatialState.at_rest(vector(*ORIGIN), exponential(vector(0.0, np.pi / 2 - 0.1, 0.0)))
+    torque = gravity_gradient_torque(tipped, inertia((0.1, 2.0, 2.0)).tensor, 1e-3)
     assert torque[1] == pytest.approx(3e-6 * 1.9 * np.sin(0.1) * np.cos(0.1), rel=1e-9)
     assert (torque[0], torque[2]) == pytest.approx((0.0, 0.0), abs=1e-18)
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from fulmar_bringup.system import default_hardware
+from fulmar_core.attitude import angle_between
 from fulmar_core.errors import ConfigError
 from fulmar_core.goal import PoseTuple
 from fulmar_core.goal_files import (
@@ -25,19 +26,18 @@ from fulmar_core.goal_sequence import goal_sequence
 from fulmar_core.paths import config_path
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot, load_robot
-from fulmar_core.spatial import SpatialState
+from fulmar_core.spatial import quat_of
 from fulmar_core.state import State
 from fulmar_core.tasks import Task, load_task
 from policy_server.controllers import CONTROLLERS, shipped_policy
 
 POSE, POSITION = "go_to_pose", "go_to_position"
-SUFFIX = {PlanarState: "", SpatialState: "_3d"}  # of the names of tasks, by what their robots move in
 
 
 def goal_options(form: type[State]) -> dict[str, str]:
     """What to say for a pose and for a position, by the names of the tasks."""
     pose, place = ",".join(form.NUMBERS), ",".join(form.NUMBERS[: form.AXES])
-    return {POSE + SUFFIX[form]: f"--goal {pose}", POSITION + SUFFIX[form]: f"--goal {place}"}
+    return {POSE + form.SUFFIX: f"--goal {pose}", POSITION + form.SUFFIX: f"--goal {place}"}
 
 
 def whole_pose(numbers: Sequence[float], robot: Robot, option: str) -> PoseTuple:
@@ -116,7 +116,7 @@ def default_task(
     if backend == "hardware":
         default_hardware(robot, hardware)
     form = load_robot(robot).state_type
-    pose, position = (name + SUFFIX[form] for name in (POSE, POSITION))
+    pose, position = (name + form.SUFFIX for name in (POSE, POSITION))
     asked = position if goal is not None and len(goal) == form.AXES else pose
     reason = why_not(robot, asked, controller, policy)
     if not reason:
@@ -158,7 +158,7 @@ def check_heading(task: str, goal: tuple[float, ...]) -> str:
     what = "heading" if form is PlanarState else "attitude"
     angles = goal[form.AXES :]
     if not angles and wants == "goal_pose":
-        usual = POSITION + SUFFIX[form]
+        usual = POSITION + form.SUFFIX
         raise ConfigError(
             f"task '{task}' needs a{'n' if what == 'attitude' else ''} {what}: --goal {','.join(form.NUMBERS)}. "
             f"Or use --task {usual}."
@@ -170,6 +170,8 @@ def check_heading(task: str, goal: tuple[float, ...]) -> str:
 
 
 DEFAULT_TASKS = {Positions: POSITION, Poses: POSE}  # all others are about velocities
+GOALS_HZ = 10.0  # of a goal node, at most
+TRIED = 720  # places along a path where a step is measured
 SHOWN = 400  # points of a path that a record carries along
 SPARE_S = 5.0  # after everything is done, to see that it stays so
 
@@ -182,8 +184,8 @@ def task_of_goals(goals: str) -> str:
     """
     file = load_goals(goals)
     if isinstance(file, Trajectory):
-        return (POSITION if file.facing == "any" else POSE) + SUFFIX[file.form]
-    return DEFAULT_TASKS.get(type(file), "track_velocities") + SUFFIX[file.form]
+        return (POSITION if file.facing == "any" else POSE) + file.form.SUFFIX
+    return DEFAULT_TASKS.get(type(file), "track_velocities") + file.form.SUFFIX
 
 
 def goal_path(goals: str) -> Path:
@@ -196,8 +198,8 @@ def is_path_of_places(task: Task) -> bool:
     return task.goal_topic == "goal_path"
 
 
-def checked_goals(goals: str, robot: Robot, task: Task) -> GoalFile:
-    """A goal file that a task's controller can follow in a run.
+def checked_goals(goals: str, robot: Robot, task: Task, goal_hz: float) -> GoalFile:
+    """A goal file that a task's controller can follow in a run, with goals that come so often [Hz].
 
     Raises:
         ConfigError: Unknown name, a mistake in the file, a task that takes other goals, or a robot that cannot.
@@ -212,21 +214,33 @@ def checked_goals(goals: str, robot: Robot, task: Task) -> GoalFile:
             f"the goals '{goals}' are no goals of task '{task.name}'. "
             f"Leave --task out: they are for '{task_of_goals(goals)}'."
         )
-    check_pace(file, goals, robot)
+    check_pace(file, goals, robot, goal_hz)
     return file
 
 
-def check_pace(file: GoalFile, goals: str, robot: Robot) -> None:
-    """Refuse velocities that the robot cannot reach.
+def goal_rate(control_hz: float, *, lockstep: bool = False) -> float:
+    """How often a target that moves is another goal: as often as commands, but for a goal node by the clock [Hz]."""
+    return control_hz if lockstep else min(control_hz, GOALS_HZ)
+
+
+def check_pace(file: GoalFile, goals: str, robot: Robot, goal_hz: float) -> None:
+    """Refuse velocities that the robot cannot reach, and targets whose every goal begins anew.
+
+    Args:
+        file: The goals.
+        goals: What they are called.
+        robot: Whose goals they are.
+        goal_hz: How often a goal comes, of a target that moves; see `goal_rate` [Hz].
 
     Raises:
-        ConfigError: They are beyond its top speed or turn rate, or sideways or on the spot where it cannot go so.
+        ConfigError: They are beyond its top speed or turn rate, or sideways or on the spot where it cannot go so; or a
+            target moves or turns by more than its task's tolerance from one goal to the next.
     """
     if isinstance(file, FollowedPath):
         ahead, sideways = file.speed, 0.0
     elif isinstance(file, Trajectory):
         ahead, sideways = file.speed, 0.0
-        _check_step(file, goals, robot)
+        _check_step(file, goals, goal_hz)
     elif isinstance(file, Velocities):
         targets = file.targets()
         axes = file.form.AXES
@@ -246,14 +260,32 @@ def check_pace(file: GoalFile, goals: str, robot: Robot) -> None:
         )
 
 
-def _check_step(file: Trajectory, goals: str, robot: Robot) -> None:
-    """Refuse a target that is another goal at each control step: it moves beyond the tolerance of its task."""
-    most = load_task(task_of_goals(goals)).tolerance.position * robot.timing.control_hz
+def _check_step(file: Trajectory, goals: str, goal_hz: float) -> None:
+    """Refuse a target that is another goal at each step: it moves or turns beyond the tolerance of its task."""
+    tolerance = load_task(task_of_goals(goals)).tolerance
+    most = tolerance.position * goal_hz
     if file.speed > most:
         raise ConfigError(
-            f"the goals '{goals}' move by {file.speed:g} m/s, at {robot.timing.control_hz:g} Hz by more than the "
-            f"task's tolerance in a control step: at most {most:g} m/s."
+            f"the goals '{goals}' move by {file.speed:g} m/s, at {goal_hz:g} Hz by more than the task's tolerance in a "
+            f"control step: at most {most:g} m/s."
         )
+    if not tolerance.attitude_deg:
+        return
+    turned = _largest_turn_deg(file, 1.0 / goal_hz)
+    if turned > tolerance.attitude_deg:
+        raise ConfigError(
+            f"the goals '{goals}' turn by up to {turned:.1f} deg in a control step at {goal_hz:g} Hz, and the task's "
+            f"tolerance is {tolerance.attitude_deg:g} deg. Give a lower speed than {file.speed:g} m/s, a wider path, "
+            "or 'facing: fixed'."
+        )
+
+
+def _largest_turn_deg(file: Trajectory, step_s: float) -> float:
+    """Largest angle between two poses of a target that lie a step apart, anywhere along its path [deg]."""
+    target = file.target()
+    times = np.linspace(0.0, target.round_s, TRIED)
+    before, after = (np.stack([target.pose(t + late) for t in times]) for late in (0.0, step_s))
+    return math.degrees(float(np.max(angle_between(quat_of(before), quat_of(after)))))
 
 
 def _check_turning(turns: np.ndarray, ahead: np.ndarray, goals: str, robot: Robot) -> None:

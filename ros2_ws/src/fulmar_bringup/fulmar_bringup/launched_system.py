@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from fulmar_bringup.bag_origin import attachments, run_info
-from fulmar_bringup.goal_plan import checked_goals, goal_path
+from fulmar_bringup.goal_plan import checked_goals, goal_path, goal_rate
 from fulmar_bringup.plan_checks import adapter_path, check_external
 from fulmar_bringup.run_plan import NodeSpec, RunPlan
 from fulmar_bringup.system import default_hardware, varied_system
@@ -94,7 +94,7 @@ def list_nodes(
     check_external(plan.controller, plan.guards, adapter=adapter, topic=topic, lockstep=False)
     plan = replace(plan, adapter=adapter_path(plan.robot, adapter), adapter_topic=topic or "")
     if goals:
-        checked_goals(goals, load_robot(plan.robot), load_task(plan.task))
+        checked_goals(goals, load_robot(plan.robot), load_task(plan.task), goal_rate(plan.control_hz))
         plan = replace(plan, goals=str(goal_path(goals)))
     record = {"info": run_info(plan), "files": attachments(plan)}
     return tuple(system_rows(plan, record=record, wires_folder=wires).values())

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from fulmar_bringup.emulation import Emulation
-from fulmar_bringup.goal_plan import is_path_of_places
+from fulmar_bringup.goal_plan import goal_rate, is_path_of_places
 from fulmar_bringup.run_plan import NodeSpec, Parameter, RunPlan, node_row
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.estimation.kinds import estimator_kind, load_estimator
@@ -321,7 +321,7 @@ def run_goals_spec(plan: RunPlan) -> NodeSpec:
         plan.goals,
         name=plan.name,
         as_path=is_path_of_places(load_task(plan.task)),
-        control_hz=min(plan.control_hz, 10.0),
+        control_hz=goal_rate(plan.control_hz),
     )
     more: dict[str, Parameter] = {"stay": True, "lockstep": plan.lockstep, "rate": plan.rate}
     return replace(spec, parameters=spec.parameters | more, remappings=dict(plan.remappings))

@@ -13,6 +13,7 @@ from fulmar_bringup.goal_plan import (
     duration_of,
     first_targets,
     goal_path,
+    goal_rate,
     places_of,
     start_of,
     whole_pose,
@@ -171,7 +172,9 @@ def plan_run(
             raise ConfigError("a real robot goes nowhere by chance: say where with --goal or --goals.")
     if goals is not None and goal is not None:
         raise ConfigError("--goals brings its own goals; it takes no --goal.")
-    file = None if goals is None else checked_goals(goals, the_robot, the_task)
+    file = (
+        None if goals is None else checked_goals(goals, the_robot, the_task, goal_rate(hz, lockstep=lockstep))
+    )
     if file is not None:
         check_places(f"the goal of '{goals}'", places_of(file).tolist(), watched.area)
     mission, drawn_start = _placed(

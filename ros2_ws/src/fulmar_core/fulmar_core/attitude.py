@@ -13,6 +13,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
+
 from fulmar_core.arrays import array_namespace, clip
 from fulmar_core.rotation import Array
 
@@ -214,3 +216,14 @@ def uniform_direction(first: Array, second: Array) -> Vector:
     across = xp.sqrt(clip(1.0 - up * up, 0.0, None))
     angle = 2.0 * math.pi * second
     return across * xp.cos(angle), across * xp.sin(angle), up
+
+
+def even_directions(count: int) -> np.ndarray:
+    """Unit vectors spread evenly over the sphere, shape (count, 3).
+
+    A Fibonacci lattice: González, Mathematical Geosciences 42, 2010.
+    """
+    number = np.arange(count) + 0.5
+    up, angle = 1.0 - 2.0 * number / count, math.pi * (1.0 + math.sqrt(5.0)) * number
+    across = np.sqrt(1.0 - up * up)
+    return np.stack((across * np.cos(angle), across * np.sin(angle), up), axis=-1)

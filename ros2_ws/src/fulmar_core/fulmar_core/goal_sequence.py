@@ -262,7 +262,7 @@ def goal_sequence(goals: GoalFile, robot: Robot, *, as_path: bool = False) -> Go
         )
     if isinstance(goals, Positions | Poses):
         last = "positions" if isinstance(goals, Positions) else "poses"
-        where = "_3d" if goals.form is SpatialState else ""
+        where = goals.form.SUFFIX
         if as_path:
             tolerance = load_task(f"go_through_{last}{where}").tolerance
             return Waypoints("goal_path", goals, tolerance, hold_s=0.0, at_once=True)

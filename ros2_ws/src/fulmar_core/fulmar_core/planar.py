@@ -37,6 +37,7 @@ class PlanarState(State):
     WORLD: ClassVar[str] = "the plane"
     NUMBERS: ClassVar[tuple[str, ...]] = ("x", "y", "deg")
     AXES: ClassVar[int] = 2
+    SUFFIX: ClassVar[str] = ""
 
     def columns(self) -> tuple[Array, ...]:
         """Every array, in the order of `COLUMNS`."""

@@ -48,6 +48,7 @@ class SpatialState(State):
     WORLD: ClassVar[str] = "space"
     NUMBERS: ClassVar[tuple[str, ...]] = ("x", "y", "z", "roll", "pitch", "yaw")
     AXES: ClassVar[int] = 3
+    SUFFIX: ClassVar[str] = "_3d"
 
     @property
     def position(self) -> Vector:
@@ -118,8 +119,12 @@ class SpatialState(State):
     @classmethod
     def resting(cls, target: Array) -> Self:
         """A body that stands still at a pose, shape (..., 7)."""
-        place = position_of(target)
-        return cls(*place, *quat_of(target), *place, *place).stopped()
+        return cls.at_rest(position_of(target), quat_of(target))
+
+    @classmethod
+    def at_rest(cls, position: Vector, quat: Quaternion) -> Self:
+        """The same, at a place [m] with an attitude."""
+        return cls(*position, *quat, *position, *position).stopped()
 
     @property
     def pose(self) -> Array:
@@ -139,11 +144,6 @@ class SpatialState(State):
         """Place, yaw, speed and length of the turn rate."""
         place = {"x": self.x, "y": self.y, "z": self.z, "yaw": euler_of(self.quat)[2]}
         return place | {"speed": length(self.velocity), "yaw_rate": length(self.rate)}
-
-
-def at_rest_in_space(position: Vector, quat: Quaternion) -> SpatialState:
-    """A body that stands still at a pose."""
-    return SpatialState(*position, *quat, *position, *position).stopped()
 
 
 def position_of(target: Array) -> Vector:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fulmar_core.attitude import turn_back
+from fulmar_core.attitude import even_directions, turn_back
 from fulmar_core.disturbances.spatial_world import SpatialWorld
 from fulmar_core.holdability import LEAST_MARGIN, least_margin, one_way_actuators
 from fulmar_core.robot import Robot
@@ -61,7 +61,7 @@ def can_hold_in_space(robot: Robot, world: SpatialWorld, quats: np.ndarray | Non
         if quats is None:
             # Only the direction of the force in the body changes with the attitude; as it is first.
             size = float(np.linalg.norm(force[i]))
-            tried = [force[i], *(size * _sphere())] if size > 0.0 else [force[i]]
+            tried = [force[i], *(size * even_directions(ATTITUDES))] if size > 0.0 else [force[i]]
         else:
             x, y, z = turn_back(tuple(quats[i]), tuple(force[i]))
             tried = [np.array([x, y, z])]
@@ -69,11 +69,3 @@ def can_hold_in_space(robot: Robot, world: SpatialWorld, quats: np.ndarray | Non
             hold_margin_in_space(robot, working[i], each, torque[i], com[i]) > LEAST_MARGIN for each in tried
         )
     return able
-
-
-def _sphere() -> np.ndarray:
-    """Directions all around, on a Fibonacci lattice, shape (`ATTITUDES`, 3)."""
-    k = np.arange(ATTITUDES) + 0.5
-    up, around = 1.0 - 2.0 * k / ATTITUDES, np.pi * (1.0 + np.sqrt(5.0)) * k
-    across = np.sqrt(1.0 - up**2)
-    return np.stack((across * np.cos(around), across * np.sin(around), up), axis=-1)

@@ -56,6 +56,7 @@ class State(ABC):
         WORLD: What bodies of this form move in, in words.
         NUMBERS: A pose as people write it, in m and degrees; of a place they leave the angles out.
         AXES: Coordinates of a place.
+        SUFFIX: Ends the names of shipped tasks of this form.
     """
 
     __slots__ = ()
@@ -63,6 +64,7 @@ class State(ABC):
     WORLD: ClassVar[str]
     NUMBERS: ClassVar[tuple[str, ...]]
     AXES: ClassVar[int]
+    SUFFIX: ClassVar[str]
 
     @abstractmethod
     def columns(self) -> tuple[Array, ...]:

@@ -26,25 +26,41 @@ DEAD_TASK, DEAD_CONTROLLER = "go_to_pose_3d", "lqr"
 # Robots whose episodes differ from those of the tasks: starts up to [m], length [s].
 EPISODES = {"int_ball2": (2.0, 60.0)}
 
-RANS_POSITION_M, RANS_ATTITUDE_RAD, RANS_STEPS = 0.01, 0.025, 50  # held so long in a row, GoToPose
-_RANS = {
-    "control_hz": 5.0,
-    "physics_dt_s": 0.02,
-    "source": "elharirymatteo/RANS at 6f2720b, 3-D tasks (MFP3D)",
-}
+RANS_POSITION_M, RANS_ATTITUDE_RAD, RANS_STEPS = 0.01, 0.025, 50  # held so long in a row
+_RANS_STARTS = {"start_distance_m": [0.25, 6.0], "kill_distance_m": 8.0}
+
+
+def _of_rans(file: str, episode_steps: int) -> dict[str, Any]:
+    """What the settings of all its tasks share, and where they are: a file in its `omniisaacgymenvs/cfg/task`."""
+    return {
+        "consecutive_steps": RANS_STEPS,
+        "episode_steps": episode_steps,
+        "control_hz": 5.0,
+        "physics_dt_s": 0.02,
+        "source": f"elharirymatteo/RANS at 6f2720b, {file}",
+    }
+
+
 _ROBORAN = {"source": "snt-spacer/RobRAN-Code at 9273fc28, 3-D tasks; its own Int-Ball2 is another body"}
 OF_RANS: dict[str, dict[str, Any]] = {
-    "go_to_position_3d": {"episode_steps": 450, **_RANS},
+    "go_to_position_3d": {
+        "position_tolerance_m": RANS_POSITION_M,
+        **_RANS_STARTS,
+        **_of_rans("MFP3D_GoToXYZ.yaml", 450),
+    },
     "go_to_pose_3d": {
         "position_tolerance_m": RANS_POSITION_M,
         "attitude_tolerance_rad": RANS_ATTITUDE_RAD,
-        "consecutive_steps": RANS_STEPS,
-        "episode_steps": 450,
-        "start_distance_m": [0.25, 6.0],
-        "kill_distance_m": 8.0,
-        **_RANS,
+        **_RANS_STARTS,
+        **_of_rans("MFP3D_GoToPose.yaml", 450),
     },
-    "track_velocities_3d": {"episode_steps": 250, **_RANS},
+    "track_velocities_3d": {
+        "velocity_tolerance_m_s": 0.01,
+        "rate_tolerance_rad_s": 0.025,
+        "most_speed_m_s": 0.75,
+        "most_rate_rad_s": 0.75,
+        **_of_rans("MFP3D_Track6DoFVelocity.yaml", 250),
+    },
 }
 OF_ROBORAN: dict[str, dict[str, Any]] = {
     "go_to_position_3d": {"position_tolerance_m": 0.01, "consecutive_steps": 100, **_ROBORAN},

@@ -93,7 +93,7 @@ def goals(
     given = None if place is None else single_goal(place, the_robot.state_type)
     file = given or load_goals(name or "")
     goal_sequence(file, the_robot, as_path=as_path)  # rejects goals that the robot cannot have
-    check_pace(file, name or "", the_robot)
+    check_pace(file, name or "", the_robot, min(control_hz, the_robot.timing.control_hz))
     check_places(f"the goal of '{name}'" if name else "the goal", places_of(file).tolist(), inside)
     spec = goals_spec(
         robot,

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fulmar_core.actuators.pushing import Pushing
+from fulmar_core.attitude import even_directions
 from fulmar_core.controllers.space_lqr import SpaceLqrWeights
 from fulmar_core.controllers.space_pd import SpacePdGains
 from fulmar_core.robot import Robot
@@ -132,13 +133,5 @@ def _weakest(full: np.ndarray, *, shared: bool) -> float:
         full: Of each actuator at full command, shape (n, 3).
         shared: They share one supply.
     """
-    along = np.maximum(_sphere() @ full.T, 0.0)
+    along = np.maximum(even_directions(TRIES) @ full.T, 0.0)
     return float((along.max(axis=1) if shared else along.sum(axis=1)).min())
-
-
-def _sphere() -> np.ndarray:
-    """Unit vectors spread evenly (a Fibonacci lattice: González, Mathematical Geosciences 42, 2010), shape (k, 3)."""
-    number = np.arange(TRIES) + 0.5
-    up, angle = 1.0 - 2.0 * number / TRIES, math.pi * (1.0 + math.sqrt(5.0)) * number
-    across = np.sqrt(1.0 - up * up)
-    return np.stack((across * np.cos(angle), across * np.sin(angle), up), axis=-1)

@@ -51,10 +51,11 @@ class SpaceLaw(Law):
             raise ValueError("the law allocates valves or fans; this robot has neither.")
         self.frame = SpaceFrame(self.task)
         self._modulation: DeltaSigma | None = None
-        limits = self.robot.limits
-        self._target = TargetMotion(speed=limits.speed, rate=limits.yaw_rate)
+        can = self.robot.performance
+        self._target = TargetMotion(speed=can.speed, rate=can.yaw_rate)
         self._com = np.array(self.robot.body.com)
         self._inertia = self.robot.body.inertia_matrix
+        self._largest_inertia = float(np.linalg.eigvalsh(self._inertia)[-1])
 
     def allocate_by(self, weight: np.ndarray, *, lead: float, turn_lead: float) -> None:
         """Prepare the allocation and the limits of the errors.
@@ -84,7 +85,8 @@ class SpaceLaw(Law):
         """Choose commands; shapes as in `Controller.act`."""
         now = self.frame.motion(inputs)
         if not self.frame.tracks and not self.frame.passes:
-            now = self.frame.less_target(now, inputs, *self._target.update(inputs.goal.current, inputs.dt))
+            motion = self._target.update(inputs.goal.current, inputs.stamp_ns, inputs.dt)
+            now = self.frame.less_target(now, inputs, *motion)
         wrench = self.wrench(self._way(inputs, now), now)
         # Allocations count torques about the body's origin.
         wrench[..., 3:] += np.cross(self._com, wrench[..., :3])
@@ -105,10 +107,9 @@ class SpaceLaw(Law):
 
     def limited_turn(self, error: np.ndarray) -> np.ndarray:
         """An error of the attitude with the same axis, cut to the limits, shape (n, 3) [rad]."""
-        gains, inertia = self.gains, float(np.linalg.eigvalsh(self._inertia)[-1])
-        return _cut(
-            error, np.deg2rad(gains.attitude_error_limit_deg), gains.braking_torque / inertia, self._turn_lead
-        )
+        gains = self.gains
+        braking = gains.braking_torque / self._largest_inertia
+        return _cut(error, np.deg2rad(gains.attitude_error_limit_deg), braking, self._turn_lead)
 
     def turning_force(self, now: SpaceMotion) -> np.ndarray:
         """Force that keeps a velocity in the body's frame while it turns, m ω × v, shape (n, 3) [N]."""

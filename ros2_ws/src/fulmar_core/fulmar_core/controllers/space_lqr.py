@@ -17,7 +17,7 @@ from fulmar_core.controllers.lqr import regulator
 from fulmar_core.controllers.space_frame import SpaceMotion
 from fulmar_core.controllers.space_law import SpaceGains, SpaceLaw
 from fulmar_core.dynamics.linear_model import linearise_wrench
-from fulmar_core.spatial import at_rest_in_space
+from fulmar_core.spatial import SpatialState
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,7 +57,7 @@ class SpaceLqr(SpaceLaw):
     def prepare(self) -> None:
         """Solve for the gain and list the combinations of valves."""
         robot, gains, frame, dt = self.robot, self.gains, self.frame, 1.0 / self.control_hz
-        at_rest = at_rest_in_space((np.asarray(0.0),) * 3, (*((np.asarray(0.0),) * 3), np.asarray(1.0)))
+        at_rest = SpatialState.at_rest((np.asarray(0.0),) * 3, (*((np.asarray(0.0),) * 3), np.asarray(1.0)))
         model = linearise_wrench(robot, at_rest, np.zeros(6), dt)
         velocity = (frame.tracks and gains.tracking_velocity) or gains.velocity
         rate = (frame.tracks and gains.tracking_rate) or gains.rate

@@ -12,7 +12,7 @@ from fulmar_core.attitude import Vector, uniform_direction
 from fulmar_core.counter_rng import Draws
 from fulmar_core.disturbances.scenario import Scenario, around, check_delays, survivors
 from fulmar_core.disturbances.world import Drawn
-from fulmar_core.dynamics.rigid_body import Inertia, gravity_gradient_torque
+from fulmar_core.dynamics.rigid_body import gravity_gradient_torque
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
 from fulmar_core.spatial import SpatialState
@@ -77,7 +77,7 @@ def orbit_torque(state: SpatialState, world: SpatialWorld) -> Vector:
         world: Inertia and orbit.
     """
     tensor = tuple(world.inertia[i] for i in range(6))
-    return gravity_gradient_torque(state, Inertia(tensor, ()), world.orbit_rate)
+    return gravity_gradient_torque(state, tensor, world.orbit_rate)
 
 
 def draw_spatial_world(robot: Robot, scenario: Scenario, draws: Draws) -> SpatialWorld:

@@ -9,9 +9,6 @@ for a force that does not turn.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
-
-import numpy as np
 
 from fulmar_core.attitude import (
     Vector,
@@ -150,7 +147,7 @@ def angular_momentum_in_world(state: SpatialState, inertia: Inertia) -> Vector:
     return turn(state.quat, times(inertia.tensor, state.rate))
 
 
-def gravity_gradient_torque(state: SpatialState, inertia: Inertia, orbit_rate: Array | float) -> Vector:
+def gravity_gradient_torque(state: SpatialState, tensor: Tensor, orbit_rate: Array | float) -> Vector:
     """Torque of a planet's gravity along the world's −z, in the body's frame [N·m].
 
     3 n² e × J e with e the unit vector to the planet (Wertz, Spacecraft Attitude Determination and Control, 1978,
@@ -158,18 +155,9 @@ def gravity_gradient_torque(state: SpatialState, inertia: Inertia, orbit_rate: A
 
     Args:
         state: Of the centre of mass; the world's z points away from the planet.
-        inertia: Of the body; its inverse does not matter.
+        tensor: Inertia of the body about the centre of mass [kg·m²].
         orbit_rate: n = √(μ/r³) [rad/s].
     """
     zero = 0.0 * state.x
     e = turn_back(state.quat, (zero, zero, zero - 1.0))
-    return scaled(3.0 * orbit_rate**2, cross(e, times(inertia.tensor, e)))
-
-
-def principal_inertia(tensor: Any) -> np.ndarray:
-    """Principal moments of the tensor of one body, rising, shape (3,) [kg·m²]."""
-    entries = np.asarray(tensor, dtype=float)
-    if entries.shape[0] == 3:
-        return np.sort(entries)
-    xx, yy, zz, xy, xz, yz = entries
-    return np.linalg.eigvalsh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
+    return scaled(3.0 * orbit_rate**2, cross(e, times(tensor, e)))

@@ -1,6 +1,6 @@
 """Reference paths in space, each given by a few sizes, and the attitudes along them.
 
-The explicit table of paths in space. A new path is one class and one line below.
+A new path is one class, and a member of `SpacePath` below.
 """
 
 from __future__ import annotations
@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import ClassVar, Literal, get_args, get_type_hints
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -90,4 +90,3 @@ class TiltedCircle(SpaceCurve):
 
 
 SpacePath = Helix | TiltedCircle
-SPACE_PATHS = {get_args(get_type_hints(path)["kind"])[0]: path for path in get_args(SpacePath)}

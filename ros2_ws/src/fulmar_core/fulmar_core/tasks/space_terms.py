@@ -21,7 +21,7 @@ from fulmar_core.attitude import (
 )
 from fulmar_core.counter_rng import Draws
 from fulmar_core.rotation import Array
-from fulmar_core.spatial import SpatialState, at_rest_in_space, position_of, quat_of
+from fulmar_core.spatial import SpatialState, position_of, quat_of
 from fulmar_core.tasks.terms import Errors, Start
 
 AXES = ("x", "y", "z")
@@ -52,7 +52,7 @@ class SpaceStart(Start):
         x, y, z = (place[:, i] + distance * aside[i] for i in range(3))
         xp = array_namespace(place)
         goal = xp.concat((place, xp.stack(goal_quat, axis=-1)), axis=-1)
-        return at_rest_in_space((x, y, z), quat), goal
+        return SpatialState.at_rest((x, y, z), quat), goal
 
 
 def place_errors(state: SpatialState, target: Array, *, attitude: bool) -> Errors:

@@ -16,8 +16,6 @@ from fulmar_core.state import S, State
 from fulmar_core.tasks.terms import Errors, Tolerance
 from fulmar_core.things import Thing
 
-IN_SPACE = "_3d"  # ends the names of tasks in space
-
 
 class Task(ABC, Generic[S]):
     """Observation, reward, errors and tolerance of one task; free of side effects.
@@ -91,16 +89,16 @@ class Task(ABC, Generic[S]):
             TaskError: A member of a user's own task raises, or returns what no task returns.
         """
         if robot.state_type is not self.state_type:
-            in_space = self.name.endswith(IN_SPACE)
-            other = self.name.removesuffix(IN_SPACE) if in_space else self.name + IN_SPACE
+            mine, its = self.state_type.SUFFIX, robot.state_type.SUFFIX
+            other = self.name.removesuffix(mine) + its
             hint = (
                 f"Did you mean '{other}'?"
-                if other in config_names("tasks")
+                if other != self.name and other in config_names("tasks")
                 else "`fulmar list tasks` shows others."
             )
             raise ConfigError(
                 f"task '{self.name}' is about motion in {self.state_type.WORLD}, and robot '{robot.name}' moves in "
-                f"{robot.state_type.WORLD}. {hint} Names of tasks in space end in {IN_SPACE}."
+                f"{robot.state_type.WORLD}. {hint} Names of tasks in space end in {mine or its}."
             )
 
     def goal_of(self, targets: Array) -> Goal:

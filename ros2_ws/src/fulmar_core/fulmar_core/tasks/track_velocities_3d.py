@@ -12,7 +12,7 @@ from fulmar_core.counter_rng import Draws
 from fulmar_core.goal import Goal, no_obstacles
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
-from fulmar_core.spatial import SpatialState, at_rest_in_space
+from fulmar_core.spatial import SpatialState
 from fulmar_core.tasks.space_terms import AXES, MOTION_TERMS, motion_terms
 from fulmar_core.tasks.task import Task
 from fulmar_core.tasks.terms import Errors, Tolerance
@@ -64,7 +64,7 @@ class TrackVelocities3d(Task[SpatialState]):
         targets = xp.stack((*scaled(speed, towards), *scaled(rate, about)), axis=-1)
         zero = xp.zeros_like(numbers[:, 0])
         quat = uniform_attitude(*(numbers[:, i] for i in range(3)))
-        return at_rest_in_space((zero, zero, zero), quat), Goal(targets, zero, no_obstacles(draws.worlds))
+        return SpatialState.at_rest((zero, zero, zero), quat), Goal(targets, zero, no_obstacles(draws.worlds))
 
     def _errors(self, state: SpatialState, goal: Goal) -> tuple[Vector, Vector]:
         """Wanted minus true velocity [m/s] and turn rate [rad/s] in the body's frame."""

@@ -14,7 +14,7 @@ from fulmar_core.counter_rng import Draws
 from fulmar_core.goal import Goal, no_obstacles
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
-from fulmar_core.spatial import SpatialState, at_rest_in_space
+from fulmar_core.spatial import SpatialState
 from fulmar_core.tasks.space_terms import (
     ATTITUDE_TERMS,
     AXES,
@@ -125,7 +125,7 @@ class SpaceWaypointTask(Task[SpatialState]):
         x, y, z = (targets[:, 0, i] + distance * aside[i] for i in range(3))
         quat = uniform_attitude(*(numbers[:, i] for i in range(2, 5)))
         worlds = draws.worlds
-        return at_rest_in_space((x, y, z), quat), Goal(targets, np.zeros(worlds), no_obstacles(worlds))
+        return SpatialState.at_rest((x, y, z), quat), Goal(targets, np.zeros(worlds), no_obstacles(worlds))
 
     def observe(self, state: SpatialState, goal: Goal) -> tuple[Array, ...]:
         """What every controller of this task sees; see `Task.observe`."""

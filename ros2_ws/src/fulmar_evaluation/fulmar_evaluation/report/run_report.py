@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 from fulmar_bags.run_record import RunRecord
 from fulmar_core.errors import ConfigError
+from fulmar_core.spatial import SpatialState
 from fulmar_evaluation.report.control_plot import actuators_height, draw_actuators, draw_latency, draw_use
 from fulmar_evaluation.report.error_plot import counting, draw_progress, strips
 from fulmar_evaluation.report.motion_plot import MOTION_ROWS, draw_motion
@@ -44,7 +45,8 @@ def write_report(
         raise ConfigError("there is no run to report on. Give at least one bag.")
     _check_alike(records)
     runs = views(records)
-    task = str(runs[0].summary["task"] or "run").replace("_3d", " in space").replace("_", " ").capitalize()
+    task = str(runs[0].summary["task"] or "run").replace(SpatialState.SUFFIX, " in space")
+    task = task.replace("_", " ").capitalize()
     title = title or f"{task}: {' and '.join(run.label for run in runs)}"
     return write_document(
         Path(out),
