@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from fulmar_core.paths import config_names, config_path
+from fulmar_core.paths import OWN_FOLDERS, config_names, config_path
 from tests import new_robots
 from tests.fulmar_cli.command_line import complaint
 
@@ -199,6 +199,25 @@ def test_an_unusual_value_is_a_warning_and_passes(fulmar, tmp_path):
     assert "'timing.physics_dt' = 0.1 s is unusual" in warning
 
 
+def test_valves_that_no_law_in_space_allocates_are_a_warning_and_refused_before_anything_starts(
+    fulmar, tmp_path, monkeypatch
+):
+    path = altered(tmp_path, actuators__continuous=True)
+    code, found = checked(fulmar, path)
+    assert (code, found["passed"]) == (0, True)
+    (warning,) = found["warnings"]
+    assert warning.startswith(
+        "no controller but a policy can drive it: valves that open by degrees on one line"
+    )
+    (tmp_path / "robots").mkdir()
+    own = path.read_text(encoding="utf-8").replace("name: spacecraft_16", "name: proportional")
+    (tmp_path / "robots" / "proportional.yaml").write_text(own, encoding="utf-8")
+    monkeypatch.setenv(OWN_FOLDERS, str(tmp_path))
+    code, _, err = fulmar("run", "proportional", "--controller", "lqr", "--goal", "1,0,0")
+    assert code == 2
+    assert "no classical law is for 'proportional': valves that open by degrees" in err
+
+
 def test_nozzles_that_push_one_way_only_are_a_problem(fulmar, tmp_path):
     path = altered(tmp_path, "floating_platform")
     robot = yaml.safe_load(path.read_text(encoding="utf-8"))
@@ -211,13 +230,16 @@ def test_nozzles_that_push_one_way_only_are_a_problem(fulmar, tmp_path):
     assert not found["zero_wrench_holdable"]
     (problem,) = found["problems"]
     assert "negative force along x" in problem
+    _, out, _ = fulmar("check", "robot", str(path))
+    (alone,) = [line for line in out.splitlines() if "each by itself" in line]
+    assert "x 0 to " in alone
 
 
 def test_people_get_the_same_in_lines(fulmar):
     code, out, err = fulmar("check", "robot", "spacecraft_16")
     assert (code, err) == (0, "")
     assert "16, rank 6 of 6" in out
-    assert "2.828" in out
+    assert "x ±2.828, y ±2.828, z ±4 N" in out
     assert out.endswith("passed\n")
     code, out, _ = fulmar("check", "robot", str(NEW / "placeholder_ball.yaml"))
     assert code == 1

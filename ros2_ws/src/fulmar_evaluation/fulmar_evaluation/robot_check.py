@@ -12,7 +12,9 @@ from typing import Any
 
 import numpy as np
 
+from fulmar_core.actuators.pushing import WRENCH, Pushing
 from fulmar_core.actuators.rolling import Rolling
+from fulmar_core.controllers.allocation import check_allocation
 from fulmar_core.dynamics.linear_model import linearise
 from fulmar_core.errors import ImplausibleError
 from fulmar_core.planar import PlanarState
@@ -112,6 +114,11 @@ def check_robot(name: str) -> RobotCheck:
         effects = _effects(robot, wrenches)
         controllable = _controllable(robot, wrenches)
         problems = list(_problems(robot, wrenches, effects, controllable))
+        if robot.state_type is SpatialState and isinstance(robot.actuators, Pushing):
+            try:
+                check_allocation(robot.actuators, WRENCH)
+            except ValueError as error:
+                plausibility.warning("no controller but a policy can drive it: %s", error)
         for gap, line in _gaps(robot, wrenches):
             if gap <= LARGEST_GAP:
                 plausibility.warning("%s", line)
@@ -137,13 +144,14 @@ def wrench_json(robot: Robot, wrenches: WrenchSet) -> dict[str, Any]:
     torque about the centre of mass instead, where that is not the origin.
     """
     found: dict[str, Any] = _sides(wrenches)
-    low, high = _three(wrenches, wrenches.limits[:, 0]), _three(wrenches, wrenches.limits[:, 1])
-    ranges = [None if a is None or b is None else [a, b] for a, b in zip(low, high, strict=True)]
-    found |= {"force_range_n": ranges[:3], "torque_range_nm": ranges[3:], "shared_line": wrenches.shared}
+    found |= _ranges(wrenches) | {"shared_line": wrenches.shared}
     if wrenches.shared:
-        found["without_shared_line"] = _sides(wrenches.without_shared_line())
+        alone = wrenches.without_shared_line()
+        found["without_shared_line"] = _sides(alone) | _ranges(alone)
     if any(robot.body.com) and not isinstance(robot.actuators, Rolling):
-        found["force_n_about_com"] = _sides(wrenches.about(robot.body.com))["force_n"]
+        about = wrenches.about(robot.body.com)
+        found["force_n_about_com"] = _sides(about)["force_n"]
+        found["force_range_n_about_com"] = _ranges(about)["force_range_n"]
     return found
 
 
@@ -181,6 +189,12 @@ def _rest_to_rest(way: float, faster: float, slower: float, fastest: float) -> f
 def _sides(wrenches: WrenchSet) -> dict[str, Any]:
     each = _three(wrenches, np.minimum(-wrenches.limits[:, 0], wrenches.limits[:, 1]))
     return {"force_n": each[:3], "torque_nm": each[3:]}
+
+
+def _ranges(wrenches: WrenchSet) -> dict[str, Any]:
+    low, high = _three(wrenches, wrenches.limits[:, 0]), _three(wrenches, wrenches.limits[:, 1])
+    each = [None if a is None or b is None else [a, b] for a, b in zip(low, high, strict=True)]
+    return {"force_range_n": each[:3], "torque_range_nm": each[3:]}
 
 
 def _three(wrenches: WrenchSet, values: np.ndarray) -> list[float | None]:

@@ -82,10 +82,13 @@ def _lines(found: RobotCheck, result: dict[str, Any]) -> list[tuple[str, str]]:
     if wrench["shared_line"]:
         alone = wrench["without_shared_line"]
         lines.append(
-            ("  each by itself", f"{_xyz(alone['force_n'], 'N')}; {_xyz(alone['torque_nm'], 'N·m')}")
+            (
+                "  each by itself",
+                f"{_xyz(alone['force_range_n'], 'N')}; {_xyz(alone['torque_range_nm'], 'N·m')}",
+            )
         )
     if "force_n_about_com" in wrench:
-        lines.append(("  no torque about CoM", _xyz(wrench["force_n_about_com"], "N")))
+        lines.append(("  no torque about CoM", _xyz(wrench["force_range_n_about_com"], "N")))
     return [
         *lines,
         ("zero wrench, all on", "holds" if result["zero_wrench_holdable"] else "does not hold"),
@@ -97,17 +100,17 @@ def _lines(found: RobotCheck, result: dict[str, Any]) -> list[tuple[str, str]]:
 
 def _xyz(values: list[Any], unit: str) -> str:
     """Three values, or three pairs of both ways; axes in which the robot does not move are left out."""
-    return (
-        ", ".join(
-            f"{axis} {_either_way(value) if isinstance(value, list) else f'{value:.4g}'}"
-            for axis, value in zip("xyz", values, strict=True)
-            if value is not None
-        )
-        + f" {unit}"
-    )
+    known = [
+        f"{axis} {_either_way(value) if isinstance(value, list) else f'{value:.4g}'}"
+        for axis, value in zip("xyz", values, strict=True)
+        if value is not None
+    ]
+    return f"{', '.join(known)} {unit}" if known else "none"
 
 
 def _either_way(limits: list[float]) -> str:
     low, high = limits
+    if low == high == 0.0:
+        return "0"
     same = abs(low + high) <= 1e-6 * max(-low, high, 1e-12)
     return f"±{high:.4g}" if same else f"{low:.4g} to {high:.4g}"

@@ -40,19 +40,28 @@ def allocation_of(actuators: Pushing, *, weight: np.ndarray, cost: float) -> All
         cost: Of each actuator at full command, >= 0.
 
     Raises:
+        ValueError: As of `check_allocation`.
+    """
+    check_allocation(actuators, len(weight))
+    if actuators.binary:
+        return ValveAllocation(actuators, weight=weight, valve_cost=cost)
+    if actuators.shared_pressure:
+        return OpeningAllocation(actuators, weight=weight, valve_cost=cost)
+    return ThrustAllocation(actuators, weight=weight, cost=cost)
+
+
+def check_allocation(actuators: Pushing, numbers: int) -> None:
+    """Refuse actuators to which no wrench of so many numbers, 3 or 6, can be allocated.
+
+    Raises:
         ValueError: They do not push one way, or are valves that open by degrees on one line, in space.
     """
     if not actuators.one_way:
         raise ValueError(
             f"wrenches are allocated to actuators that push one way; {actuators.kind} push both."
         )
-    if actuators.binary:
-        return ValveAllocation(actuators, weight=weight, valve_cost=cost)
-    if actuators.shared_pressure:
-        if len(weight) == WRENCH:
-            raise ValueError(
-                "valves that open by degrees on one line are allocated in the plane only; in space use on/off valves "
-                "('continuous: false'), or none that share ('shared_pressure: false')."
-            )
-        return OpeningAllocation(actuators, weight=weight, valve_cost=cost)
-    return ThrustAllocation(actuators, weight=weight, cost=cost)
+    if numbers == WRENCH and actuators.shared_pressure and not actuators.binary:
+        raise ValueError(
+            "valves that open by degrees on one line are allocated in the plane only; in space use on/off valves "
+            "('continuous: false'), or none that share ('shared_pressure: false')."
+        )

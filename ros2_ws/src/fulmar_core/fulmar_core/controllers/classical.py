@@ -11,8 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from fulmar_core.actuators.families import FAMILIES
-from fulmar_core.actuators.pushing import Pushing
+from fulmar_core.actuators.pushing import WRENCH, Pushing
 from fulmar_core.config import load_config
+from fulmar_core.controllers.allocation import check_allocation
 from fulmar_core.controllers.default_gains import (
     line_of_sight_gains,
     lqr_weights,
@@ -138,6 +139,11 @@ def check_pair(robot: Robot, task: Task, *, law: str | None = None) -> None:
             f"no classical law does '{task.name}' on '{robot.name}' ({family}); there is one for: "
             f"{', '.join(entry.tasks)}. Use --controller policy, which `fulmar train {robot.name} {task.name}` makes."
         )
+    if is_in_space(robot) and isinstance(robot.actuators, Pushing):
+        try:
+            check_allocation(robot.actuators, WRENCH)
+        except ValueError as error:
+            raise ConfigError(f"no classical law is for '{robot.name}': {error}") from error
     if _find_gains(robot, entry) is None:
         gains_of(robot, law)
 
