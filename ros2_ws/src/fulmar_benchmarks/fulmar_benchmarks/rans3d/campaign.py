@@ -16,7 +16,7 @@ from fulmar_benchmarks.rans3d.pace import measure_pace
 from fulmar_benchmarks.rans3d.targets import (
     CONTROLLERS,
     DEAD,
-    DEAD_CONTROLLER,
+    DEAD_CONTROLLERS,
     DEAD_TASK,
     EPISODES,
     HOUR_S,
@@ -126,7 +126,12 @@ def _keys(request: Request) -> list[Key]:
             for scenario in request.scenarios
         ]
     if "dead" in request.parts and ROBOTS[0] in request.robots:
-        keys += [(ROBOTS[0], DEAD_TASK, DEAD_CONTROLLER, scenario) for scenario in DEAD]
+        keys += [
+            (ROBOTS[0], DEAD_TASK, controller, scenario)
+            for scenario in DEAD
+            for controller in DEAD_CONTROLLERS
+            if controller in request.controllers
+        ]
     return keys
 
 

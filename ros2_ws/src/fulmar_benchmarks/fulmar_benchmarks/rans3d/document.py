@@ -12,7 +12,7 @@ from fulmar_benchmarks.rans3d.targets import (
     AIMED_RATIO,
     AIMED_STEPS_PER_S,
     DEAD,
-    DEAD_CONTROLLER,
+    DEAD_CONTROLLERS,
     DEAD_TASK,
     LEAST_RATIO,
     LEAST_WITH_DEAD,
@@ -75,12 +75,13 @@ def document_of(
         wall_s: How long it took [s].
     """
     cells = {robot: _cells(request, robot, pairs, found, bounds) for robot in ROBOTS}
-    dead = {
-        scenario: figures_of(found.get((ROBOTS[0], DEAD_TASK, DEAD_CONTROLLER, scenario)))
-        | {"dead": count, "of": 16, "task": DEAD_TASK, "controller": DEAD_CONTROLLER}
+    dead = [
+        figures_of(found.get((ROBOTS[0], DEAD_TASK, controller, scenario)))
+        | {"scenario": scenario, "dead": count, "of": 16, "task": DEAD_TASK, "controller": controller}
         for scenario, count in DEAD.items()
-        if any(key[3] == scenario for key in keys)
-    }
+        for controller in DEAD_CONTROLLERS
+        if (ROBOTS[0], DEAD_TASK, controller, scenario) in keys
+    ]
     requirements = [*_of_cells(cells), *_of_integrator(integrator), *_of_pace(throughput)]
     return {
         "benchmark": "rans3d",
@@ -238,7 +239,7 @@ def _of_pace(found: dict[str, Any] | None) -> list[dict[str, Any]]:
     ]
 
 
-def _aims_of_cells(cells: dict[str, Cells], dead: dict[str, Any]) -> list[dict[str, Any]]:
+def _aims_of_cells(cells: dict[str, Cells], dead: list[dict[str, Any]]) -> list[dict[str, Any]]:
     duties = [
         _line(
             f"{ROBOTS[0]}, {task}, {name}: share of time that valves are open",
@@ -252,12 +253,12 @@ def _aims_of_cells(cells: dict[str, Cells], dead: dict[str, Any]) -> list[dict[s
     ]
     return duties + [
         _line(
-            f"{one['dead']} of {one['of']} thrusters dead, {DEAD_TASK}, {DEAD_CONTROLLER}: success",
+            f"{one['dead']} of {one['of']} thrusters dead, {DEAD_TASK}, {one['controller']}: success",
             one["success_rate"],
             LEAST_WITH_DEAD,
             at_least=True,
         )
-        for one in dead.values()
+        for one in dead
     ]
 
 

@@ -131,7 +131,7 @@ def notes(document: dict[str, Any]) -> list[str]:
 def other_lines(document: dict[str, Any]) -> list[str]:
     """Dead thrusters, integrator and pace, a line each."""
     lines = []
-    for one in document["dead_thrusters"].values():
+    for one in document["dead_thrusters"]:
         held = one.get("holdable", {})
         lines.append(
             f"{one['dead']} of {one['of']} thrusters dead, {one['task']}, {one['controller']}: success "

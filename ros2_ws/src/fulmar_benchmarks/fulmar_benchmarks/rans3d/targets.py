@@ -21,7 +21,7 @@ CONTROLLERS = ("lqr", "pd", "policy")
 NOMINAL, RANDOMISED = "nominal", "randomised"
 SCENARIOS = (NOMINAL, RANDOMISED)
 DEAD = {"one_dead": 1, "two_dead": 2}  # scenarios, and how many thrusters they take from the spacecraft
-DEAD_TASK, DEAD_CONTROLLER = "go_to_pose_3d", "lqr"
+DEAD_TASK, DEAD_CONTROLLERS = "go_to_pose_3d", ("lqr", "policy")
 
 # Robots whose episodes differ from those of the tasks: starts up to [m], length [s].
 EPISODES = {"int_ball2": (2.0, 60.0)}
