@@ -41,6 +41,15 @@ def test_help_is_no_mistake(fulmar, words):
     assert "Usage: fulmar" in out
 
 
+@pytest.mark.parametrize(("command", "option"), [("run", "--goal"), ("run", "--start"), ("goals", "--pose")])
+def test_the_help_of_a_goal_gives_the_numbers_in_space(fulmar, monkeypatch, command, option):
+    monkeypatch.setenv("COLUMNS", "400")
+    _, out, _ = fulmar(command, "--help")
+    (line,) = (line for line in out.splitlines() if re.search(rf"^\W*{option} ", line))
+    assert {"x,y,z", "x,y,z,roll,pitch,yaw"} <= set(re.split(r"[ ;.]+", line.replace(", or", " or")))
+    assert "[m, deg]" in line
+
+
 def test_the_list_shows_every_family_for_people(fulmar):
     code, out, err = fulmar("list")
     assert (code, err) == (0, "")
