@@ -69,7 +69,10 @@ def test_a_box_reaches_the_controller(plan):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"goal": (1.0, 2.0)}, "--goal = '1,2' has 2 numbers; 'spacecraft_16' moves in space: 3 (x,y,z) or 6"),
+        (
+            {"goal": (1.0, 2.0)},
+            "--goal = '1,2' has 2 numbers; 'spacecraft_16' moves in space: 3 (x,y,z) or 6",
+        ),
         ({"start": (1.0, 2.0, 0.0, 90.0)}, "--start = '1,2,0,90' has 4 numbers"),
         ({"goal": (0.0, 0.0, 30.0), "start": (0.0, 0.0, 0.0)}, "start and goal are 30.0 m apart"),
         ({"goal": (0.0, 0.0, 2000.0)}, "z = 2000 m lies 2,000 m from the origin"),
@@ -93,7 +96,7 @@ def test_what_cannot_be_is_refused(change, words, plan):
 
 
 def test_an_estimator_in_space_is_refused_in_the_plane_with_the_one_to_use(plan):
-    with pytest.raises(ConfigError, match="moves in the plane. Use 'mocap_imu' of configs/estimators"):
+    with pytest.raises(ConfigError, match=r"moves in the plane\. Use 'mocap_imu' of configs/estimators"):
         plan(guards={"estimator": "mocap_imu_3d"})
 
 

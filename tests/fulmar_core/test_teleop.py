@@ -162,6 +162,8 @@ def test_what_drifts_is_as_fast_as_before_when_its_actuators_have_rested(robot):
 
 def test_the_help_says_that_x_keeps_the_robot_from_its_controller_and_what_keys_do_in_space():
     words = keys_help(CRAFT)
-    assert "x: end; the robot stays in its safe state: press g first to give it back to the controller" in words
+    assert (
+        "x: end; the robot stays in its safe state: press g first to give it back to the controller" in words
+    )
     assert "keys push along x and y and turn about z only" in words
     assert "about z only" not in keys_help(load_robot("floating_platform"))

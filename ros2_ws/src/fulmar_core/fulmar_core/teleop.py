@@ -43,10 +43,10 @@ def letting_go(robot: Robot) -> str:
     """What a robot does when the dead-man switch is released, and how a person gives it back, for the person."""
     if not robot.drifts:
         return "let go and it stands still; g gives it back to the controller"
-    rest = "the valves close" if isinstance(robot.actuators, Thrusters) else f"the {robot.actuators.kind} stop"
-    return (
-        f"let go and {rest}: it drifts on; press the opposite key to brake, or g to give it back to the controller"
+    rest = (
+        "the valves close" if isinstance(robot.actuators, Thrusters) else f"the {robot.actuators.kind} stop"
     )
+    return f"let go and {rest}: it drifts on; press the opposite key to brake, or g to give it back to the controller"
 
 
 def keys_help(robot: Robot) -> str:

@@ -21,7 +21,9 @@ RUN_TASK_HELP = (
 BACKEND_HELP = "mujoco, mock (Fulmar's own dynamics, perfect sensors) or hardware."
 DURATION_HELP = "Simulated seconds; the task's episode by default."
 GOAL_HELP = "Where to go [m, deg], in space x,y,z or x,y,z,roll,pitch,yaw; drawn from the seed by default."
-START_HELP = "Where to begin [m, deg], in space x,y,z or x,y,z,roll,pitch,yaw; drawn from the seed by default."
+START_HELP = (
+    "Where to begin [m, deg], in space x,y,z or x,y,z,roll,pitch,yaw; drawn from the seed by default."
+)
 GOALS_HELP = "Goals one after another, or a path to follow: a name from `fulmar list goals`, or a .yaml file."
 ESTIMATOR_HELP = "Estimate odometry from poses and inertial readings: a name from configs/estimators."
 END_HELP = "An e-stop ends and fails the run; by default the robot waits for a reset and a new goal."

@@ -112,7 +112,12 @@ def _drawings(bag: Bag, seen: Odometries) -> list[Drawing]:
         axes.set_ylabel("delay [ms]")
 
     found = [
-        Drawing(f"The path, seen {SIDES[0].title if space else SIDES[0].name}", "As the odometry reports it.", 4.0, path),
+        Drawing(
+            f"The path, seen {SIDES[0].title if space else SIDES[0].name}",
+            "As the odometry reports it.",
+            4.0,
+            path,
+        ),
         *([Drawing(f"The path, seen {SIDES[1].title}", "At the same scale.", 4.0, side)] if space else []),
         Drawing(
             "How fast", _PACE_IN_SPACE if space else "Speed and turn rate in the body's frame.", 2.2, pace

@@ -16,7 +16,9 @@ from fulmar_evaluation.report.style import FAINT, quiet_grid
 from fulmar_evaluation.run_evaluation import RunResult
 
 SPEEDS = {0.001: "1 mm/s", 0.01: "1 cm/s", 0.1: "10 cm/s", 1.0: "1 m/s", 10.0: "10 m/s"}
-DEEPEST = 0.05  # of the usual end of a scale: below that nothing matters, such as an error that changes its sign
+DEEPEST = (
+    0.05  # of the usual end of a scale: below that nothing matters, such as an error that changes its sign
+)
 CUT = 0.01  # share of a curve's samples that may lie below the scale
 TURN_RATES = {0.01: "0.01°/s", 0.1: "0.1°/s", 1.0: "1°/s", 10.0: "10°/s", 100.0: "100°/s"}
 
