@@ -69,14 +69,17 @@ def test_a_box_reaches_the_controller(plan):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"goal": (1.0, 2.0)}, "--goal = '1,2' has 2 numbers; 'spacecraft_16' moves in space: x,y,z [m] or"),
+        (
+            {"goal": (1.0, 2.0)},
+            "--goal = '1,2' has 2 numbers; 'spacecraft_16' moves in space: 3 (x,y,z) or 6",
+        ),
         ({"start": (1.0, 2.0, 0.0, 90.0)}, "--start = '1,2,0,90' has 4 numbers"),
         ({"goal": (0.0, 0.0, 30.0), "start": (0.0, 0.0, 0.0)}, "start and goal are 30.0 m apart"),
         ({"goal": (0.0, 0.0, 2000.0)}, "z = 2000 m lies 2,000 m from the origin"),
         ({"goal": (0.0, math.inf, 0.0)}, "must be finite"),
         (
             {"guards": {"estimator": "mocap_imu"}},
-            "estimator 'mocap_imu' is of motion in the plane, and robot",
+            "moves in space. Use 'mocap_imu_3d' of configs/estimators, or leave it out.",
         ),
         ({"task": "go_to_pose"}, "task 'go_to_pose' is about motion in the plane"),
         ({"robot": "floating_platform"}, "task 'go_to_pose_3d' is about motion in space"),
@@ -90,6 +93,11 @@ def test_what_cannot_be_is_refused(change, words, plan):
     with pytest.raises(ConfigError) as caught:
         plan(**SPACE | change)
     assert words in str(caught.value)
+
+
+def test_an_estimator_in_space_is_refused_in_the_plane_with_the_one_to_use(plan):
+    with pytest.raises(ConfigError, match=r"moves in the plane\. Use 'mocap_imu' of configs/estimators"):
+        plan(guards={"estimator": "mocap_imu_3d"})
 
 
 def test_a_box_in_the_plane_is_refused(plan):

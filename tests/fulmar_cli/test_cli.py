@@ -41,6 +41,14 @@ def test_help_is_no_mistake(fulmar, words):
     assert "Usage: fulmar" in out
 
 
+@pytest.mark.parametrize(("command", "option"), [("run", "--goal"), ("run", "--start"), ("goals", "--pose")])
+def test_the_help_of_a_goal_gives_the_numbers_in_space(fulmar, command, option):
+    _, out, _ = fulmar(command, "--help")
+    words = out.partition(f"\n  {option} ")[2].partition("\n  -")[0].split()
+    assert {"x,y,z", "x,y,z,roll,pitch,yaw"} <= {word.strip(";.") for word in words}
+    assert "[m, deg]" in " ".join(words)
+
+
 def test_the_list_shows_every_family_for_people(fulmar):
     code, out, err = fulmar("list")
     assert (code, err) == (0, "")

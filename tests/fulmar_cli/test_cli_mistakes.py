@@ -15,6 +15,9 @@ from fulmar_core import policy_bundle
 from fulmar_core.paths import config_directory
 from tests.fulmar_cli.command_line import EVALUATE, RUN, SHIPPED, complaint
 
+CRAFT = ["run", "spacecraft_16"]
+IN_SPACE = "3 (x,y,z) or 6 (x,y,z,roll,pitch,yaw)"
+
 
 @pytest.fixture
 def broken_configs(tmp_path, monkeypatch):
@@ -94,6 +97,13 @@ def broken_configs(tmp_path, monkeypatch):
         (["run", "jetbot", "--goal", "1,2,90"], "Say --task go_to_position or --goal x,y, or --controller"),
         ([*RUN, "--start", "a,b,c"], "--start = 'a,b,c' must be three finite numbers"),
         ([*RUN, "--area=2,-2,0,1"], "--area = '2,-2,0,1' must be x_min,x_max,y_min,y_max"),
+        ([*CRAFT, "--goal", "1,0,-0.5,0,30"], f"--goal = '1,0,-0.5,0,30' has 5 numbers; {IN_SPACE} are needed"),
+        ([*CRAFT, "--goal", "nan,0,0"], f"--goal = 'nan,0,0' must be {IN_SPACE} finite numbers"),
+        ([*CRAFT, "--goal", "a,0,0"], f"--goal = 'a,0,0' must be {IN_SPACE} finite numbers"),
+        ([*CRAFT, "--start", "0,0,0,0,0"], f"--start = '0,0,0,0,0' has 5 numbers; {IN_SPACE} are needed"),
+        (["goals", "--robot", "spacecraft_16", "--pose", "1,2,3,4,5"], f"has 5 numbers; {IN_SPACE} are needed"),
+        (["run", "spacecraft", "--goal", "1,2,3,4,5"], "unknown robot 'spacecraft'"),
+        ([*CRAFT, "--area=-2,2,-2,2,1,-1"], "In space z_min,z_max follow, with z_min < z_max."),
         ([*RUN, "--area=1,2,3"], "--area = '1,2,3' must be x_min,x_max,y_min,y_max"),
         ([*RUN, "--goal", "3,0,0", "--area=-2,2,-1,1"], "the goal x = 3 m, y = 0 m lies outside the area of x -2 to"),
         (["goals", "--robot", "kingfisher", "--pose", "0,1001"], "x = 0 m, y = 1001 m lies 1,001 m from the origin"),
@@ -300,3 +310,14 @@ def test_a_run_folder_is_never_trained_into(fulmar, tmp_path):
     (tmp_path / "run.json").write_text("{}")
     words = ("train", "floating_platform", "go_to_pose", "--out", str(tmp_path))
     assert "nothing recorded is overwritten" in complaint(fulmar(*words))
+
+
+@pytest.mark.parametrize(
+    ("words", "advice"),
+    [([*CRAFT, "--controller", "mpc"], "Use --controller lqr or pd."),
+     (["run", "leatherback", "--controller", "lqr"], "Use --controller classical.")],
+)  # fmt: skip
+def test_a_controller_of_another_kind_of_robot_gets_one_advice(fulmar, words, advice):
+    line = complaint(fulmar(*words))
+    assert line.endswith(advice)
+    assert line.count("--controller") == 1

@@ -201,3 +201,9 @@ def test_a_repeated_goal_of_an_operator_begins_anew_as_before():
     bench.give(1.0, 0.0, 0.0)
     bench.give(1.0, 0.0, 0.0)
     assert (bench.guard.mission.moved, bench.guard.mission.goals_received) == (False, 2)
+
+
+def test_the_title_of_the_helix_has_the_width_of_its_path():
+    helix = load_goals("helix")
+    width = np.ptp(helix.target().points[:, 0])
+    assert f"{width:.0f} m wide" in helix.title

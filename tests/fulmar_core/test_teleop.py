@@ -22,7 +22,10 @@ from fulmar_core.teleop import (
     Keyboard,
     Wish,
     hand_mapping,
+    keys_help,
+    letting_go,
 )
+from tests.simulations import build
 from tests.spaces import pushes_within_its_plane
 
 ROBOTS = pytest.mark.parametrize(
@@ -123,3 +126,44 @@ def test_whatever_a_gamepad_says_wishes_stay_within_bounds(axes, buttons):
     pad.see(axes, buttons, 0)
     wish = pad.wish(1)
     assert wish is None or all(-1.0 <= part <= 1.0 for part in wish.parts)
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("spacecraft_16", "let go and the valves close: it drifts on; press the opposite key to brake, or g to give"),
+        ("int_ball2", "let go and the fans stop: it drifts on; press the opposite key to brake, or g to give"),
+        ("floating_platform", "let go and the valves close: it drifts on"),
+        ("modular_freeflyer", "let go and the valves close: it drifts on"),
+        ("turtlebot2", "let go and it stands still; g gives it back"),
+        ("leatherback", "let go and it stands still"),
+        ("kingfisher", "let go and it stands still"),
+    ],
+)  # fmt: skip
+def test_a_person_reads_what_the_robot_does_when_the_key_is_released(name, words):
+    assert letting_go(load_robot(name)).startswith(words)
+
+
+@ROBOTS
+def test_what_drifts_is_as_fast_as_before_when_its_actuators_have_rested(robot):
+    """The sentence follows the physics: driven ahead by hand for 2 s, then let go for 20 s."""
+    simulation = build(robot=robot, worlds=1)
+    steps = round(simulation.robot.timing.control_hz)
+
+    def speed_after(seconds, wish):
+        for _ in range(seconds * steps):
+            simulation.step(hand_mapping(robot)(wish)[None])
+        return float(simulation.truth.logged()["speed"][0])
+
+    driven, left = speed_after(2, Wish(ahead=1.0)), speed_after(20, NOTHING)
+    assert driven > 0.02
+    assert (left > 0.9 * driven) == robot.drifts
+
+
+def test_the_help_says_that_x_keeps_the_robot_from_its_controller_and_what_keys_do_in_space():
+    words = keys_help(CRAFT)
+    assert (
+        "x: end; the robot stays in its safe state: press g first to give it back to the controller" in words
+    )
+    assert "keys push along x and y and turn about z only" in words
+    assert "about z only" not in keys_help(load_robot("floating_platform"))

@@ -166,7 +166,7 @@ def test_runs_of_two_tasks_are_not_compared(reached, tmp_path):
     [
         ("turtlebot2", "go_through_poses", ("make a success", "targets reached", "Effort spent")),
         ("turtlebot2", "track_velocities", ("velocity error", "turn rate error", "m/s off")),
-        ("kingfisher", "go_to_position_with_obstacles", ("Grey discs are obstacles", "distance to goal")),
+        ("kingfisher", "go_to_position_with_obstacles", ("Grey discs are obstacles", "distance")),
         ("leatherback", "race_waypoints", ("Numbered circles", "What the actuators did")),
     ],
 )

@@ -24,7 +24,9 @@ from fulmar_core.topics import ODOMETRY
 from fulmar_evaluation.report import write_report
 from fulmar_evaluation.report.bag_report import _drawings
 from fulmar_evaluation.report.control_plot import actuators_height, draw_actuators, open_spans
+from fulmar_evaluation.report.error_plot import draw_progress, strips
 from fulmar_evaluation.report.motion_plot import draw_motion
+from fulmar_evaluation.report.run_report import _overview
 from fulmar_evaluation.report.run_view import DISPLAY_NAMES, views
 from fulmar_evaluation.report.space_plot import draw_space
 from fulmar_evaluation.report.style import BODY_AXES, CONTROLLER_COLOURS, colours, house_style
@@ -78,7 +80,8 @@ def test_a_page_of_space_has_its_plots_and_figures_and_nothing_of_the_plane(page
     assert out.read_text().count("<svg") == 6
     for word in (
         "from above and from the side",
-        "from the side",
+        "from above (x, y)",
+        "from the side (x, z)",
         "z [m]",
         "attitude error",
         "speed [m/s]",
@@ -150,7 +153,7 @@ def test_rows_of_robots_with_few_actuators_are_as_high_as_before(reached):
 @pytest.mark.parametrize(
     ("task", "words"),
     [
-        ("go_to_position_3d", ("distance to goal", "within 5 cm of the goal")),
+        ("go_to_position_3d", ("distance", "1 cm", "within 5 cm of the goal")),
         ("track_velocities_3d", ("velocity error", "turn rate error", "°/s, on average", "within 0.1 m/s")),
         ("go_through_poses_3d", ("make a success", "Numbered circles", "attitude error")),
         ("go_through_positions_3d", ("make a success", "Numbered circles")),
@@ -160,7 +163,7 @@ def test_every_task_in_space_gets_a_page_and_a_plot(task, words, tmp_path):
     plan = SpacePlan(task=task, duration_s=15.0, start=None, goal=None)
     record = read_run(write_space_run(tmp_path / "bag", plan))
     reported = " ".join(Page(write_report([record], tmp_path / "r.html").read_text()).words)
-    for word in (*words, "from the side"):
+    for word in (*words, "from the side (x, z)"):
         assert word in reported
     assert "eading" not in reported
     assert write_report([record], tmp_path / "r.png").exists()
@@ -186,13 +189,45 @@ def test_a_bag_without_a_task_shows_space_where_the_body_leaves_the_plane(tmp_pa
     bag = open_bag(write_space_run(tmp_path / "bag", plan))
     drawings = {drawing.title: drawing for drawing in _drawings(bag, odometries(bag.of(ODOMETRY)))}
     spans = []
-    for title in ("The path, seen from above", "The path, seen from the side"):
+    for title in ("The path, seen from above (x, y)", "The path, seen from the side (x, z)"):
         axes = Figure(figsize=(6.2, 4.0)).subplots()
         drawings[title].draw(axes)
         spans.append(np.ptp(axes.get_ylim()))
     assert spans[0] == pytest.approx(spans[1])
     flat = open_bag(POLICY)
-    assert not any("side" in d.title for d in _drawings(flat, odometries(flat.of(ODOMETRY))))
+    titles = [drawing.title for drawing in _drawings(flat, odometries(flat.of(ODOMETRY)))]
+    assert not any("side" in title for title in titles)
+    assert titles[0] == "The path, seen from above"
+
+
+def progress(view):
+    """The strips of errors of one run as they stand in a report."""
+    figure = Figure(figsize=(7.4, 0.5 + 1.7 * len(strips([view]))), layout="constrained")
+    rows = figure.subplots(len(strips([view])), 1, sharex=True)
+    with house_style():
+        draw_progress(rows, [view])
+        figure.draw_without_rendering()
+    return rows
+
+
+def test_no_label_of_an_error_is_taller_than_its_axis_and_no_unit_stands_twice(flown):
+    with house_style():
+        sheet = _overview(views([read_run(flown)]), "title")
+        sheet.draw_without_rendering()
+    errors = {axes.get_ylabel(): axes for axes in sheet.axes if axes.get_yscale() == "log"}
+    assert list(errors) == ["distance", "attitude error"]
+    for axes in errors.values():
+        assert axes.yaxis.label.get_window_extent().height < axes.get_window_extent().height
+    assert "1 cm" in [tick.get_text() for tick in errors["distance"].get_yticklabels()]
+
+
+@pytest.mark.parametrize(("least", "lowest"), [(0.05, 2e-3), (5e-4, 4e-4), (1e-12, 1e-4), (0.0, 2e-3)])
+def test_the_scale_of_distances_goes_as_low_as_they_do(flown, least, lowest):
+    (view,) = views([read_run(flown)])
+    run = view.result.run
+    flat = dataclasses.replace(run, position_error=np.full_like(run.position_error, least))
+    near = dataclasses.replace(view, result=dataclasses.replace(view.result, run=flat))
+    assert progress(near)[0].get_ylim()[0] == pytest.approx(lowest)
 
 
 def test_a_body_in_space_is_identified_from_its_bag(flown, tmp_path):

@@ -56,7 +56,8 @@ def whole_pose(numbers: Sequence[float], robot: Robot, option: str) -> PoseTuple
         given = ",".join(f"{number:g}" for number in numbers)
         raise ConfigError(
             f"{option} = '{given}' has {len(numbers)} numbers; '{robot.name}' moves in {form.WORLD}: "
-            f"{','.join(form.NUMBERS[: form.AXES])} [m] or {','.join(form.NUMBERS)} [m, deg]."
+            f"{form.AXES} ({','.join(form.NUMBERS[: form.AXES])}) or {len(form.NUMBERS)} "
+            f"({','.join(form.NUMBERS)}) are needed [m, deg]."
         )
     return (*numbers, *[0.0] * (len(form.NUMBERS) - len(numbers)))
 
@@ -122,8 +123,11 @@ def default_task(
     if not reason:
         return asked
     other = pose if asked == position else position
+    reason_of_other = why_not(robot, other, controller, policy)
+    if reason == reason_of_other:
+        return asked  # not for this robot, whatever the task: the plan is refused with what is
     instead = []
-    if not why_not(robot, other, controller, policy):
+    if not reason_of_other:
         instead.append(f"--task {other} or {goal_options(form)[other]}")
     if controller != "classical" and not why_not(robot, asked, "classical", None):
         instead.append("--controller classical")

@@ -235,8 +235,12 @@ class Robot:
     @property
     def state_type(self) -> type[State]:
         """Form of its states: in the plane, or, of bodies that neither the floor nor water carries, in space."""
-        free = not self.body.planar and self.hydrodynamics is None and isinstance(self.actuators, Pushing)
-        return SpatialState if free else PlanarState
+        return SpatialState if self.drifts and not self.body.planar else PlanarState
+
+    @property
+    def drifts(self) -> bool:
+        """Whether it keeps its speed when its actuators are at rest: neither the floor nor water slows it down."""
+        return self.hydrodynamics is None and isinstance(self.actuators, Pushing)
 
     @property
     def recipe(self) -> str:
@@ -259,7 +263,7 @@ class Robot:
             )
         if self.hydrodynamics is not None and isinstance(self.actuators, Rolling):
             raise ValueError("'hydrodynamics' and wheels exclude one another.")
-        if self.air_bearing and not (isinstance(self.actuators, Pushing) and self.hydrodynamics is None):
+        if self.air_bearing and not self.drifts:
             raise ValueError("'air_bearing' is for robots on the floor with thrusters or fans; leave it out.")
         if self.limits.yaw_rate >= self.sensors.imu.gyroscope_range:
             raise ValueError(

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fulmar_core.actuators.pushing import PLANAR, Pushing
+from fulmar_core.actuators.thrusters import Thrusters
 from fulmar_core.controllers.allocation import allocation_of
 from fulmar_core.errors import ConfigError
 from fulmar_core.robot import Robot
@@ -36,6 +37,25 @@ class Wish:
 
 
 NOTHING = Wish()
+
+
+def letting_go(robot: Robot) -> str:
+    """What a robot does when the dead-man switch is released, and how a person gives it back, for the person."""
+    if not robot.drifts:
+        return "let go and it stands still; g gives it back to the controller"
+    rest = (
+        "the valves close" if isinstance(robot.actuators, Thrusters) else f"the {robot.actuators.kind} stop"
+    )
+    return f"let go and {rest}: it drifts on; press the opposite key to brake, or g to give it back to the controller"
+
+
+def keys_help(robot: Robot) -> str:
+    """What the keys do, in one line for the person."""
+    space = "keys push along x and y and turn about z only · " if robot.state_type is SpatialState else ""
+    return (
+        f"w/s ahead, back · a/d turn · q/e left, right · {space}hold a key: it is the dead-man switch · "
+        "g give back · x: end; the robot stays in its safe state: press g first to give it back to the controller"
+    )
 
 
 def hand_mapping(robot: Robot) -> Callable[[Wish], np.ndarray]:

@@ -1,7 +1,7 @@
 """The node `teleop`: manual control by keyboard or gamepad, with a dead-man switch.
 
-Nothing is sent before the switch is held for the first time. From then on the person has the robot: let go, and it
-stands still; the controller gets it back only when the person says so.
+Nothing is sent before the switch is held for the first time. From then on the person has the robot: let go, and its
+actuators go to their safe state; the controller gets it back only when the person says so.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from std_srvs.srv import Trigger
 
 from fulmar_core.errors import DONE, ConfigError
 from fulmar_core.robot import load_robot
-from fulmar_core.teleop import NOTHING, Gamepad, JoyLayout, Keyboard, hand_mapping
+from fulmar_core.teleop import NOTHING, Gamepad, JoyLayout, Keyboard, hand_mapping, keys_help, letting_go
 from fulmar_core.topics import GIVE_BACK, JOY, TELEOP
 from fulmar_ros.convert import VectorWriter
 from fulmar_ros.graph import running_robots_text
@@ -38,7 +38,6 @@ from fulmar_ros.runtime import RequestExit, run_node
 RATE_HZ = 20.0
 PATIENCE_S = 3.0  # for a plant that receives the commands, before a warning
 ANSWER_S = 2.0  # a plant that does not answer a request by then is asked again
-HELP = "w/s ahead, back · a/d turn · q/e left, right · hold a key: it is the dead-man switch · g give back · x end"
 
 
 @dataclass(frozen=True)
@@ -91,6 +90,7 @@ class TeleopNode(Node):
         self._request_exit, self._share = request_exit, settings.share
         self._binary = robot.actuators.binary
         self._command_for, self._safe = hand_mapping(robot), robot.actuators.safe_command
+        self._letting_go = letting_go(robot)
         self._keyboard, self._gamepad = Keyboard(), Gamepad(settings.layout)
         self._lock = threading.Lock()
         self._has_robot, self._over = False, threading.Event()
@@ -107,7 +107,7 @@ class TeleopNode(Node):
         )
         self._thread: threading.Thread | None = None
         if settings.keyboard:
-            self.get_logger().info(HELP)
+            self.get_logger().info(keys_help(robot))
             self._thread = threading.Thread(target=self._read_keys, name="keys", daemon=True)
             self._thread.start()
 
@@ -148,7 +148,7 @@ class TeleopNode(Node):
             wish = self._gamepad.wish(now) or self._keyboard.wish(now)
             if wish is not None and not self._has_robot:
                 self._has_robot = True
-                self._say("you have the robot; let go and it stands still; g gives it back")
+                self._say(f"you have the robot; {self._letting_go}")
             if not self._has_robot or self._over.is_set():
                 return
             command = self._command_for(wish or NOTHING)
@@ -185,7 +185,7 @@ class TeleopNode(Node):
         self._said = words or self._said
 
     def stop(self) -> None:
-        """Publish the safe command several times; the robot stands still until a person gives it back."""
+        """Publish the safe command several times; it stays in force until a person gives the robot back."""
         self._over.set()
         if self._has_robot:
             for _ in range(SAFE_REPEATS):

@@ -30,7 +30,7 @@ def goals(
         option(
             "X,Y,DEG",
             "One goal instead of a file: x [m], y [m], heading [deg], or x,y for a position; in space "
-            "x,y,z,roll,pitch,yaw or x,y,z.",
+            "x,y,z,roll,pitch,yaw [m, deg], or x,y,z for a position.",
             "--pose",
         ),
     ] = None,
@@ -66,6 +66,8 @@ def goals(
 
     fulmar goals --robot floating_platform --pose 1,-0.5,90
 
+    fulmar goals --robot spacecraft_16 --pose 1,0,-0.5,0,30,90
+
     Exit code: 0 done, or stopped by Ctrl-C, 1 there is no robot or no controller that takes such goals.
     """
     if name is None and pose is None:
@@ -73,7 +75,7 @@ def goals(
         return
     if name is not None and pose is not None:
         raise ConfigError(f"'{name}' and --pose are two goals: give one of them.")
-    place = read_goal(pose, "--pose")
+    place = read_goal(pose, "--pose", robot or "")
     if robot is None:
         example = name if place is None else f"--pose {pose}"
         raise ConfigError(f"whose goals? Example: fulmar goals {example} --robot floating_platform")

@@ -15,12 +15,12 @@ from fulmar_cli.commands.values import read_area, read_goal, read_pose
 
 RUN_TASK_HELP = (
     f"{cli.TASK_HELP} By default the goal decides: go_to_position for x,y, go_to_pose for x,y,deg and without a goal, "
-    "and the task that takes the goals of --goals."
+    "and the task that takes the goals of --goals. In space, go_to_position_3d for x,y,z, else go_to_pose_3d."
 )
 BACKEND_HELP = "mujoco, mock (Fulmar's own dynamics, perfect sensors) or hardware."
 DURATION_HELP = "Simulated seconds; the task's episode by default."
-GOAL_HELP = "Where to go, in space x,y,z[,roll,pitch,yaw]; drawn from the seed by default."
-START_HELP = "Where to begin, in space x,y,z[,roll,pitch,yaw]; drawn from the seed by default."
+GOAL_HELP = "Where to go [m, deg], in space x,y,z or x,y,z,roll,pitch,yaw; by default the seed draws it."
+START_HELP = "Where to begin [m, deg], in space x,y,z or x,y,z,roll,pitch,yaw; by default the seed draws it."
 GOALS_HELP = "Goals one after another, or a path to follow: a name from `fulmar list goals`, or a .yaml file."
 ESTIMATOR_HELP = "Estimate odometry from poses and inertial readings: a name from configs/estimators."
 END_HELP = "An e-stop ends and fails the run; by default the robot waits for a reset and a new goal."
@@ -123,7 +123,7 @@ def run(
     from fulmar_evaluation.run_summary import summary_text
 
     use_calibration(calibration, robot)
-    place = read_goal(goal)
+    place = read_goal(goal, robot=robot)
     task, note = task_of_run(
         task, robot, controller, backend, goal=place, goals=goals, policy=policy, hardware=hardware
     )
@@ -135,7 +135,7 @@ def run(
     }  # fmt: skip
     request = plan_run(
         robot=robot, name=name, task=task, controller=controller, backend=backend, policy=policy,
-        goal=place, goals=goals, start=read_pose(start, "--start"), duration_s=duration, lockstep=lockstep,
+        goal=place, goals=goals, start=read_pose(start, "--start", robot), duration_s=duration, lockstep=lockstep,
         rate=rate, control_hz=control_hz, scenario=scenario, seed=seed, hardware=hardware, emulate=emulate, arm=arm,
         record=record or dated_folder("runs", name or robot, controller), command=cli.invoked_command(),
         guards={key: value for key, value in guards.items() if value is not None}, recording=recording,

@@ -25,8 +25,10 @@ def teleop(
 ) -> None:
     """Drive a running robot by keyboard or gamepad, with priority over the controller.
 
-    Hold a key or the gamepad's left shoulder button: that is the dead-man switch. The robot stops when it is released
-    or this command dies. The controller takes over again with g, with the right shoulder button, or with --give-back.
+    Hold a key or the gamepad's left shoulder button: that is the dead-man switch. When it is released or this command
+    dies, the actuators go to their safe state: robots on wheels or in water stop, robots that float drift on. The
+    controller takes over again with g, with the right shoulder button, or with --give-back; x ends this command and
+    leaves the robot in its safe state. In space, keys push along x and y and turn about z only.
 
     Try:
 

@@ -38,7 +38,7 @@ def read_area(text: str | None) -> Area | None:
     """
     wanted = (
         "x_min,x_max,y_min,y_max in m with x_min < x_max and y_min < y_max, such as --area=-2,2,-1,1. "
-        "In space z_min,z_max follow."
+        "In space z_min,z_max follow, with z_min < z_max."
     )
 
     def is_area(values: tuple[float, ...]) -> bool:
@@ -48,8 +48,13 @@ def read_area(text: str | None) -> Area | None:
     return _read(text, "--area", wanted, is_area)
 
 
-def read_goal(text: str | None, option: str = "--goal") -> tuple[float, ...] | None:
+def read_goal(text: str | None, option: str = "--goal", robot: str = "") -> tuple[float, ...] | None:
     """Read a place or a pose: `x,y` or `x,y,deg`, in space `x,y,z` or `x,y,z,roll,pitch,yaw` [m, deg].
+
+    Args:
+        text: What was given.
+        option: What gave it.
+        robot: Whose goal it is, where that is known: the message then says what this robot needs.
 
     Raises:
         ConfigError: If it is not two, three or six finite numbers.
@@ -58,11 +63,16 @@ def read_goal(text: str | None, option: str = "--goal") -> tuple[float, ...] | N
         "two or three finite numbers: x [m], y [m] and, for a pose, heading [deg]. "
         f"Example: {option} 1,-0.5 or {option} 1,-0.5,90. In space x,y,z or x,y,z,roll,pitch,yaw [m, deg]."
     )
-    return _read(text, option, wanted, lambda values: len(values) in (2, 3, 6))
+    return _read(text, option, wanted, lambda values: len(values) in (2, 3, 6), robot)
 
 
-def read_pose(text: str | None, option: str) -> tuple[float, ...] | None:
+def read_pose(text: str | None, option: str, robot: str = "") -> tuple[float, ...] | None:
     """Read a pose: `x,y,deg`, in space `x,y,z`, upright, or `x,y,z,roll,pitch,yaw` [m, deg].
+
+    Args:
+        text: What was given.
+        option: What gave it.
+        robot: As of `read_goal`.
 
     Raises:
         ConfigError: If it is not three or six finite numbers.
@@ -71,10 +81,16 @@ def read_pose(text: str | None, option: str) -> tuple[float, ...] | None:
         f"three finite numbers: x [m], y [m], heading [deg]. Example: {option} 1,-0.5,90. "
         "In space x,y,z,roll,pitch,yaw [m, deg]."
     )
-    return _read(text, option, wanted, lambda values: len(values) in (3, 6))
+    return _read(text, option, wanted, lambda values: len(values) in (3, 6), robot)
 
 
-def _read(text: str | None, option: str, wanted: str, fits: Callable[[tuple[float, ...]], bool]) -> Any:
+def _read(
+    text: str | None,
+    option: str,
+    wanted: str,
+    fits: Callable[[tuple[float, ...]], bool],
+    robot: str = "",
+) -> Any:
     if text is None:
         return None
     try:
@@ -83,4 +99,33 @@ def _read(text: str | None, option: str, wanted: str, fits: Callable[[tuple[floa
             return values
     except ValueError:  # of a part, or of `fits`
         pass
+    if robot:
+        _refuse_in_space(text, option, robot)
     raise ConfigError(f"{option} = '{text}' must be {wanted}")
+
+
+def _refuse_in_space(text: str, option: str, robot: str) -> None:
+    """Say what a robot in space needs; nothing for one in the plane.
+
+    Raises:
+        ConfigError: The robot moves in space, or there is none of this name.
+    """
+    from fulmar_core.planar import PlanarState
+    from fulmar_core.robot import load_robot  # loads NumPy: only for this message
+
+    form = load_robot(robot).state_type
+    if form is PlanarState:
+        return
+    parts = text.split(",")
+    place, pose = form.NUMBERS[: form.AXES], form.NUMBERS
+    needed = f"{len(place)} ({','.join(place)}) or {len(pose)} ({','.join(pose)})"
+    if all(map(_is_finite, parts)):
+        raise ConfigError(f"{option} = '{text}' has {len(parts)} numbers; {needed} are needed [m, deg].")
+    raise ConfigError(f"{option} = '{text}' must be {needed} finite numbers [m, deg].")
+
+
+def _is_finite(text: str) -> bool:
+    try:
+        return math.isfinite(float(text))
+    except ValueError:
+        return False

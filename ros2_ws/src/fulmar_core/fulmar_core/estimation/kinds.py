@@ -120,7 +120,7 @@ def check_estimator(name: str, robot: Robot) -> None:
     if robot.state_type is not form:
         raise ConfigError(
             f"estimator '{name}' is of motion in {form.WORLD}, and robot '{robot.name}' moves in "
-            f"{robot.state_type.WORLD}. Leave it out, or name another file of configs/estimators."
+            f"{robot.state_type.WORLD}. Use '{default_estimator(robot)}' of configs/estimators, or leave it out."
         )
 
 

@@ -19,6 +19,7 @@ from fulmar_bags.contents import Bag
 from fulmar_bags.decode import TWIST, Odometries, Vectors, joint_vectors, odometries, twist_vectors
 from fulmar_bags.figures import describe
 from fulmar_evaluation.report.page import Part, Plot, cells, html_page, table
+from fulmar_evaluation.report.space_plot import SIDES
 from fulmar_evaluation.report.style import CONTROLLER_COLOURS, legend, quiet_grid
 from fulmar_evaluation.report.writer import write_document
 
@@ -111,8 +112,13 @@ def _drawings(bag: Bag, seen: Odometries) -> list[Drawing]:
         axes.set_ylabel("delay [ms]")
 
     found = [
-        Drawing("The path, seen from above", "As the odometry reports it.", 4.0, path),
-        *([Drawing("The path, seen from the side", "At the same scale.", 4.0, side)] if space else []),
+        Drawing(
+            f"The path, seen {SIDES[0].title if space else SIDES[0].name}",
+            "As the odometry reports it.",
+            4.0,
+            path,
+        ),
+        *([Drawing(f"The path, seen {SIDES[1].title}", "At the same scale.", 4.0, side)] if space else []),
         Drawing(
             "How fast", _PACE_IN_SPACE if space else "Speed and turn rate in the body's frame.", 2.2, pace
         ),

@@ -16,6 +16,10 @@ from fulmar_evaluation.report.style import FAINT, quiet_grid
 from fulmar_evaluation.run_evaluation import RunResult
 
 SPEEDS = {0.001: "1 mm/s", 0.01: "1 cm/s", 0.1: "10 cm/s", 1.0: "1 m/s", 10.0: "10 m/s"}
+DEEPEST = (
+    0.05  # of the usual end of a scale: below that nothing matters, such as an error that changes its sign
+)
+CUT = 0.01  # share of a curve's samples that may lie below the scale
 TURN_RATES = {0.01: "0.01°/s", 0.1: "0.1°/s", 1.0: "1°/s", 10.0: "10°/s", 100.0: "100°/s"}
 
 
@@ -25,14 +29,14 @@ class Strip:
 
     label: str
     marks: dict[float, str]  # of the scale
-    lowest: float
+    lowest: float  # of the scale, where the curves do not go below it
     values: Callable[[RunResult], np.ndarray]
     tolerance: Callable[[Tolerance], float]  # 0: there is none
     unit: str  # of the tolerance
 
 
 STRIPS = (
-    Strip("distance to goal", LENGTHS, 2e-3, lambda r: r.run.position_error[0], lambda t: t.position, "m"),
+    Strip("distance", LENGTHS, 2e-3, lambda r: r.run.position_error[0], lambda t: t.position, "m"),
     Strip(
         "heading error", ANGLES, 2e-2, lambda r: _deg(r.run.heading_error[0]), lambda t: t.heading_deg, "°"
     ),
@@ -125,10 +129,17 @@ def _reached(axes: Axes, runs: Sequence[View]) -> None:
     axes.set_ylabel("targets reached")
 
 
-def _top(axes: Axes, strip: Strip, limits: list[float]) -> float:
+def _bottom(runs: Sequence[View], strip: Strip) -> float:
+    """Below what the curves show, so that a good run is not cut off at the end of the scale."""
+    curves = [strip.values(result) for _, result in evaluated(runs)]
+    lows = [float(np.quantile(seen, CUT)) for curve in curves if (seen := curve[curve > 0.0]).size]
+    return max(DEEPEST * strip.lowest, min([strip.lowest, *(0.8 * low for low in lows)]))
+
+
+def _top(axes: Axes, strip: Strip, bottom: float, limits: list[float]) -> float:
     """Above everything that is drawn, and above a mark that is near, so that the scale can be read off."""
     drawn = max([float(axes.dataLim.y1), *limits])
-    if not strip.lowest < drawn < np.inf:  # nothing is drawn, or nothing that would be seen
+    if not bottom < drawn < np.inf:  # nothing is drawn, or nothing that would be seen
         return max(strip.marks)
     return 1.1 * min((mark for mark in strip.marks if drawn <= mark < 2.0 * drawn), default=drawn)
 
@@ -140,7 +151,8 @@ def _errors(axes: Axes, runs: Sequence[View], strip: Strip) -> None:
     _span(axes, runs)
     log_scale(axes.yaxis, strip.marks)
     limits = [strip.tolerance(result.task.tolerance) for _, result in evaluated(runs)[:1]]
-    axes.set_ylim(strip.lowest, _top(axes, strip, limits))
+    bottom = _bottom(runs, strip)
+    axes.set_ylim(bottom, _top(axes, strip, bottom, limits))
     axes.set_ylabel(strip.label)
     for _, result in evaluated(runs):
         if not result.counts:

@@ -27,8 +27,13 @@ FLATTEST, TALLEST = 0.5, 1.3  # height of a view over its width
 class Side:
     """One way to look at space."""
 
-    title: str
+    name: str
     axes: tuple[int, int]  # which of x, y, z go to the right and up
+
+    @property
+    def title(self) -> str:
+        """Its name, with the letters of the two axes."""
+        return f"{self.name} ({', '.join(self.labels)})"
 
     @property
     def labels(self) -> tuple[str, str]:
