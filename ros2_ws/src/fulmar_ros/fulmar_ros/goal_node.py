@@ -14,6 +14,7 @@ from nav_msgs.msg import Odometry
 from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
 from rclpy.node import Node
+from rclpy.publisher import Publisher
 
 from fulmar_bags.message_reader import measurement_of, stamp_ns
 from fulmar_core.errors import DONE, FAILED
@@ -27,13 +28,13 @@ from fulmar_core.safety.input_gate import InputGate, Measurement
 from fulmar_core.spatial import SpatialState
 from fulmar_core.state import State
 from fulmar_core.tasks import load_task
-from fulmar_core.topics import GOAL_WIRES, ODOMETRY, STATUS
+from fulmar_core.topics import GOAL_PATH, GOAL_WIRES, ODOMETRY, STATUS
 from fulmar_ros.goal_messages import TYPES, GoalMessage, goal_message
 from fulmar_ros.graph import running_robots_text
 from fulmar_ros.health import Health
 from fulmar_ros.operator_subscription import LateSubscribers
 from fulmar_ros.parameters import name_of, own_frames, read_parameters
-from fulmar_ros.qos import publisher_qos, subscriber_qos
+from fulmar_ros.qos import EVERYTHING, publish_patiently, publisher_qos, subscriber_qos
 from fulmar_ros.runtime import RequestExit, run_node
 
 PATIENCE_S = 3.0  # for the first odometry and the first subscriber, before a warning
@@ -110,7 +111,13 @@ class GoalNode(Node):
         self._subscribers_checked = self._settings.stay  # nodes that start together subscribe each other
         self._began = self._usable_at = time.monotonic()
         wire = GOAL_WIRES[self._sequence.topic]
-        self._publisher = self.create_publisher(TYPES[wire.name], wire.name, publisher_qos(wire))
+        # In lock step a goal comes with each odometry, and a recorder that lags behind needs them all. A path is the
+        # same in each step and may be long: its newest message is enough.
+        streamed = self._settings.lockstep and wire is not GOAL_PATH
+        self._publish = publish_patiently if streamed else Publisher.publish
+        self._publisher = self.create_publisher(
+            TYPES[wire.name], wire.name, publisher_qos(wire, depth=EVERYTHING if streamed else None)
+        )
         self._message: GoalMessage | None = None  # the newest
         if not self._settings.lockstep:  # there a goal comes with each odometry
             LateSubscribers(self, self._publisher, lambda: [self._message] if self._message else [])
@@ -169,7 +176,7 @@ class GoalNode(Node):
         self._message = goal_message(
             goal, self._sequence.topic, stamp_ns, self._frames, form=self._sequence.form
         )
-        self._publisher.publish(self._message)
+        self._publish(self._publisher, self._message)
         if self._single and self._sent is None:
             self.get_logger().info(f"published {self._title} on {self._publisher.topic_name}")
         self._sent, self._sent_at_ns = goal, self._time_ns
