@@ -108,7 +108,9 @@ class GoalNode(Node):
         self._said, self._said_at = "", 0.0
         self._problem, self._stale, self._over = "", False, False
         self._has_odometry, self._alone_checked = False, False
-        self._heard = self._settings.stay  # whether anybody takes the goals; until then the first one waits
+        self._has_subscriber = (
+            self._settings.stay
+        )  # whether anybody takes the goals; until then the first one waits
         self._subscribers_checked = self._settings.stay  # nodes that start together subscribe each other
         self._began = self._usable_at = time.monotonic()
         wire = GOAL_WIRES[self._sequence.topic]
@@ -144,10 +146,10 @@ class GoalNode(Node):
                     self._publish_goal(self._sent, measurement.stamp_ns)  # others wait for this stamp
                 return
             self._has_odometry = True
-            if not (self._heard or self._subscribed(self._publisher.topic_name)):
+            if not (self._has_subscriber or self._subscribed(self._publisher.topic_name)):
                 self._usable_at, self._problem, self._stale = time.monotonic(), "", False
                 return
-            self._heard = True
+            self._has_subscriber = True
             was_done = self._sequence.done
             self._resume(measurement)
             goal = self._sequence.step(self._sequence.form.from_rigid(measurement.state), self._time_ns / 1e9)
