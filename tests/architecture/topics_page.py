@@ -30,7 +30,9 @@ Every topic is recorded in the bag of a run, except {UNRECORDED}.
 | best_effort | best effort, volatile, keeps the last 50; in lock step with estimators as stream |
 
 Subscribers of Fulmar ask for best effort where only the newest message counts. They receive goals, obstacles and the
-e-stop from volatile publishers, which is the default of rclpy and rclcpp, and from latched ones.
+e-stop from volatile publishers, which is the default of rclpy and rclcpp, and from latched ones. In lock step
+`fulmar run --goals` publishes a goal with each odometry; but for `goal_path`, its publisher keeps, beyond what is
+stated, all that a reliable subscriber has not received, and up to 5000 earlier ones: the stamps tell them apart.
 
 Services: `{ESTOP_TRIGGER}`, `{ESTOP_RESET}` and `{GIVE_BACK}` (std_srvs/Trigger); `air_bearing/enable`
 (std_srvs/SetBool).

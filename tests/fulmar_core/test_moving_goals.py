@@ -169,6 +169,19 @@ def test_a_goal_that_moves_a_little_goes_on_and_one_that_moves_more_begins_anew(
     assert bench.guard.mission.goals_received == 3
 
 
+def test_a_controller_that_comes_late_to_a_stream_takes_its_past_as_one_goal_and_waits_for_that_of_its_state():
+    bench = Bench(goals_streamed=True)
+    mission = bench.guard.mission
+    for number in range(300):
+        assert mission.lacks_something_of(S + 299 * STEP_NS)
+        bench.guard.take_goal(
+            SpatialState.target_at((0.01 * number, 0.0, 0.0))[None], S + number * STEP_NS, 0
+        )
+    assert not mission.lacks_something_of(S + 299 * STEP_NS)
+    assert mission.goals_received == 1
+    assert bench.guard.loop.goal.current[0, 0] == pytest.approx(2.99)
+
+
 @pytest.mark.parametrize(("after_s", "moved"), [(0.2, True), (2.0, False)])
 def test_in_the_plane_a_goal_near_the_one_before_begins_anew_unless_it_is_streamed(after_s, moved):
     bench = PlanarBench()

@@ -19,6 +19,7 @@ from nav_msgs.msg import Path
 from fulmar_bags.message_reader import stamp_ns
 from fulmar_core.errors import ConfigError
 from fulmar_core.goal_files import single_goal
+from fulmar_core.robot import load_robot
 from fulmar_core.topics import GOAL_WIRES
 from fulmar_ros.goal_messages import TYPES
 from fulmar_ros.goal_node import GoalNode
@@ -103,7 +104,8 @@ def single_goal_node(*place: float, **parameters: object) -> Iterator[tuple[Goal
     for name, value in parameters.items():
         arguments += ["-p", f"{name}:={value}"]
     codes: list[int] = []
-    node = GoalNode(codes.append, goals=single_goal(place), cli_args=arguments)
+    form = load_robot(str(parameters.get("robot", ROBOT))).state_type
+    node = GoalNode(codes.append, goals=single_goal(place, form), cli_args=arguments)
     with spinning(node, lambda error: pytest.fail(repr(error))):
         yield node, codes
         node.stop()
@@ -316,7 +318,54 @@ def test_a_pose_for_a_controller_that_takes_other_goals_ends_with_one_line(
         until(lambda: codes == [1])
     neighbour.node.destroy_subscription(listener)
     (line,) = [line for line in capfd.readouterr().err.splitlines() if "ERROR" in line]
-    assert "no controller subscribes" in line and f"the one that runs takes {topic}" in line
+    assert "no controller subscribes" in line and f"The one that runs takes {topic}: give a file of" in line
+
+
+@pytest.mark.parametrize(
+    ("neighbour", "place", "taken", "advice"),
+    [
+        ("spacecraft_16", (0.0, 0.0, 0.0), "goal_pose", "--pose x,y,z,roll,pitch,yaw or a file of poses"),
+        ("spacecraft_16", (0.0,) * 6, "goal_point", "--pose x,y,z or a file of positions"),
+        ("floating_platform", (0.0, 0.0), "goal_pose", "--pose x,y,deg or a file of poses"),
+        ("floating_platform", (0.0, 0.0, 0.0), "goal_point", "--pose x,y or a file of positions"),
+    ],
+    indirect=["neighbour"],
+)
+def test_a_place_where_the_robot_is_counts_as_neither_published_nor_reached_while_nobody_takes_it(
+    neighbour: Neighbour, place: tuple[float, ...], taken: str, advice: str, capfd
+) -> None:
+    listener = neighbour.node.create_subscription(TYPES[taken], taken, lambda _message: None, 10)
+    parameters = {"robot": neighbour.robot.name, "give_up_s": 1.0, **PATIENT}
+    with single_goal_node(*place, **parameters) as (_, codes), streaming(neighbour):
+        until(lambda: bool(codes))
+    neighbour.node.destroy_subscription(listener)
+    said = capfd.readouterr().err
+    assert codes == [1]
+    (line,) = [line for line in said.splitlines() if "ERROR" in line]
+    assert f"(after 1 s). The one that runs takes {taken}: give {advice}." in line
+    assert "published" not in said and "reached" not in said
+
+
+def test_goals_wait_for_a_controller_that_starts_after_them(
+    tmp_path, neighbour: Neighbour, ros_domain: RosDomain
+) -> None:
+    """And their time begins then; a recorder is nobody that takes them."""
+    recorder = rclpy.create_node("recorder", namespace=NAMESPACE)
+    recorded: list[TwistStamped] = []
+    recorder.create_subscription(
+        TwistStamped, "goal_velocity", recorded.append, subscriber_qos(GOAL_WIRES["goal_velocity"], depth=50)
+    )
+    with (
+        spinning(recorder, lambda error: pytest.fail(repr(error))),
+        streaming(neighbour),
+        goal_node(tmp_path, VELOCITIES, **PATIENT) as (_, codes),
+    ):
+        time.sleep(1.5)  # longer than the velocities last
+        assert (recorded, codes) == ([], [])
+        ears = Ears(neighbour)
+        until(lambda: codes == [0] and len(ears.moves) == 3)
+        first, second, _ = (stamp_ns(message.header.stamp) for message in ears.velocities)
+        assert 400_000_000 <= second - first < 600_000_000
 
 
 @pytest.mark.slow

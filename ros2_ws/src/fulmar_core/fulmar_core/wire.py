@@ -14,8 +14,8 @@ class Wire:
     """One topic.
 
     `delivery` is how publishers offer it: "stream" is reliable with the last 50 kept (in lock step with all that a
-    reader has not got), "latched" is reliable and transient-local with the last `latest`, "best_effort" keeps the last
-    50.
+    reader has not got), "latched" is reliable and transient-local with the last `latest` (goals that come with each
+    step of lock step, as a stream), "best_effort" keeps the last 50.
     """
 
     name: str

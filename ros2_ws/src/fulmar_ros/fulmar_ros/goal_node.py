@@ -14,6 +14,7 @@ from nav_msgs.msg import Odometry
 from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
 from rclpy.node import Node
+from rclpy.publisher import Publisher
 
 from fulmar_bags.message_reader import measurement_of, stamp_ns
 from fulmar_core.errors import DONE, FAILED
@@ -27,13 +28,13 @@ from fulmar_core.safety.input_gate import InputGate, Measurement
 from fulmar_core.spatial import SpatialState
 from fulmar_core.state import State
 from fulmar_core.tasks import load_task
-from fulmar_core.topics import GOAL_WIRES, ODOMETRY, STATUS
+from fulmar_core.topics import GOAL_PATH, GOAL_WIRES, ODOMETRY, STATUS
 from fulmar_ros.goal_messages import TYPES, GoalMessage, goal_message
-from fulmar_ros.graph import running_robots_text
+from fulmar_ros.graph import UNNAMED_NODE, running_robots_text
 from fulmar_ros.health import Health
 from fulmar_ros.operator_subscription import LateSubscribers
 from fulmar_ros.parameters import name_of, own_frames, read_parameters
-from fulmar_ros.qos import publisher_qos, subscriber_qos
+from fulmar_ros.qos import EVERYTHING, publish_patiently, publisher_qos, subscriber_qos
 from fulmar_ros.runtime import RequestExit, run_node
 
 PATIENCE_S = 3.0  # for the first odometry and the first subscriber, before a warning
@@ -106,11 +107,19 @@ class GoalNode(Node):
         self._progress = self._sequence.progress
         self._said, self._said_at = "", 0.0
         self._problem, self._stale, self._over = "", False, False
-        self._alone_checked = False
+        self._has_odometry, self._alone_checked = False, False
+        # Until somebody takes the goals the first one waits; nodes that start together do not ask.
+        self._has_subscriber = self._settings.stay
         self._subscribers_checked = self._settings.stay  # nodes that start together subscribe each other
         self._began = self._usable_at = time.monotonic()
         wire = GOAL_WIRES[self._sequence.topic]
-        self._publisher = self.create_publisher(TYPES[wire.name], wire.name, publisher_qos(wire))
+        # In lock step a goal comes with each odometry, and a recorder that lags behind needs them all. A path is the
+        # same in each step and may be long: its newest message is enough.
+        streamed = self._settings.lockstep and wire is not GOAL_PATH
+        self._publish = publish_patiently if streamed else Publisher.publish
+        self._publisher = self.create_publisher(
+            TYPES[wire.name], wire.name, publisher_qos(wire, depth=EVERYTHING if streamed else None)
+        )
         self._message: GoalMessage | None = None  # the newest
         if not self._settings.lockstep:  # there a goal comes with each odometry
             LateSubscribers(self, self._publisher, lambda: [self._message] if self._message else [])
@@ -135,6 +144,11 @@ class GoalNode(Node):
                 if self._settings.lockstep and self._sent is not None and not self._over:
                     self._publish_goal(self._sent, measurement.stamp_ns)  # others wait for this stamp
                 return
+            self._has_odometry = True
+            if not (self._has_subscriber or self._subscribed(self._publisher.topic_name)):
+                self._usable_at, self._problem, self._stale = time.monotonic(), "", False
+                return
+            self._has_subscriber = True
             was_done = self._sequence.done
             self._resume(measurement)
             goal = self._sequence.step(self._sequence.form.from_rigid(measurement.state), self._time_ns / 1e9)
@@ -169,7 +183,7 @@ class GoalNode(Node):
         self._message = goal_message(
             goal, self._sequence.topic, stamp_ns, self._frames, form=self._sequence.form
         )
-        self._publisher.publish(self._message)
+        self._publish(self._publisher, self._message)
         if self._single and self._sent is None:
             self.get_logger().info(f"published {self._title} on {self._publisher.topic_name}")
         self._sent, self._sent_at_ns = goal, self._time_ns
@@ -220,7 +234,7 @@ class GoalNode(Node):
         if not self._subscribers_checked and now - self._began > PATIENCE_S:
             self._subscribers_checked = True  # once
             if not self._settings.give_up_s and (alone := self._without_subscriber()):
-                self.get_logger().warning(alone)
+                self.get_logger().warning(f"{alone}. {self._what_is_taken()}".rstrip())
 
     def _give_up_if_alone(self) -> None:
         """End if the robot or its controller is not there after the time for it."""
@@ -228,17 +242,19 @@ class GoalNode(Node):
             if self._over or self._alone_checked or time.monotonic() - self._began < self._settings.give_up_s:
                 return
             self._alone_checked = True
-            missing = self._without_subscriber()
-            if self._newest is None:
+            missing, after = self._without_subscriber(), f"(after {self._settings.give_up_s:g} s)"
+            advice = self._what_is_taken()
+            if not self._has_odometry:
                 topic = self.resolve_topic_name(ODOMETRY.name)
                 missing = f"no usable odometry: {self._problem or f'nothing comes on {topic}'}"
+                advice = ""
             if not missing:
                 return
             self._over = True
-        self.get_logger().error(
-            f"{missing} (after {self._settings.give_up_s:g} s). Start the robot and its controller, or wait for them: "
-            f"fulmar goals --wait. {running_robots_text(self)}"
-        )
+        if not advice:
+            advice = "Start the robot and its controller, or wait for them: fulmar goals --wait. "
+            advice += running_robots_text(self)
+        self.get_logger().error(f"{missing} {after}. {advice}")
         self._request_exit(FAILED)
 
     def _pause(self) -> None:
@@ -265,13 +281,22 @@ class GoalNode(Node):
             return ""
         wanted = self._sequence.topic, self._sequence.form
         tasks = [name for name in config_names("tasks") if _taken_by(name) == wanted]
+        return f"no controller subscribes {topic}; one does with one of the tasks {', '.join(tasks)}"
+
+    def _what_is_taken(self) -> str:
+        """Which goals a running controller takes instead, and how to give them; empty where none runs."""
         taken = [name for name in GOAL_WIRES if self._subscribed(self.resolve_topic_name(name))]
-        instead = f"; the one that runs takes {' and '.join(taken)}" if taken else ""
-        return f"no controller subscribes {topic}; one does with one of the tasks {', '.join(tasks)}{instead}"
+        if not taken:
+            return ""
+        gives = " or ".join(_how_to_give(name, self._sequence.form) for name in taken)
+        return f"The one that runs takes {' and '.join(taken)}: give {gives}."
 
     def _subscribed(self, topic: str) -> bool:
         """Whether a node other than a recorder subscribes a topic."""
-        return any(info.node_name != "recorder" for info in self.get_subscriptions_info_by_topic(topic))
+        passive = {"recorder"}
+        if time.monotonic() - self._began < PATIENCE_S:
+            passive.add(UNNAMED_NODE)  # which may turn out to be one
+        return any(info.node_name not in passive for info in self.get_subscriptions_info_by_topic(topic))
 
     def stop(self) -> None:
         """Publish standstill after a velocity goal."""
@@ -286,6 +311,17 @@ def _taken_by(task: str) -> tuple[str, type[State]]:
     """Topic and form of a task's goals."""
     found = load_task(task)
     return found.goal_topic, found.state_type
+
+
+def _how_to_give(topic: str, form: type[State]) -> str:
+    """What to tell `fulmar goals` for a controller that takes a topic."""
+    numbers = ",".join(form.NUMBERS)
+    return {
+        "goal_pose": f"--pose {numbers} or a file of poses",
+        "goal_point": f"--pose {','.join(form.NUMBERS[: form.AXES])} or a file of positions",
+        "goal_path": "a file of positions or poses, and --as-path",
+        "goal_velocity": "a file of velocities or of a path",
+    }[topic]
 
 
 def main() -> None:

@@ -15,14 +15,17 @@ from fulmar_core.wire_check import Offer, wire_problems
 
 # Of an endpoint's GUID: they name the process, the others the endpoint in it (RTPS 2.5, 9.3.1)
 PARTICIPANT_BYTES = 12
-UNNAMED = "a node of unknown name"  # discovery reports endpoints some moments before the names of their nodes
+UNNAMED_NODE = (
+    "_NODE_NAME_UNKNOWN_"  # discovery reports endpoints some moments before the names of their nodes
+)
+UNNAMED = "a node of unknown name"
 ROBOT_NODES = {"plant", "controller"}
 LOOK_S = 2.0  # between two looks of a watch; each takes well under a millisecond a topic
 
 
 def full_name(info: TopicEndpointInfo) -> str:
     """Name of an endpoint's node, with its namespace."""
-    if info.node_name == "_NODE_NAME_UNKNOWN_":
+    if info.node_name == UNNAMED_NODE:
         return UNNAMED
     return f"{info.node_namespace.rstrip('/')}/{info.node_name}"
 

@@ -22,20 +22,25 @@ STREAM_DEPTH = 50  # a recorder that the machine holds up for as many steps stil
 EVERYTHING = 0  # as depth: whatever has not been taken yet; the middleware sets an end to it at 5000
 
 
-def publisher_qos(wire: Wire, *, lockstep: bool = False, lossless: bool = False) -> QoSProfile:
+def publisher_qos(
+    wire: Wire, *, lockstep: bool = False, lossless: bool = False, depth: int | None = None
+) -> QoSProfile:
     """How publishers of a wire offer it.
 
     Args:
         wire: The wire.
         lockstep: Overwrite nothing that a reliable reader has not got; see `publish_patiently`.
         lossless: Offer best-effort wires as streams: nodes between plant and controller count their messages.
+        depth: Messages that are kept, >= 1, or `EVERYTHING`; by default as the wire's delivery says. A latched wire
+            of which everything is kept holds the newest 5000 for readers to come.
     """
     is_stream = wire.delivery == "stream" or (lossless and wire.delivery == "best_effort")
     stream = EVERYTHING if lockstep and is_stream else STREAM_DEPTH
+    usual = wire.latest if wire.delivery == "latched" else stream
     return _profile(
         reliable=wire.delivery != "best_effort" or lossless,
         latched=wire.delivery == "latched",
-        depth=wire.latest if wire.delivery == "latched" else stream,
+        depth=usual if depth is None else depth,
     )
 
 
