@@ -166,8 +166,14 @@ def test_a_run_through_sixteen_emulated_valves_meets_its_goal_by_motion_capture_
         ("evaluate floating_platform go_to_pose_3d", "'floating_platform' moves in the plane"),
         ("train spacecraft_16 go_to_position", "robot 'spacecraft_16' moves in space"),
         ("up mujoco_lqr --robot spacecraft_16 --controller external", "task 'go_to_pose' is about motion in"),
-        ("goals --robot spacecraft_16 --pose 1,2", "x,y,z [m] or x,y,z,roll,pitch,yaw [m, deg]"),
-        ("goals --robot floating_platform --pose 1,2,3,4,5,6", "x,y [m] or x,y,deg [m, deg]"),
+        (
+            "goals --robot spacecraft_16 --pose 1,2",
+            "moves in space: 3 (x,y,z) or 6 (x,y,z,roll,pitch,yaw) are needed",
+        ),
+        (
+            "goals --robot floating_platform --pose 1,2,3,4,5,6",
+            "moves in the plane: 2 (x,y) or 3 (x,y,deg) are needed",
+        ),
         ("up mujoco_lqr --start 1,2,3,4,5,6", "--start = '1,2,3,4,5,6' has 6 numbers"),
     ],
 )
