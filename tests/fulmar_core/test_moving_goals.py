@@ -125,7 +125,7 @@ def test_motion_goes_by_the_time_that_has_passed():
     assert moved(3, 0.06, 3.0) == pytest.approx((0.1, 5.0))  # one step was missed
     assert moved(6, 0.12, 6.0) == pytest.approx((0.1, 5.0))
     assert moved(6, 0.14, 7.0) == pytest.approx((0.1, 5.0))  # no time passed: a step
-    assert moved(0, 0.16, 8.0, stamp_ns=0) == pytest.approx((0.1, 5.0))  # nobody measures time
+    assert moved(0, 0.16, 8.0, stamp_ns=0) == pytest.approx((0.1, 5.0))  # without a clock
     assert moved(7, 0.18, 9.0) == pytest.approx((0.1, 5.0))
 
 

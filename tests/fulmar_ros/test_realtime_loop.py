@@ -27,7 +27,7 @@ def test_the_guard_receives_the_newest_measured_state_for_safe_controllers_that_
         return ROBOT.actuators.safe_command
 
     def ignore(*_arguments):
-        """Nobody subscribes."""
+        """There is no subscriber."""
 
     backend = SimpleNamespace(robot=ROBOT, step=lambda _command: samples[len(received)])
     wires = SimpleNamespace(lock=nullcontext(), publish_sample=ignore, publish_applied=ignore)

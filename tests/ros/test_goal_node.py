@@ -349,7 +349,7 @@ def test_a_place_where_the_robot_is_counts_as_neither_published_nor_reached_whil
 def test_goals_wait_for_a_controller_that_starts_after_them(
     tmp_path, neighbour: Neighbour, ros_domain: RosDomain
 ) -> None:
-    """And their time begins then; a recorder is nobody that takes them."""
+    """Their time begins then; a recorder does not count as a subscriber."""
     recorder = rclpy.create_node("recorder", namespace=NAMESPACE)
     recorded: list[TwistStamped] = []
     recorder.create_subscription(

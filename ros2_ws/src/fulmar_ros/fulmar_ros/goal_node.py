@@ -108,7 +108,7 @@ class GoalNode(Node):
         self._said, self._said_at = "", 0.0
         self._problem, self._stale, self._over = "", False, False
         self._has_odometry, self._alone_checked = False, False
-        # Until somebody takes the goals the first one waits; nodes that start together do not ask.
+        # The first goal waits for a subscriber; nodes that start together do not look for one.
         self._has_subscriber = self._settings.stay
         self._subscribers_checked = self._settings.stay  # nodes that start together subscribe each other
         self._began = self._usable_at = time.monotonic()

@@ -20,7 +20,7 @@ class SentStates:
 
     def note(self, stamp_ns: int, now_ns: int) -> None:
         """Note that a state of a stamp [ns] was sent now, by a steady clock [ns]; of repetitions the first counts."""
-        if not self._newest_ns or stamp_ns < self._newest_ns:  # the first, or somebody set the clock back
+        if not self._newest_ns or stamp_ns < self._newest_ns:  # the first, or the clock was set back
             self._waiting.clear()
             self._young.clear()
             self._outdated_ns = stamp_ns - 1

@@ -36,7 +36,7 @@ class TargetMotion:
 
         Args:
             target: Poses, shape (n, 7).
-            stamp_ns: When the step's state was measured; not positive where nobody measures time [ns].
+            stamp_ns: When the step's state was measured; 0 or less without a clock [ns].
             dt: Time of one step, which counts without two stamps in order: none, or the same one again [s].
 
         Returns:

@@ -11,15 +11,18 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Generic, TypeVar
 
 import numpy as np
 
 from fulmar_core.estimation.estimator import Estimate
+from fulmar_core.estimation.settings import PlanarMotionSettings, SpatialMotionSettings
 from fulmar_core.robot import Limits
 from fulmar_core.safety.input_gate import BACK_NS, FORWARD_NS
 from fulmar_core.sensors.imu import ImuSample
 from fulmar_core.sensors.reading import Reading
+
+S = TypeVar("S", bound=PlanarMotionSettings | SpatialMotionSettings)
 
 KEPT_NS = 1_000_000_000  # how far back an estimate can be corrected
 READING_LASTS_NS = 60_000_000  # how long after it an inertial reading still stands for what happens
@@ -51,7 +54,7 @@ class Filter(ABC):
 
     @abstractmethod
     def move_on(self, seconds: float, inertial: Any) -> None:
-        """Predict so far, by an inertial reading; None: nobody measured [s]."""
+        """Predict by a time step [s] from an inertial reading; None: there is none."""
 
     @abstractmethod
     def correct(self, kind: int, value: Any) -> None:
@@ -74,7 +77,7 @@ class Filter(ABC):
         """Largest standard deviation of the velocity's components [m/s]."""
 
 
-class HistoryEstimator(ABC):
+class HistoryEstimator(ABC, Generic[S]):
     """An `Estimator` that keeps a second of readings; each kind says what its filter takes of them.
 
     Attributes:
@@ -87,27 +90,24 @@ class HistoryEstimator(ABC):
 
     def __init__(
         self,
+        settings: S,
         limits: Limits,
         *,
-        gate: float,
-        bridge_s: float,
-        latency_s: float,
-        slack: float,
         gyroscope_range: float = math.inf,
     ) -> None:
         """Begin without an estimate.
 
         Args:
+            settings: What to believe of the sensors.
             limits: What the robot can possibly do.
-            gate: Squared Mahalanobis distance beyond which a reading is an outlier [-].
-            bridge_s: Longest time without a believed pose [s].
-            latency_s: From capture of a pose to its stamp [s].
-            slack: Distance between two poses that their noise explains [m].
             gyroscope_range: Largest turn rate about an axis that inertial readings have [rad/s].
         """
         self._gyroscope_range = gyroscope_range
-        self._limits, self._gate, self._bridge_s, self._slack = limits, gate, bridge_s, slack
-        self._latency_ns = round(1e9 * latency_s)
+        self._settings: S = settings
+        self._limits = limits
+        self._gate, self._bridge_s = settings.gate, settings.bridge_s
+        self._slack = 10.0 * settings.position_std  # distance between two poses that their noise explains [m]
+        self._latency_ns = round(1e9 * settings.latency_s)  # from capture of a pose to its stamp
         self._kinds: Mapping[str, tuple[int, Callable[[Reading], Any]]] = {
             "mocap": (POSE, self._pose),
             "imu": (IMU, self._inertial),
@@ -143,7 +143,7 @@ class HistoryEstimator(ABC):
     def _turn_rate(self, reading: Reading) -> float:
         """Turn rate of an inertial reading that the robot's limits bound [rad/s]."""
 
-    def _believed(self, reading: Reading) -> None:  # noqa: B027 - most keep nothing beside the filter
+    def _believed(self, reading: Reading) -> None:
         """Note a pose that is believed."""
 
     def reset(self) -> None:

@@ -16,7 +16,6 @@ from fulmar_core.dynamics.hydrodynamics import GRAVITY
 from fulmar_core.estimation.history import HistoryEstimator
 from fulmar_core.estimation.motion_filter import MOTION, POSE, RATE, VX, VY, YAW, Inertial, MotionFilter, X, Y
 from fulmar_core.estimation.settings import PlanarMotionSettings
-from fulmar_core.robot import Limits
 from fulmar_core.rotation import from_yaw, multiply, rotate, yaw_of
 from fulmar_core.sensors.reading import Reading
 from fulmar_core.state import RigidBodyState
@@ -24,30 +23,10 @@ from fulmar_core.state import RigidBodyState
 PLANAR = np.array((0, 1, 5, 6, 7, 11))  # rows of a covariance that a motion in the plane has
 
 
-class PlanarMotionEstimator(HistoryEstimator):
+class PlanarMotionEstimator(HistoryEstimator[PlanarMotionSettings]):
     """Extended Kalman filter with a history; see `Estimator`."""
 
     _filter: MotionFilter | None
-
-    def __init__(
-        self, settings: PlanarMotionSettings, limits: Limits, *, gyroscope_range: float = math.inf
-    ) -> None:
-        """Begin without an estimate.
-
-        Args:
-            settings: What to believe of the sensors.
-            limits: What the robot can possibly do.
-            gyroscope_range: Largest turn rate about an axis that inertial readings have [rad/s].
-        """
-        self._settings = settings
-        super().__init__(
-            limits,
-            gate=settings.gate,
-            bridge_s=settings.bridge_s,
-            latency_s=settings.latency_s,
-            slack=10.0 * settings.position_std,
-            gyroscope_range=gyroscope_range,
-        )
 
     def _forget(self) -> None:
         super()._forget()

@@ -9,44 +9,21 @@ body [rad/s].
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from fulmar_core.estimation.history import HistoryEstimator
 from fulmar_core.estimation.settings import SpatialMotionSettings
 from fulmar_core.estimation.spatial_filter import PLACE, RATE_BIAS, TURN, VELOCITY, SpatialFilter
-from fulmar_core.robot import Limits
 from fulmar_core.rotation import rotate
 from fulmar_core.sensors.imu import ImuSample
 from fulmar_core.sensors.reading import Reading
 from fulmar_core.state import RigidBodyState
 
 
-class SpatialMotionEstimator(HistoryEstimator):
+class SpatialMotionEstimator(HistoryEstimator[SpatialMotionSettings]):
     """Multiplicative extended Kalman filter with a history; see `Estimator`."""
 
     _filter: SpatialFilter | None
-
-    def __init__(
-        self, settings: SpatialMotionSettings, limits: Limits, *, gyroscope_range: float = math.inf
-    ) -> None:
-        """Begin without an estimate.
-
-        Args:
-            settings: What to believe of the sensors.
-            limits: What the robot can possibly do.
-            gyroscope_range: Largest turn rate about an axis that inertial readings have [rad/s].
-        """
-        self._settings = settings
-        super().__init__(
-            limits,
-            gate=settings.gate,
-            bridge_s=settings.bridge_s,
-            latency_s=settings.latency_s,
-            slack=10.0 * settings.position_std,
-            gyroscope_range=gyroscope_range,
-        )
 
     def _pose(self, reading: Reading) -> np.ndarray:
         return np.array(reading.value, dtype=float)
