@@ -16,13 +16,13 @@ from typing import Any, ClassVar, Generic, TypeVar
 import numpy as np
 
 from fulmar_core.estimation.estimator import Estimate
-from fulmar_core.estimation.settings import PlanarMotionSettings, SpatialMotionSettings
+from fulmar_core.estimation.settings import MotionSettings
 from fulmar_core.robot import Limits
 from fulmar_core.safety.input_gate import BACK_NS, FORWARD_NS
 from fulmar_core.sensors.imu import ImuSample
 from fulmar_core.sensors.reading import Reading
 
-S = TypeVar("S", bound=PlanarMotionSettings | SpatialMotionSettings)
+S = TypeVar("S", bound=MotionSettings)
 
 KEPT_NS = 1_000_000_000  # how far back an estimate can be corrected
 READING_LASTS_NS = 60_000_000  # how long after it an inertial reading still stands for what happens

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,31 +24,31 @@ class EstimatorSettings:
 
 
 @dataclass(frozen=True, kw_only=True)
-class PlanarMotionSettings(EstimatorSettings):
-    """Settings of `PlanarMotionEstimator`.
+class MotionSettings(EstimatorSettings):
+    """What estimators of motion have in common.
 
     Densities are those of white noise: over a time t they spread what they drive by density · √t.
     """
 
-    kind: str = "planar_motion"
     position_std: float  # of a pose, each axis [m]
-    heading_std: float  # of a pose [rad]
-    star_tracker_std: float = 0.0005  # heading of an attitude whose reading states no covariance [rad]
+    # About each axis, of an attitude whose reading states no covariance; in the plane of its heading [rad].
+    star_tracker_std: float = 0.0005
     gyroscope_std: float  # of a reading [rad/s]
     acceleration_noise: float  # of the inertial unit, with what its mounting adds [m/s²/√Hz]
     manoeuvre: float  # acceleration of manoeuvres, without an inertial unit [m/s²/√Hz]
-    spin: float  # how fast the turn rate may change [rad/s²/√Hz]
+    spin: float  # how fast the turn rate may change; in space only without an inertial unit [rad/s²/√Hz]
     accelerometer_drift: float  # of its bias [m/s²/√s]
     gyroscope_drift: float  # of its bias [rad/s/√s]
-    gate: float  # squared Mahalanobis distance of a pose beyond which it is an outlier; 3 degrees of freedom [-]
+    # Squared Mahalanobis distance of a pose beyond which it is an outlier; of 3 degrees of freedom, in space 6 [-].
+    gate: float
+
+    POSITIVE: ClassVar[tuple[str, ...]] = (
+        "position_std", "star_tracker_std", "gyroscope_std", "acceleration_noise", "manoeuvre", "spin", "gate",
+    )  # fmt: skip
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        positive = (
-            "position_std", "heading_std", "star_tracker_std", "gyroscope_std", "acceleration_noise", "manoeuvre",
-            "spin", "gate",
-        )  # fmt: skip
-        for name in positive:
+        for name in self.POSITIVE:
             if not getattr(self, name) > 0.0:
                 raise ValueError(f"'{name}' = {getattr(self, name):g} must be greater than 0.")
         if min(self.accelerometer_drift, self.gyroscope_drift) < 0.0:
@@ -55,32 +56,21 @@ class PlanarMotionSettings(EstimatorSettings):
 
 
 @dataclass(frozen=True, kw_only=True)
-class SpatialMotionSettings(EstimatorSettings):
-    """Settings of `SpatialMotionEstimator`; densities as of `PlanarMotionSettings`."""
+class PlanarMotionSettings(MotionSettings):
+    """Settings of `PlanarMotionEstimator`."""
+
+    kind: str = "planar_motion"
+    heading_std: float  # of a pose [rad]
+
+    POSITIVE = (*MotionSettings.POSITIVE, "heading_std")
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpatialMotionSettings(MotionSettings):
+    """Settings of `SpatialMotionEstimator`."""
 
     kind: str = "spatial_motion"
-    position_std: float  # of a pose, each axis [m]
     attitude_std: float  # of a pose, about each axis [rad]
-    star_tracker_std: float = (
-        0.0005  # about each axis, of an attitude whose reading states no covariance [rad]
-    )
-    gyroscope_std: float  # of a reading [rad/s]
-    gyroscope_noise: float  # density of the same [rad/s/√Hz]
-    acceleration_noise: float  # of the inertial unit, with what its mounting adds [m/s²/√Hz]
-    manoeuvre: float  # acceleration of manoeuvres, without an inertial unit [m/s²/√Hz]
-    spin: float  # how fast the turn rate may change, where there is no inertial unit [rad/s²/√Hz]
-    accelerometer_drift: float  # of its bias [m/s²/√s]
-    gyroscope_drift: float  # of its bias [rad/s/√s]
-    gate: float  # squared Mahalanobis distance of a pose beyond which it is an outlier; 6 degrees of freedom [-]
+    gyroscope_noise: float  # density of a gyroscope's reading [rad/s/√Hz]
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        positive = (
-            "position_std", "attitude_std", "star_tracker_std", "gyroscope_std", "gyroscope_noise",
-            "acceleration_noise", "manoeuvre", "spin", "gate",
-        )  # fmt: skip
-        for name in positive:
-            if not getattr(self, name) > 0.0:
-                raise ValueError(f"'{name}' = {getattr(self, name):g} must be greater than 0.")
-        if min(self.accelerometer_drift, self.gyroscope_drift) < 0.0:
-            raise ValueError("accelerometer_drift and gyroscope_drift must not be negative.")
+    POSITIVE = (*MotionSettings.POSITIVE, "attitude_std", "gyroscope_noise")
