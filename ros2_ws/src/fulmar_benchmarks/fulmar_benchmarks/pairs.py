@@ -94,11 +94,9 @@ def with_law(robot: str, task: str, name: str) -> Pair:
     return Pair(robot, task, "classical", name, law=law, sha256=str(found["sha256"]))
 
 
-def units_of(
-    pair: Pair, ways: dict[str, int], *, seed: int, scenario: str, folder: Path, worlds: int
-) -> list[Unit]:
-    """The work on one pair."""
-    plan = RunPlan(
+def plan_of(pair: Pair, *, scenario: str, seed: int, duration_s: float | None = None) -> RunPlan:
+    """One episode of a pair in MuJoCo, in lock step; its length [s] is the task's own by default."""
+    return RunPlan(
         robot=pair.robot,
         task=pair.task,
         controller=pair.controller,
@@ -107,9 +105,16 @@ def units_of(
         policy=pair.policy,
         scenario=scenario,
         seed=seed,
-        duration_s=load_task(pair.task).episode_s,
+        duration_s=duration_s or load_task(pair.task).episode_s,
         lockstep=True,
     )
+
+
+def units_of(
+    pair: Pair, ways: dict[str, int], *, seed: int, scenario: str, folder: Path, worlds: int
+) -> list[Unit]:
+    """The work on one pair."""
+    plan = plan_of(pair, scenario=scenario, seed=seed)
     return [
         Unit(Trial(plan, way, episodes, worlds), hash_of(pair.sha256, code_hash(way)), folder)
         for way, episodes in ways.items()

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, cast
 
-from fulmar_benchmarks.pairs import Pair, code_hash, hash_of, with_law, with_policy
+from fulmar_benchmarks.pairs import Pair, code_hash, hash_of, plan_of, with_law, with_policy
 from fulmar_benchmarks.rans3d.bound import bounds_of
 from fulmar_benchmarks.rans3d.document import Key, document_of
 from fulmar_benchmarks.rans3d.integrator import measure_integrator
@@ -30,7 +30,6 @@ from fulmar_benchmarks.rans3d.unit import SpaceTrial, SpaceUnit
 from fulmar_benchmarks.results import PairResult
 from fulmar_benchmarks.unit import Unit
 from fulmar_benchmarks.workers import Outcome, evaluate_units
-from fulmar_bringup.run_plan import RunPlan
 from fulmar_core.counts import check_episodes
 from fulmar_core.episode import episode_steps
 from fulmar_core.robot import load_robot
@@ -156,18 +155,7 @@ def _pair(request: Request, robot: str, task: str, controller: str) -> Pair:
 
 
 def _unit(request: Request, pair: Pair, scenario: str, code: str) -> SpaceUnit:
-    farthest, seconds = EPISODES.get(pair.robot, (0.0, 0.0))
-    plan = RunPlan(
-        robot=pair.robot,
-        task=pair.task,
-        controller=pair.controller,
-        backend="mujoco",
-        control_hz=load_robot(pair.robot).timing.control_hz,
-        policy=pair.policy,
-        scenario=scenario,
-        seed=request.seed,
-        duration_s=seconds or load_task(pair.task).episode_s,
-        lockstep=True,
-    )
+    farthest, seconds = EPISODES.get(pair.robot, (0.0, None))
+    plan = plan_of(pair, scenario=scenario, seed=request.seed, duration_s=seconds)
     trial = SpaceTrial(plan, WAY, request.episodes, request.episodes, farthest_m=farthest)
     return SpaceUnit(trial, hash_of(pair.sha256, code, f"{farthest:g}"), request.folder / "outcomes")
