@@ -13,6 +13,7 @@ from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu
 
+from fulmar_core.errors import ConfigError
 from fulmar_core.topics import IMU, MOCAP, ODOMETRY
 from fulmar_ros.convert import PoseWriter, stamp_of
 from fulmar_ros.estimator_node import EstimatorNode
@@ -72,6 +73,15 @@ def sources(neighbour: Neighbour, monkeypatch: pytest.MonkeyPatch) -> Iterator[S
     with spinning(node, lambda error: pytest.fail(repr(error))):
         yield Sources(neighbour)
         node.stop()
+
+
+def test_a_node_that_is_started_by_hand_refuses_an_estimator_of_the_other_space(
+    neighbour: Neighbour, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["estimator_node"])
+    given = ["--ros-args", "-p", "robot:=spacecraft_16", "-p", "estimator:=mocap_imu"]
+    with pytest.raises(ConfigError, match="Use 'mocap_imu_3d' of configs/estimators"):
+        EstimatorNode(lambda _code: None, cli_args=given)
 
 
 def test_odometry_has_frames_the_stamp_of_what_it_is_about_and_covariances(sources: Sources) -> None:

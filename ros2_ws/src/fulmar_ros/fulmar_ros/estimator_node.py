@@ -19,7 +19,7 @@ from rclpy.publisher import Publisher
 
 from fulmar_bags.message_reader import stamp_ns
 from fulmar_core.estimation.estimator import Estimate
-from fulmar_core.estimation.kinds import estimator_kind, load_estimator
+from fulmar_core.estimation.kinds import estimator_kind, load_estimator, make_estimator
 from fulmar_core.process import CONTROL_PRIORITY, take_priority_with_helpers
 from fulmar_core.robot import load_robot
 from fulmar_core.sensors.reading import Reading
@@ -63,9 +63,8 @@ class EstimatorNode(Node):
         super().__init__("estimator", cli_args=cli_args)
         settings = read_parameters(self, EstimatorNodeSettings)
         robot, kind = load_robot(settings.robot), estimator_kind(settings.estimator)
-        believed = load_estimator(settings.estimator)
-        self._estimator = kind.make(believed, robot)
-        self._bridge_s = believed.bridge_s
+        self._estimator = make_estimator(settings.estimator, robot)
+        self._bridge_s = load_estimator(settings.estimator).bridge_s
         self._frames = own_frames(self, robot)
         self._published_ns = -1
         self._published, self._refused = 0, 0
