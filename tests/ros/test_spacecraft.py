@@ -187,7 +187,7 @@ def test_what_belongs_to_the_other_space_is_one_line_before_anything_starts(
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("controller", ["lqr", "pd"])
+@pytest.mark.parametrize("controller", ["lqr", pytest.param("pd", marks=pytest.mark.slow)])
 def test_a_law_follows_a_target_that_moves_in_lock_step(
     controller: str, ros_domain: RosDomain, tmp_path: Path
 ) -> None:

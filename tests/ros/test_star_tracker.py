@@ -59,6 +59,7 @@ def run(env: dict[str, str], cwd: Path, seed: int, bag: str) -> Bag:
     return open_bag(cwd / bag)
 
 
+@pytest.mark.slow
 def test_its_attitude_is_recorded_at_its_rate_within_its_noise_and_repeats_with_the_seed(
     env: dict[str, str], tmp_path: Path
 ) -> None:
