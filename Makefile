@@ -15,6 +15,8 @@ PEERS := .venv-peers
 RUN_LOCK := requirements.lock
 DEV_LOCK := requirements-dev.lock
 PEERS_LOCK := requirements-peers.lock
+# Lies beside what it builds, so that the wheel has it too.
+MESSAGES_LOCK := ros2_ws/src/fulmar_bringup/fulmar_bringup/tf2_msgs/requirements.lock
 # Of .venv after an install on x86-64 [MiB], measured by `du -s --block-size=1M .venv`; the last one of .venv-peers.
 RUN_SIZE := 884
 DEV_SIZE := 7053
@@ -29,6 +31,7 @@ unexport PYTHONDONTWRITEBYTECODE
 key = $(firstword $(shell cat $(1) pyproject.toml | cksum))
 RUN_STAMP := $(VENV)/.run-$(call key,$(RUN_LOCK))
 DEV_STAMP := $(VENV)/.dev-$(call key,$(DEV_LOCK))
+TF_STAMP := $(VENV)/.tf-$(firstword $(shell cksum < $(MESSAGES_LOCK)))
 # Nothing of ours is installed beside the peers, so their lock alone counts.
 PEERS_STAMP := $(PEERS)/.peers-$(firstword $(shell cksum < $(PEERS_LOCK)))
 
@@ -66,8 +69,11 @@ help: ## Show this list
 .PHONY: setup
 setup: $(RUN_STAMP) ## Install what a robot or a simulation needs (no torch; 0.9 GiB)
 
+.PHONY: tf
+tf: $(RUN_STAMP) $(TF_STAMP) ## Build the message package of /tf, for RViz and Foxglove (needs a C++ compiler)
+
 .PHONY: dev
-dev: $(DEV_STAMP) ## Install everything, also for training and tests (6.9 GiB)
+dev: $(DEV_STAMP) $(TF_STAMP) ## Install everything, also for training and tests (6.9 GiB)
 
 .PHONY: peers
 peers: $(PEERS_STAMP) ## Install the outside programs that tests compare with, into .venv-peers (8.3 GiB)
@@ -93,6 +99,12 @@ $(DEV_STAMP): | $(VENV)/bin/python
 	@rm -f $(VENV)/.run-* $(VENV)/.dev-*
 	@touch $@ $(RUN_STAMP)
 	@echo "Ready: $(BIN)/fulmar, with training and the tools for tests"
+
+# Needs an environment with ROS, which the run stamp and the dev stamp make alike.
+$(TF_STAMP): | $(RUN_STAMP)
+	@$(BIN)/fulmar install-tf
+	@rm -f $(VENV)/.tf-*
+	@touch $@
 
 $(PEERS_STAMP): | $(PEERS)/bin/python
 	@$(PEERS)/bin/python -m pip install --disable-pip-version-check --no-input --quiet --require-hashes \
@@ -173,12 +185,13 @@ compile = $(BIN)/uv pip compile --universal --python-version 3.11 --fork-strateg
 	--generate-hashes --no-strip-extras --no-header --no-annotate --quiet
 
 .PHONY: lock
-lock: dev ## Make the locks anew (UPGRADE=1 takes the newest versions)
+lock: $(DEV_STAMP) ## Make the locks anew (UPGRADE=1 takes the newest versions)
 	$(compile) $(if $(UPGRADE),--upgrade) pyproject.toml --extra ros --extra sim --extra policy --extra bags --extra hardware \
 		--extra view --group build --output-file $(RUN_LOCK)
 	$(compile) $(if $(UPGRADE),--upgrade) pyproject.toml --all-extras --group dev --constraint $(RUN_LOCK) \
 		--output-file $(DEV_LOCK)
 	$(compile) $(if $(UPGRADE),--upgrade) --group peers --output-file $(PEERS_LOCK)
+	$(compile) $(if $(UPGRADE),--upgrade) --group messages --constraint $(RUN_LOCK) --output-file $(MESSAGES_LOCK)
 
 .PHONY: clean
 clean: ## Remove what was built and cached; .venv, .venv-peers and runs/ stay

@@ -15,10 +15,12 @@ import numpy as np
 
 from fulmar_bags.contents import Topic
 from fulmar_bags.message_types import ENCAPSULATION, LITTLE_ENDIAN, Walk, type_store
+from fulmar_core.topics import TRANSFORMS
 
 NS = 1_000_000_000
 TWIST = "geometry_msgs/msg/Twist"
 STAMP = slice(ENCAPSULATION, ENCAPSULATION + 8)  # of a message that begins with a header
+FIRST_STAMP = slice(STAMP.start + 4, STAMP.stop + 4)  # of the first transform, behind their number
 
 
 @dataclass(frozen=True)
@@ -78,11 +80,16 @@ def has_header(kind: str) -> bool:
 
 
 def stamps_ns(topic: Topic) -> np.ndarray | None:
-    """Stamps of all messages, shape (n,) int64 [ns]; None where the type has none, or a message is too short."""
-    if not has_header(topic.type) or any(len(data) < STAMP.stop for data in topic.data):
+    """Stamps of all messages, shape (n,) int64 [ns]; None where the type has none, or a message is too short.
+
+    A list of transforms has the stamp of its first.
+    """
+    transforms = topic.type == TRANSFORMS.type
+    place = FIRST_STAMP if transforms else STAMP
+    if not (transforms or has_header(topic.type)) or any(len(data) < place.stop for data in topic.data):
         return None
     little = all(data[1] & LITTLE_ENDIAN for data in topic.data)
-    raw = np.frombuffer(b"".join(data[STAMP] for data in topic.data), dtype="<u4" if little else ">u4")
+    raw = np.frombuffer(b"".join(data[place] for data in topic.data), dtype="<u4" if little else ">u4")
     pairs = raw.reshape(-1, 2).astype(np.int64)
     return pairs[:, 0] * NS + pairs[:, 1]
 

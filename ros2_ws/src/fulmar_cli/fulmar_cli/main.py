@@ -28,6 +28,7 @@ from fulmar_cli.commands.faults import faults
 from fulmar_cli.commands.goals import goals
 from fulmar_cli.commands.identify import identify
 from fulmar_cli.commands.import_policy import import_policy
+from fulmar_cli.commands.install_tf import install_tf
 from fulmar_cli.commands.list import list_names
 from fulmar_cli.commands.policies import policies
 from fulmar_cli.commands.report import report
@@ -97,6 +98,7 @@ app.command()(report)
 app.command()(identify)
 app.command()(demo)
 app.command()(doctor)
+app.command()(install_tf)
 
 
 def main() -> None:

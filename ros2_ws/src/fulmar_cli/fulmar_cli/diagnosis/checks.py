@@ -14,6 +14,7 @@ from fulmar_cli.diagnosis.installation import (
     check_extra,
     check_policies,
     check_python,
+    check_tf,
 )
 from fulmar_cli.diagnosis.machine import (
     check_clock,
@@ -55,6 +56,7 @@ def diagnose(purpose: str | None = None, name: str | None = None) -> list[Findin
     checks: list[Callable[[], Finding]] = [
         check_python,
         *(partial(check_extra, extra) for extra in extras),
+        check_tf,
         check_configuration,
         check_policies,
         partial(check_discovery, environment, hardware=hardware),

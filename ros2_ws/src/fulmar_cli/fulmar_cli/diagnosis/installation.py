@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import sys
 from importlib.metadata import PackageNotFoundError, version
+from importlib.util import find_spec
 
 from fulmar_cli.diagnosis.check_result import Finding
 from fulmar_cli.extras import EXTRAS
@@ -13,7 +14,7 @@ from fulmar_core.paths import config_directories, config_names
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 
-OLDEST_PYTHON, NEWEST_PYTHON = (3, 11), (3, 13)
+OLDEST_PYTHON, NEWEST_PYTHON = (3, 11), (3, 14)
 
 
 def check_python(found: tuple[int, ...] = sys.version_info[:3]) -> Finding:
@@ -44,6 +45,16 @@ def check_module(module: str, extra: str) -> Finding:
         return Finding(module, "ok", version(module))
     except PackageNotFoundError:
         return Finding(module, "ok", "installed by the system")
+
+
+def check_tf() -> Finding:
+    """Whether frames can be published for RViz and Foxglove."""
+    if find_spec("tf2_msgs") is None:
+        found = (
+            "not installed: /tf and /tf_static are not published (nothing but RViz and Foxglove needs them)"
+        )
+        return Finding("tf2_msgs", "advice", found, "fulmar install-tf")
+    return Finding("tf2_msgs", "ok", "installed")
 
 
 def check_configuration() -> Finding:
