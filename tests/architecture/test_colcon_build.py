@@ -18,6 +18,7 @@ PROGRAMS = {
     "fulmar_ros/estimator_node": "fulmar_ros.estimator_node",
     "fulmar_ros/estop_node": "fulmar_ros.estop_node",
     "fulmar_ros/goal_node": "fulmar_ros.goal_node",
+    "fulmar_ros/markers_node": "fulmar_ros.markers_node",
     "fulmar_ros/recorder_node": "fulmar_ros.recorder_node",
     "fulmar_ros/teleop_node": "fulmar_ros.teleop_node",
     "hardware_drivers/adapter_node": "hardware_drivers.adapter_node",

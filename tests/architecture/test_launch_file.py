@@ -15,7 +15,7 @@ import pytest
 
 ARGUMENTS = {
     "system", "robot", "task", "controller", "backend", "hardware", "policy", "goals", "adapter", "topic",
-    "emulate", "name",
+    "emulate", "name", "markers",
 }  # fmt: skip
 
 
@@ -45,6 +45,7 @@ class Row:
     namespace: str = "platform"
     parameters: dict = field(default_factory=lambda: {"control_hz": 5.0, "lockstep": True, "seed": 7})
     remappings: dict = field(default_factory=dict)
+    optional: bool = False
 
 
 STAND_INS = {
@@ -156,11 +157,16 @@ def test_a_text_that_looks_like_a_number_stays_a_text(launch_with):
     assert parameters["task"].kwargs == {"value_type": str}
 
 
-def test_the_end_of_any_node_ends_the_launch(launch_with):
+def test_the_end_of_a_node_ends_the_launch(launch_with):
     _, nodes = launch_with(Row(), Row(name="controller"))
     for node in nodes:
         assert type(node.kwargs["on_exit"]).__name__ == "Shutdown"
         assert node.kwargs["name"] in node.kwargs["on_exit"].kwargs["reason"]
+
+
+def test_the_end_of_an_optional_node_does_not_end_the_launch(launch_with):
+    _, (node,) = launch_with(Row(name="markers", optional=True))
+    assert node.kwargs["on_exit"] == []
 
 
 def test_the_launch_arguments_are_those_of_the_node_table():

@@ -12,6 +12,7 @@ import pytest
 TARGETS = {
     "help",
     "setup",
+    "tf",
     "dev",
     "peers",
     "demo",
@@ -28,13 +29,14 @@ TARGETS = {
     "clean",
 }
 
+MESSAGES_LOCK = "ros2_ws/src/fulmar_bringup/fulmar_bringup/tf2_msgs/requirements.lock"
 # Replaces Python: logs its arguments, and makes a .venv with a copy of itself.
 INTERPRETER = """#!/usr/bin/env bash
 echo "$*" >> calls.log
 case "$*" in
     *version_info*) exit {too_old} ;;
     --version) echo "Python {version}" ;;
-    "-m venv .venv"*) mkdir -p "$3/bin" && cp "$0" "$3/bin/python" ;;
+    "-m venv .venv"*) mkdir -p "$3/bin" && cp "$0" "$3/bin/python" && cp "$0" "$3/bin/fulmar" ;;
     *"-m pip"*"-r "*) echo "Collecting numpy==2.0.0" ;;
 esac
 """
@@ -46,6 +48,8 @@ def make(repository, tmp_path):
     locks = ("requirements.lock", "requirements-dev.lock", "requirements-peers.lock")
     for name in ("Makefile", "pyproject.toml", *locks):
         shutil.copy(repository / name, tmp_path)
+    (tmp_path / MESSAGES_LOCK).parent.mkdir(parents=True)
+    shutil.copy(repository / MESSAGES_LOCK, tmp_path / MESSAGES_LOCK)
     environment = {key: value for key, value in os.environ.items() if not key.startswith("MAKE")}
     environment.pop("PYTHON", None)
 

@@ -111,6 +111,7 @@ def test_programs_are_those_that_systems_start(packages):
         ("fulmar_ros", "estimator_node"),
         ("fulmar_ros", "estop_node"),
         ("fulmar_ros", "goal_node"),
+        ("fulmar_ros", "markers_node"),
         ("fulmar_ros", "recorder_node"),
         ("fulmar_ros", "teleop_node"),
         ("hardware_drivers", "adapter_node"),

@@ -44,7 +44,7 @@ DIRECTIONS = {
     "controller": "From the controller to plant and recorder",
     "operator": "From the operator to plant and controller",
     "every node": "From every node to the operator",
-    "device": "From other nodes to the recorder",
+    "display": "From the node that draws to viewers",
 }
 
 HEAD = "| Topic | Type | QoS | Rate | Unit | Frame | Content |\n|---|---|---|---|---|---|---|"

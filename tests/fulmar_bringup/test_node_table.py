@@ -25,13 +25,33 @@ def by_name(nodes):
 
 
 @SYSTEMS
-def test_every_system_is_recorder_plant_its_guards_and_controller_in_one_namespace(system):
+def test_every_system_is_recorder_plant_its_guards_controller_and_markers_in_one_namespace(system):
     nodes, guards = list_nodes(system=system), load_system(system).guards
     asked = [
         name for name, is_asked in (("estop", guards.estop), ("estimator", guards.estimator)) if is_asked
     ]
-    assert [node.name for node in nodes] == ["recorder", "plant", *asked, "controller"]
+    assert [node.name for node in nodes] == ["recorder", "plant", *asked, "controller", "markers"]
     assert {node.namespace for node in nodes} == {f"/{load_system(system).robot}"}
+
+    quiet = list_nodes(system=system, markers="false")
+    assert [node.name for node in quiet] == [node.name for node in nodes][:-1]
+
+
+def test_no_node_waits_for_the_one_that_draws():
+    rows = [system_rows(replace(PLAN, markers=markers), record={}) for markers in (False, True)]
+    assert set(rows[1]) - set(rows[0]) == {"markers"}
+    for name in rows[0]:
+        assert rows[0][name].parameters == rows[1][name].parameters
+
+
+def test_the_node_that_draws_gets_the_area_and_receives_the_goals_of_the_task():
+    plan = replace(PLAN, markers=True, guards=Guards(area=(-1.0, 1.0, -2.0, 2.0)))
+    markers = system_rows(plan)["markers"]
+    assert markers.parameters == {
+        "robot": "floating_platform", "task": "go_to_pose", "area": [-1.0, 1.0, -2.0, 2.0],
+    }  # fmt: skip
+    assert {"goal_pose", "obstacles", "actuators/state"} <= {*markers.observed}
+    assert markers.optional
 
 
 @SYSTEMS

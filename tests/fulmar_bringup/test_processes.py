@@ -72,9 +72,9 @@ def start(tmp_path, monkeypatch):
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     group = ProcessGroup()
 
-    def start(name, program):
+    def start(name, program, *, optional=False):
         (tmp_path / f"{name}_program.py").write_text(program)
-        group.start(NodeSpec(name, "x", "x", f"{name}_program", "/x"))
+        group.start(NodeSpec(name, "x", "x", f"{name}_program", "/x", optional=optional))
         return group
 
     yield start
@@ -92,6 +92,16 @@ def test_output_of_a_child_is_prefixed_with_its_name(start, capfd):
     group = start("talker", "print('hello')")
     wait_for(group.ended)
     wait_for(lambda: "[talker] hello" in capfd.readouterr().err)
+
+
+def test_the_end_of_an_optional_child_is_said_once_and_is_no_end(start, capfd):
+    group = start("markers", "raise SystemExit(3)", optional=True)
+    group.process("markers").wait(10.0)
+    assert group.ended() is None
+    assert group.ended() is None
+    said = "markers ended with exit code 3; the system goes on without it"
+    assert capfd.readouterr().err.count(said) == 1
+    assert [(end.returncode, end.optional) for end in group.stop_all()] == [(3, True)]
 
 
 def test_the_last_words_of_a_child_are_printed_before_stop_returns(start, capfd):

@@ -24,6 +24,7 @@ setup(
         "console_scripts": [
             "recorder_node = fulmar_ros.recorder_node:main",
             "goal_node = fulmar_ros.goal_node:main",
+            "markers_node = fulmar_ros.markers_node:main",
             "estop_node = fulmar_ros.estop_node:main",
             "teleop_node = fulmar_ros.teleop_node:main",
             "estimator_node = fulmar_ros.estimator_node:main",

@@ -35,6 +35,7 @@ def list_nodes(
     adapter: str | None = None,
     topic: str | None = None,
     emulate: str | None = None,
+    markers: str | None = None,
 ) -> tuple[NodeSpec, ...]:
     """Nodes of a system, each of its choices replaced by what is given.
 
@@ -51,6 +52,7 @@ def list_nodes(
         adapter: With controller `external`, name or path of the hardware file whose commands it speaks.
         topic: Topic that the adapter takes them from; the file's by default.
         emulate: `true`: with backend hardware, an emulator stands in for the device.
+        markers: `false`: no node draws for viewers.
 
     Returns:
         As of `system_rows`. The row of an external controller is not there, or is that of its adapter.
@@ -79,12 +81,14 @@ def list_nodes(
         guards=chosen.guards,
         recording=chosen.recorder,
         nodes=own_nodes(chosen),
+        markers=markers != "false",
     )
     if plan.backend == "hardware":
         plan = replace(plan, hardware=default_hardware(plan.robot, hardware))
         check_own_driver(load_hardware(plan.hardware).driver)
-    if emulate not in (None, "true", "false"):
-        raise ConfigError(f"emulate = '{emulate}' must be true or false.")
+    for word, given in (("emulate", emulate), ("markers", markers)):
+        if given not in (None, "true", "false"):
+            raise ConfigError(f"{word} = '{given}' must be true or false.")
     wires = None
     if emulate == "true":
         if plan.backend != "hardware":

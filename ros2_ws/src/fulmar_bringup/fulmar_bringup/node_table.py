@@ -23,9 +23,11 @@ from fulmar_core.topics import (
     ANSWER,
     CLOCK,
     DEVICE_STATE,
+    DIAGNOSTICS,
     ESTOP,
     GOAL_WIRES,
     JOY,
+    MARKERS,
     METADATA,
     MOCAP,
     OBSERVATION,
@@ -325,6 +327,24 @@ def run_goals_spec(plan: RunPlan) -> NodeSpec:
     )
     more: dict[str, Parameter] = {"stay": True, "lockstep": plan.lockstep, "rate": plan.rate}
     return replace(spec, parameters=spec.parameters | more, remappings=dict(plan.remappings))
+
+
+def markers_spec(plan: RunPlan) -> NodeSpec:
+    """The node that draws for viewers; nothing depends on it."""
+    task, area = load_task(plan.task), plan.guards.area
+    parameters: dict[str, Parameter] = {"robot": plan.robot, "task": plan.task}
+    if area != NO_AREA:
+        parameters["area"] = list(area)
+    goals = (wire.name for wire in goal_wires(task.goal_topic))
+    return _row(
+        plan,
+        "markers",
+        "fulmar_ros.markers_node",
+        parameters,
+        observed=(*goals, OBSTACLES.name, ACTUATORS_STATE.name, STATUS.name, DIAGNOSTICS.name),
+        outputs=(MARKERS.name,),
+        optional=True,
+    )
 
 
 def teleop_spec(robot: str, *, name: str = "", keyboard: bool = True, share: float = 0.5) -> NodeSpec:

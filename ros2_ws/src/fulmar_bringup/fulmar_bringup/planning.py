@@ -99,6 +99,7 @@ def plan_run(
     adapter: str | None = None,
     topic: str | None = None,
     goals_later: bool = False,
+    markers: bool = False,
 ) -> RunRequest:
     """Complete a request and refuse what cannot work, before any process is started.
 
@@ -134,6 +135,7 @@ def plan_run(
         adapter: With controller `external`, name or path of the hardware file whose commands it speaks.
         topic: Topic that the adapter takes them from; the file's by default.
         goals_later: Whether goals come from outside while the system runs; `goal` and `goals` are None then.
+        markers: Whether a node draws for viewers; not in lock step, where every message counts.
 
     Returns:
         The request.
@@ -144,6 +146,10 @@ def plan_run(
     """
     if lockstep and rate != 1.0:
         raise ConfigError("--lockstep runs as fast as it goes; it takes no --rate.")
+    if lockstep and markers:
+        raise ConfigError(
+            "--lockstep gives the same bytes each time; it takes no --markers, drawn by the clock."
+        )
     check_names(robot, task, controller, backend, hardware)
     own_name = "" if name is None else checked_name(name)
     hardware = checked_hardware(robot, backend, hardware, emulate=emulate, hurried=lockstep or rate != 1.0)
@@ -226,6 +232,7 @@ def plan_run(
         adapter=adapter_path(robot, adapter),
         adapter_topic=topic or "",
         nodes=nodes,
+        markers=markers,
     )
     goal = goal or (the_task.state_type.written(mission.current) if the_task.goal_topic in PLACES else None)
     return RunRequest(plan, goal, record, command, mission)

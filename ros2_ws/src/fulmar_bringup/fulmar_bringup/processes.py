@@ -17,6 +17,7 @@ from typing import IO
 
 import psutil
 
+from fulmar_bringup.console import log_line
 from fulmar_bringup.run_plan import NodeSpec, Parameter
 from fulmar_ros.middleware import middleware_environment
 
@@ -31,6 +32,7 @@ class Ended:
     name: str
     returncode: int | None  # None: it could not be ended
     forced: bool = False  # we had to kill it
+    optional: bool = False  # the system goes on without it
 
     @property
     def text(self) -> str:
@@ -50,6 +52,9 @@ class ProcessGroup:
         self._environment = {**os.environ, **child_environment(), **(environment or {})}
         self._children: dict[str, psutil.Popen] = {}
         self._relays: dict[str, _Relay] = {}
+        self._optional: dict[
+            str, bool
+        ] = {}  # nodes that a system goes on without: whether their end was reported
 
     def start(self, spec: NodeSpec) -> None:
         """Start one node in a process of its own."""
@@ -62,6 +67,8 @@ class ProcessGroup:
             start_new_session=True,  # Ctrl-C reaches us alone; we stop the children in order
         )
         self._relays[spec.name] = _Relay(spec.name, child.stdout)
+        if spec.optional:
+            self._optional[spec.name] = False
         self._children[spec.name] = child
         self._relays[spec.name].start()
 
@@ -70,11 +77,16 @@ class ProcessGroup:
         return self._children[name]
 
     def ended(self) -> Ended | None:
-        """The first child found to have ended, or None."""
+        """The first child found to have ended, or None; the end of an optional one is printed once, and no end."""
         for name, child in self._children.items():
             code = child.poll()
-            if code is not None:
+            if code is None:
+                continue
+            if name not in self._optional:
                 return Ended(name, code)
+            if not self._optional[name]:
+                self._optional[name] = True
+                log_line(f"{Ended(name, code).text}; the system goes on without it")
         return None
 
     def stop(self, *names: str) -> list[Ended]:
@@ -95,7 +107,10 @@ class ProcessGroup:
             del self._children[name]
             if self._relays[name].ident is not None:  # Ctrl-C may have come before it was started
                 self._relays[name].join(LAST_WORDS_S)
-        return [Ended(name, child.poll(), forced=child.pid in killed) for name, child in chosen]
+        return [
+            Ended(name, child.poll(), forced=child.pid in killed, optional=name in self._optional)
+            for name, child in chosen
+        ]
 
     def stop_all(self) -> list[Ended]:
         """Stop every child that is left, newest first, so that the recorder gets the last messages of the others."""

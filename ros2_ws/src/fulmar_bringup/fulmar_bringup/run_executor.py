@@ -135,7 +135,7 @@ def _withdraw(group: ProcessGroup, specs: list[NodeSpec], record: Path) -> None:
 def _with_ends(failure: str, ends: list[Ended]) -> str:
     """Add the children that did not end well when they were stopped, unless the failure names them already."""
     # SIGTERM itself ends a child only before its handler is installed, and then nothing is lost.
-    bad = [end for end in ends if end.returncode not in (0, -signal.SIGTERM)]
+    bad = [end for end in ends if not end.optional and end.returncode not in (0, -signal.SIGTERM)]
     if failure:
         bad = [end for end in bad if end.name not in failure and not end.forced]
     return "; ".join([*([failure] if failure else []), *(f"{end.text} when it was stopped" for end in bad)])

@@ -29,6 +29,7 @@ class NodeSpec:
     inputs: tuple[str, ...] = ()  # topics without which it is of no use
     outputs: tuple[str, ...] = ()  # topics that it publishes
     observed: tuple[str, ...] = ()  # topics that it receives if they are there
+    optional: bool = False  # no node waits for it, and its end does not end the system
 
 
 def node_row(
@@ -72,6 +73,7 @@ class RunPlan:
     )
     adapter_topic: str = ""  # topic that it takes them from; empty: the file's
     nodes: tuple[NodeSpec, ...] = ()  # of the system's own, beside those that every system has
+    markers: bool = False  # a node draws goal, limits and thrust for viewers
 
     @property
     def robot_name(self) -> str:

@@ -50,6 +50,7 @@ def plan_system(
     start: PoseTuple | None = None,
     rate: float = 1.0,
     recording: str | None = None,
+    markers: bool = True,
 ) -> RunRequest:
     """Plan a system that has no end.
 
@@ -66,6 +67,7 @@ def plan_system(
         start: Where a simulated robot begins; the origin by default.
         rate: Simulated seconds a wall-clock second.
         recording: A mode of `fulmar_core.recording` instead of the system's own.
+        markers: Whether a node draws for viewers.
 
     Raises:
         ConfigError: As of `plan_run`; or a bag for each goal, where goals stream.
@@ -92,6 +94,7 @@ def plan_system(
         arm=arm,
         guards={name: value for name, value in asdict(system.guards).items() if value},
         goals_later=True,
+        markers=markers,
     )
     kept = chosen_recording(system.recorder, recording)
     if kept.mode == "goals" and load_task(system.task).goal_topic == "goal_velocity":

@@ -16,6 +16,7 @@ from fulmar_bringup.node_table import (
     commander_specs,
     emulator_spec,
     guard_specs,
+    markers_spec,
     paced_wire,
     plant_spec,
     recorder_spec,
@@ -66,6 +67,8 @@ def system_rows(
     if plan.goals:
         rows.append(run_goals_spec(plan))
     rows += plan.nodes
+    if plan.markers:
+        rows.append(markers_spec(plan))
     _check_chain(plan)
     check_rows(rows, outside=_from_outside(plan))
     return {row.name: row for row in _with_listeners(rows, plan)}
@@ -101,7 +104,7 @@ def check_rows(rows: Iterable[NodeSpec], *, outside: Iterable[str] = ()) -> None
         if len(sources) > 1:
             raise ConfigError(f"{' and '.join(sources)} publish {topic}, and {why}. Leave one out.")
     published = {topic for row in rows for topic in row.outputs}
-    published |= set(outside) | {wire.name for wire in WIRES if wire.source in ("operator", "device")}
+    published |= set(outside) | {wire.name for wire in WIRES if wire.source == "operator"}
     for row in rows:
         for topic in row.inputs:
             if topic not in published:
@@ -159,4 +162,4 @@ def _with_listeners(rows: list[NodeSpec], plan: RunPlan) -> list[NodeSpec]:
 
 
 def _listeners(rows: Iterable[NodeSpec], topic: str) -> int:
-    return sum(topic in (*row.inputs, *row.observed) for row in rows)
+    return sum(topic in (*row.inputs, *row.observed) for row in rows if not row.optional)

@@ -25,12 +25,13 @@ ARGUMENTS = {
     "adapter": "with controller external, a file of configs/hardware: commands come in as its driver sends them",
     "topic": "topic that the adapter takes, in the place of the file's",
     "emulate": "true: with backend hardware, an emulator stands in for the device",
+    "markers": "false: no node draws goal, limits and thrust for viewers",
     "goals": "a file of configs/goals, without .yaml, that a node of its own publishes",
 }
 
 
 def to_node(spec: NodeSpec) -> Node:
-    """Translate one row of the node table; the end of any node ends the launch."""
+    """Translate one row of the node table; the end of any node that is not optional ends the launch."""
     # Without its type, launch_ros would read a text such as "7" or "on" as YAML.
     parameters = {
         key: ParameterValue(value, value_type=str) if isinstance(value, str) else value
@@ -44,7 +45,7 @@ def to_node(spec: NodeSpec) -> Node:
         parameters=[parameters] if parameters else [],
         remappings=list(spec.remappings.items()),
         output="screen",
-        on_exit=Shutdown(reason=f"{spec.name} ended"),
+        on_exit=[] if spec.optional else Shutdown(reason=f"{spec.name} ended"),
     )
 
 

@@ -100,6 +100,11 @@ OBSTACLES = Wire(
     "obstacles", "visualization_msgs/msg/MarkerArray", "operator", "latched", "on demand",
     "cylinders to avoid; `scale.x` is the diameter", unit="m", frame="`odom`",
 )  # fmt: skip
+MARKERS = Wire(
+    "markers", "visualization_msgs/msg/MarkerArray", "display", "latched", "on change, at most 10 Hz",
+    "what viewers draw: goal, path, tolerance, geofence, area, obstacles, thrust, body; each message is complete",
+    unit="m", frame="`odom`, `base_link`",
+)  # fmt: skip
 
 
 def thing_wire(name: str) -> Wire:
@@ -183,7 +188,7 @@ DESCRIPTION = Wire(
 WIRES: tuple[Wire, ...] = (
     *SENSOR_WIRES.values(), MOCAP, TRUTH, ACTUATORS_STATE, ACTUATORS_HEALTH, CLOCK, COMMAND, VELOCITY_COMMAND,
     OBSERVATION, ACTION, METADATA, STATUS, DIAGNOSTICS, GOAL_POSE, GOAL_POINT, GOAL_PATH, GOAL_POSES,
-    GOAL_VELOCITY, OBSTACLES, BLOCK, AIR_BEARING, DEVICE_STATE, ESTOP, ESTOP_RELEASED, TELEOP, JOY, SWAP,
+    GOAL_VELOCITY, OBSTACLES, MARKERS, BLOCK, AIR_BEARING, DEVICE_STATE, ESTOP, ESTOP_RELEASED, TELEOP, JOY, SWAP,
     TRANSFORMS, STATIC_TRANSFORMS, DESCRIPTION, PERIOD, ANSWER,
 )  # fmt: skip
 

@@ -13,8 +13,10 @@ from visualization_msgs.msg import Marker, MarkerArray
 from fulmar_core.goal import Goal
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot_name import PLAIN, Frames
+from fulmar_core.scene.goal_shapes import obstacle_shapes
 from fulmar_core.state import State
 from fulmar_ros.convert import stamp_of
+from fulmar_ros.marker_messages import marker_of
 
 GoalMessage: TypeAlias = PointStamped | PoseStamped | Path | PoseArray | TwistStamped
 TYPES: dict[str, type] = {
@@ -80,18 +82,10 @@ def obstacles_message(obstacles: np.ndarray, time_ns: int, frames: Frames = PLAI
         time_ns: When they were given; controllers report it back [ns].
         frames: Of the robot.
     """
-    there = [disc[:3] for disc in np.asarray(obstacles) if disc[2] > 0.0]
     # The first marker clears what a viewer drew before, and carries the stamp where there is no obstacle.
     first = Marker(action=Marker.DELETEALL)
     first.header.frame_id, first.header.stamp = frames.odom, stamp_of(time_ns)
-    markers = [first]
-    for number, (x, y, radius) in enumerate(there):
-        marker = Marker(ns="obstacles", id=number, type=Marker.CYLINDER, action=Marker.ADD)
+    markers = [marker_of(shape, frames) for shape in obstacle_shapes(obstacles)]
+    for marker in markers:
         marker.header = first.header
-        marker.pose.position.x, marker.pose.position.y, marker.pose.position.z = float(x), float(y), 0.25
-        marker.pose.orientation.w = 1.0
-        marker.scale.x = marker.scale.y = 2.0 * float(radius)
-        marker.scale.z = 0.5
-        marker.color.r, marker.color.g, marker.color.b, marker.color.a = 0.8, 0.3, 0.2, 1.0
-        markers.append(marker)
-    return MarkerArray(markers=markers)
+    return MarkerArray(markers=[first, *markers])

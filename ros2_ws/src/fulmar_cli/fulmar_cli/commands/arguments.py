@@ -77,6 +77,10 @@ ArmOption = Annotated[
 EstopOption = Annotated[
     bool, flag("--estop", "Run an e-stop node; nothing moves without it. See `fulmar estop`.")
 ]
+MARKERS_HELP = (
+    "Draw goal, limits and thrust for RViz and Foxglove, on the topic `markers`. See `fulmar layout`."
+)
+MarkersOption = Annotated[bool, typer.Option("--markers/--no-markers", help=MARKERS_HELP)]
 RateOption = Annotated[
     float, option("F", "Simulated seconds per second of wall-clock time.", "--rate", min=0.01, max=50.0)
 ]

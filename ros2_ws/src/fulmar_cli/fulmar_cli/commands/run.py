@@ -68,9 +68,7 @@ def run(
     estimator: Annotated[str | None, option("NAME", ESTIMATOR_HELP)] = None,
     estop: cli.EstopOption = False,
     end_on_estop: Annotated[bool, flag("--end-on-estop", END_HELP)] = False,
-    fallback: Annotated[
-        str | None, option("C", "Classical controller for when the policy is rejected.")
-    ] = None,
+    fallback: Annotated[str | None, option("C", "Classical controller if the policy is rejected.")] = None,
     trusted_keys: Annotated[
         Path | None, option("FILE|DIR", "Public keys: reject bundles that none of them has signed.")
     ] = None,
@@ -91,6 +89,7 @@ def run(
     remap: Annotated[list[str] | None, option("FROM:=TO", REMAP_HELP)] = None,
     adapter: Annotated[str | None, option("NAME", ADAPTER_HELP)] = None,
     topic: Annotated[str | None, option("T", "Topic that --adapter takes; the file's by default.")] = None,
+    markers: cli.MarkersOption = False,
     as_json: cli.JsonOption = False,
 ) -> None:
     """Run a robot once, over ROS, and record it.
@@ -140,7 +139,7 @@ def run(
         record=record or dated_folder("runs", name or robot, controller), command=cli.invoked_command(),
         guards={key: value for key, value in guards.items() if value is not None}, recording=recording,
         copies=copies, controller_network=controller_network, mocap_hz=mocap_hz, remap=remap or (),
-        adapter=adapter, topic=topic,
+        adapter=adapter, topic=topic, markers=markers,
     )  # fmt: skip
     check_plan(request.plan)
     outcome = run_and_evaluate(replace(request, end_on_estop=end_on_estop))

@@ -45,6 +45,7 @@ def up(
     estop: cli.EstopOption = False,
     record: cli.RecordOption = None,
     recording: Annotated[str | None, option("whole|ring|goals", RECORDING_HELP)] = None,
+    markers: cli.MarkersOption = True,
     as_json: Annotated[
         bool, flag("--json", "Print one JSON object a line for each event, and nothing else.")
     ] = False,
@@ -83,7 +84,7 @@ def up(
     request = plan_system(
         chosen, record=record or dated_folder("runs", chosen.name or chosen.robot, chosen.controller),
         command=cli.invoked_command(), policy=policy, hardware=hardware, emulate=emulate, arm=arm, scenario=scenario,
-        seed=seed, start=read_pose(start, "--start"), rate=rate, recording=recording,
+        seed=seed, start=read_pose(start, "--start"), rate=rate, recording=recording, markers=markers,
     )  # fmt: skip
     check_plan(request.plan)
     report = _print_json if as_json else _print_words
