@@ -22,6 +22,7 @@ from fulmar_core.topics import (
     ACTUATORS_STATE,
     ANSWER,
     CLOCK,
+    DESCRIPTION,
     DEVICE_STATE,
     DIAGNOSTICS,
     ESTOP,
@@ -35,8 +36,10 @@ from fulmar_core.topics import (
     ODOMETRY,
     PERIOD,
     SENSOR_WIRES,
+    STATIC_TRANSFORMS,
     STATUS,
     TELEOP,
+    TRANSFORMS,
     TRUTH,
     WIRES,
     Wire,
@@ -45,6 +48,12 @@ from fulmar_core.topics import (
 )
 from hardware_drivers.settings import load_hardware
 from policy_server.controllers import controller_entry
+
+MODEL = (
+    DESCRIPTION.name,
+    TRANSFORMS.name,
+    STATIC_TRANSFORMS.name,
+)  # of every plant; the last two need tf2_msgs
 
 
 def _row(plan: RunPlan, name: str, module: str, parameters: Mapping[str, Parameter], **more: Any) -> NodeSpec:
@@ -196,7 +205,7 @@ def plant_spec(plan: RunPlan, *, port: str = "") -> NodeSpec:
             parameters,
             inputs=(command_wire(load_robot(plan.robot)).name,),
             outputs=tuple(
-                dict.fromkeys((ACTUATORS_STATE.name, *_sensor_topics(plan), paced_wire(plan).name))
+                dict.fromkeys((ACTUATORS_STATE.name, *_sensor_topics(plan), paced_wire(plan).name, *MODEL))
             ),
         )
     parameters |= _motion_capture(plan)
@@ -219,6 +228,7 @@ def plant_spec(plan: RunPlan, *, port: str = "") -> NodeSpec:
             *poses,
             *things,
             *period,
+            *MODEL,
         ),
     )
 
