@@ -15,6 +15,9 @@ PEERS := .venv-peers
 RUN_LOCK := requirements.lock
 DEV_LOCK := requirements-dev.lock
 PEERS_LOCK := requirements-peers.lock
+# Of the images that are not made from the run lock.
+ROBOT_LOCK := docker/requirements-robot.lock
+TRAIN_LOCK := docker/requirements-train.lock
 # Lies beside what it builds, so that the wheel has it too.
 MESSAGES_LOCK := ros2_ws/src/fulmar_bringup/fulmar_bringup/tf2_msgs/requirements.lock
 # Of .venv after an install on x86-64 [MiB], measured by `du -s --block-size=1M .venv`; the last one of .venv-peers.
@@ -162,13 +165,20 @@ profile-step: dev ## Profile a control step and its lock step (AGAINST=DIR: comp
 	@$(BIN)/python tests/benchmarks/profile_step.py $(if $(AGAINST),--against $(AGAINST))
 
 .PHONY: check
-check: dev ## Check format, lint, types, import contracts and spelling
+check: dev ## Check format, lint, types, import contracts, spelling and container files
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-logo
 	$(BIN)/codespell
+	$(BIN)/hadolint docker/*Dockerfile
+	@for profile in sim hardware split train; do \
+		$(BIN)/podman-compose --dry-run --file docker/compose.yaml --profile $$profile config > /dev/null; done
 	@echo "All checks passed."
+
+.PHONY: images
+images: ## Build the container images, by docker, podman or buildah (TARGETS="robot sim train")
+	docker/build.sh $(TARGETS)
 
 .PHONY: format
 format: dev ## Format the sources and apply the safe fixes of the linter
@@ -190,6 +200,11 @@ lock: $(DEV_STAMP) ## Make the locks anew (UPGRADE=1 takes the newest versions)
 		--extra view --group build --output-file $(RUN_LOCK)
 	$(compile) $(if $(UPGRADE),--upgrade) pyproject.toml --all-extras --group dev --constraint $(RUN_LOCK) \
 		--output-file $(DEV_LOCK)
+	$(compile) $(if $(UPGRADE),--upgrade) pyproject.toml --extra ros --extra policy --extra bags --extra hardware \
+		--group build --constraint $(RUN_LOCK) --output-file $(ROBOT_LOCK)
+	cp $(DEV_LOCK) $(TRAIN_LOCK) # its versions are taken where they fit
+	$(compile) pyproject.toml --extra ros --extra sim --extra policy --extra bags --extra view --extra train --group build \
+		--output-file $(TRAIN_LOCK)
 	$(compile) $(if $(UPGRADE),--upgrade) --group peers --output-file $(PEERS_LOCK)
 	$(compile) $(if $(UPGRADE),--upgrade) --group messages --constraint $(RUN_LOCK) --output-file $(MESSAGES_LOCK)
 

@@ -22,6 +22,7 @@ TARGETS = {
     "test-all",
     "check",
     "format",
+    "images",
     "policies",
     "replay-bags",
     "ros-build",
