@@ -42,6 +42,7 @@ class DriverSettings(PlantSettings):
     port: str = ""  # takes the place of the hardware file's port
     connect_s: float = 10.0  # wait so long for the device [s]
     arm: bool = False  # arm an autopilot, as `arm: true` in the hardware file
+    unattended: bool = False  # begun by a service: arm nothing, whatever file and parameters say
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -49,11 +50,17 @@ class DriverSettings(PlantSettings):
             raise ValueError("a real device runs in real time: lockstep and rate have no meaning here.")
         if not self.hardware:
             raise ValueError("'hardware' names no file: give a name of configs/hardware, or a path.")
+        if self.arm and self.unattended:
+            raise ValueError("'arm' and 'unattended' exclude one another: a person arms, beside the robot.")
 
     @property
     def publishes_odometry(self) -> bool:
         """Whether odometry comes from the device, not from motion capture or another node."""
         return super().publishes_odometry and load_hardware(self.hardware).measures_odometry
+
+    def may_arm(self, in_file: bool) -> bool:
+        """Whether a device is armed, where its hardware file says `arm: true` or does not."""
+        return (in_file or self.arm) and not self.unattended
 
 
 class DriverNode(PlantNode):
@@ -99,7 +106,7 @@ class DriverNode(PlantNode):
         """The hardware file with the parameter `arm`; logs what arming does before the first command."""
         driver = hardware.driver
         if isinstance(driver, OwnDriver) and driver.arm is not None:
-            driver = replace(driver, arm=driver.arm or settings.arm)
+            driver = replace(driver, arm=settings.may_arm(driver.arm))
             will = (
                 "this driver may ARM THE DEVICE."
                 if driver.arm
@@ -109,7 +116,7 @@ class DriverNode(PlantNode):
             return replace(hardware, driver=driver)
         if not isinstance(driver, MavlinkBoat):
             return hardware
-        driver = replace(driver, arm=driver.arm or settings.arm)
+        driver = replace(driver, arm=settings.may_arm(driver.arm))
         self.get_logger().warning(
             f"autopilot at {settings.port or driver.port}: this driver will set MANUAL, ARM THE BOAT, and override RC "
             f"channels {driver.steering_channel} (steering) and {driver.throttle_channel} (throttle)."

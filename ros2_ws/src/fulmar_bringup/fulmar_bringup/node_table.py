@@ -196,6 +196,8 @@ def plant_spec(plan: RunPlan, *, port: str = "") -> NodeSpec:
         parameters["hardware"] = plan.hardware
         if plan.arm:
             parameters["arm"] = True
+        if plan.unattended:
+            parameters["unattended"] = True
         if port:
             parameters["port"] = port
         return _row(
@@ -376,7 +378,13 @@ def guard_specs(plan: RunPlan) -> tuple[NodeSpec, ...]:
     nodes = []
     if plan.guards.estop:
         nodes.append(
-            _row(plan, "estop", "fulmar_ros.estop_node", {"robot": plan.robot}, outputs=(ESTOP.name,))
+            _row(
+                plan,
+                "estop",
+                "fulmar_ros.estop_node",
+                {"robot": plan.robot} | ({"pressed": True} if plan.unattended else {}),
+                outputs=(ESTOP.name,),
+            )
         )
     if plan.guards.estimator:
         nodes.append(_estimator_spec(plan, plan.guards.estimator))

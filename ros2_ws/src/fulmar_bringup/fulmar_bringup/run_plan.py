@@ -63,6 +63,7 @@ class RunPlan:
     hardware: str = ""  # file of `configs/hardware`, where the backend is hardware
     emulated: bool = False  # an emulator stands in for the device
     arm: bool = False  # an autopilot may be armed, whatever the hardware file says
+    unattended: bool = False  # begun by a service: the e-stop is pressed, and nothing is armed
     recording: Recording = Recording()
     copies: int = 1  # of each command on the wire
     controller_network: str = ""  # namespace of Linux, as another computer; empty: ours

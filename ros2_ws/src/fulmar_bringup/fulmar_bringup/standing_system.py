@@ -51,6 +51,7 @@ def plan_system(
     rate: float = 1.0,
     recording: str | None = None,
     markers: bool = True,
+    unattended: bool = False,
 ) -> RunRequest:
     """Plan a system that has no end.
 
@@ -68,10 +69,12 @@ def plan_system(
         rate: Simulated seconds a wall-clock second.
         recording: A mode of `fulmar_core.recording` instead of the system's own.
         markers: Whether a node draws for viewers.
+        unattended: Whether a service starts it: an e-stop node begins pressed, and nothing is armed.
 
     Raises:
         ConfigError: As of `plan_run`; or a bag for each goal, where goals stream.
     """
+    guards = replace(system.guards, estop=True) if unattended else system.guards
     request = plan_run(
         robot=system.robot,
         name=system.name or None,
@@ -92,16 +95,22 @@ def plan_system(
         hardware=hardware,
         emulate=emulate,
         arm=arm,
-        guards={name: value for name, value in asdict(system.guards).items() if value},
+        guards={name: value for name, value in asdict(guards).items() if value},
         goals_later=True,
         markers=markers,
     )
+    if unattended and arm:
+        raise ConfigError(
+            "--service and --arm exclude one another: a person arms, beside the robot, by `fulmar up --arm`."
+        )
     kept = chosen_recording(system.recorder, recording)
     if kept.mode == "goals" and load_task(system.task).goal_topic == "goal_velocity":
         raise ConfigError(
             f"velocities stream: task '{system.task}' gets no bag for each goal. Use --recording whole or ring."
         )
-    plan = replace(request.plan, duration_s=0.0, recording=kept, nodes=own_nodes(system))
+    plan = replace(
+        request.plan, duration_s=0.0, unattended=unattended, recording=kept, nodes=own_nodes(system)
+    )
     return replace(request, plan=plan)
 
 

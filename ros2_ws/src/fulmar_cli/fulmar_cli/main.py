@@ -33,6 +33,7 @@ from fulmar_cli.commands.list import list_names
 from fulmar_cli.commands.policies import policies
 from fulmar_cli.commands.report import report
 from fulmar_cli.commands.run import run
+from fulmar_cli.commands.service import service
 from fulmar_cli.commands.swap import swap
 from fulmar_cli.commands.teleop import teleop
 from fulmar_cli.commands.train import train
@@ -94,6 +95,7 @@ app.add_typer(benchmark, name="benchmark")
 app.add_typer(bundle, name="bundle")
 app.add_typer(bag, name="bag")
 app.add_typer(check, name="check")
+app.add_typer(service, name="service")
 app.command()(report)
 app.command()(identify)
 app.command()(demo)

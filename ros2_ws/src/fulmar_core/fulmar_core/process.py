@@ -11,6 +11,7 @@ import sys
 # Above every ordinary thread. The plant before the controller: threads of one priority do not interrupt each
 # other, and a controller that spins for ever must not keep the watchdog from closing the valves.
 CONTROL_PRIORITY, PLANT_PRIORITY = 10, 20
+RT_LIMIT = 98  # priority that a user is allowed; 99 is left to the kernel
 
 
 def take_priority(priority: int) -> bool:

@@ -19,6 +19,9 @@ from fulmar_cli.commands.values import read_pose
 from fulmar_core.errors import DONE, FAILED
 
 START_HELP = "Where a simulated robot begins, in space x,y,z[,roll,pitch,yaw]; the origin by default."
+SERVICE_HELP = (
+    "For a start without a person: the e-stop is pressed until `fulmar estop --reset`, and nothing is armed."
+)
 RECORDING_HELP = (
     "whole: one bag. goals: one bag for each goal, DIR/goal_001 and so on. ring: only the time around a fault. "
     "The system file's by default."
@@ -46,6 +49,7 @@ def up(
     record: cli.RecordOption = None,
     recording: Annotated[str | None, option("whole|ring|goals", RECORDING_HELP)] = None,
     markers: cli.MarkersOption = True,
+    service: Annotated[bool, flag("--service", SERVICE_HELP)] = False,
     as_json: Annotated[
         bool, flag("--json", "Print one JSON object a line for each event, and nothing else.")
     ] = False,
@@ -85,6 +89,7 @@ def up(
         chosen, record=record or dated_folder("runs", chosen.name or chosen.robot, chosen.controller),
         command=cli.invoked_command(), policy=policy, hardware=hardware, emulate=emulate, arm=arm, scenario=scenario,
         seed=seed, start=read_pose(start, "--start"), rate=rate, recording=recording, markers=markers,
+        unattended=service,
     )  # fmt: skip
     check_plan(request.plan)
     report = _print_json if as_json else _print_words

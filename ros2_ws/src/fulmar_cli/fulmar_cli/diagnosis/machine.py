@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from fulmar_cli.diagnosis.check_result import Finding
-from fulmar_core.process import PLANT_PRIORITY
+from fulmar_core.process import PLANT_PRIORITY, RT_LIMIT
 
 LATE_MS = 2.0  # what a 50 Hz loop may be late at the 99th percentile
 FREE_BYTES = 1_000_000_000
@@ -74,7 +74,7 @@ def check_real_time(
     if not lacking:
         return Finding("real-time limits", "ok", "rtprio and memlock suffice")
     fix = (
-        r"printf '%s - rtprio 98\n%s - memlock unlimited\n' $USER $USER "
+        rf"printf '%s - rtprio {RT_LIMIT}\n%s - memlock unlimited\n' $USER $USER "
         "| sudo tee /etc/security/limits.d/fulmar.conf   # then log in again"
     )
     return Finding("real-time limits", "advice", "; ".join(lacking), fix)

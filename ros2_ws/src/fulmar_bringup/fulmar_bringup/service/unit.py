@@ -1,0 +1,141 @@
+"""The unit of a system: a file of systemd that runs `fulmar up SYSTEM --service`."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from fulmar_core.process import RT_LIMIT
+
+MARK = "# Written by `fulmar service install`; `fulmar service remove` removes it."
+# Of the environment of the one who installs: where nodes find each other, own files, and on a Jazzy machine ROS itself.
+PASSED = (
+    "ROS_DOMAIN_ID", "ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_STATIC_PEERS", "RMW_IMPLEMENTATION",
+    "FASTDDS_BUILTIN_TRANSPORTS", "FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE",
+    "ROS_SECURITY_ENABLE", "ROS_SECURITY_STRATEGY", "ROS_SECURITY_KEYSTORE", "FULMAR_CONFIGS", "FULMAR_CALIBRATION",
+    "AMENT_PREFIX_PATH", "PYTHONPATH", "LD_LIBRARY_PATH",
+)  # fmt: skip
+STATE = "fulmar"  # folder below /var/lib, the working folder; bags lie in its `runs`
+# Our values. Five failures within five minutes are no accident: the robot then stays down until a person looks.
+RESTART_S, FAILURES, WITHIN_S = 5, 5, 300
+# Valves close within a second; bags on a slow disk take longer.
+STOP_S = 15
+
+UNIT = """\
+{mark}
+[Unit]
+Description=Fulmar system {system}
+After=network.target time-sync.target
+StartLimitIntervalSec={within}
+StartLimitBurst={failures}
+
+[Service]
+Type=exec
+User={user}
+{groups}{environment}StateDirectory={state}
+WorkingDirectory=/var/lib/{state}
+ExecStart={command}
+# Every node brings its device to the safe state on SIGTERM, also where the process that started it has died.
+KillMode=control-group
+KillSignal=SIGTERM
+TimeoutStopSec={stop}
+# It comes back with the e-stop pressed. A mistake in a file (exit code 2) does not mend itself.
+Restart=on-failure
+RestartSec={restart}
+RestartPreventExitStatus=2
+LimitRTPRIO={rtprio}
+LimitMEMLOCK=infinity
+StandardOutput=journal
+StandardError=journal
+SyslogIdentifier=fulmar-{name}
+# /dev, /dev/shm and /tmp stay: devices, shared memory of Fast DDS, and the record of used ROS domains.
+NoNewPrivileges=yes
+ProtectSystem=strict
+ReadWritePaths=/tmp /dev/shm
+ProtectHome=read-only
+ProtectKernelTunables=yes
+ProtectKernelModules=yes
+RestrictSUIDSGID=yes
+LockPersonality=yes
+
+[Install]
+WantedBy=multi-user.target
+"""
+
+
+@dataclass(frozen=True)
+class Service:
+    """What a unit is made of."""
+
+    name: str  # of the unit, without `fulmar-` and `.service`
+    system: str
+    command: tuple[str, ...]  # program, with its whole path, and arguments
+    user: str
+    groups: tuple[str, ...] = ()  # beside the user's own
+
+    @property
+    def unit(self) -> str:
+        """Name of the unit."""
+        return unit_name(self.name)
+
+
+def unit_name(name: str) -> str:
+    """Name of the unit of a service."""
+    return f"fulmar-{name}.service"
+
+
+def unit_text(service: Service, environment: Mapping[str, str]) -> str:
+    """The unit as a file.
+
+    Args:
+        service: What runs.
+        environment: Of the one who installs; `PASSED` is taken from it.
+    """
+    passed = {name: environment[name] for name in PASSED if environment.get(name)}
+    return UNIT.format(
+        mark=MARK,
+        system=service.system,
+        within=WITHIN_S,
+        failures=FAILURES,
+        user=service.user,
+        groups=f"SupplementaryGroups={' '.join(service.groups)}\n" if service.groups else "",
+        environment="".join(f"Environment={_quoted(f'{name}={value}')}\n" for name, value in passed.items()),
+        state=STATE,
+        command=" ".join(map(_quoted, service.command)),
+        stop=STOP_S,
+        restart=RESTART_S,
+        rtprio=RT_LIMIT,
+        name=service.name,
+    )
+
+
+def command_of(text: str) -> tuple[str, ...]:
+    """The words of ExecStart in the text of a unit; the inverse of `unit_text`."""
+    (line,) = re.findall(r"^ExecStart=(.*)$", text, re.MULTILINE)
+    return tuple(_unquoted(word) for word in re.findall(r'"(?:[^"\\]|\\.)*"|\S+', line))
+
+
+def system_of_unit(text: str) -> str:
+    """The system that a unit runs, by its text."""
+    (system,) = re.findall(r"^Description=Fulmar system (.*)$", text, re.MULTILINE)
+    return str(system)
+
+
+def _quoted(word: str) -> str:
+    """A word as systemd reads it (systemd.service, "Command lines"): % and $ would be replaced."""
+    word = word.replace("%", "%%").replace("$", "$$")
+    if re.fullmatch(r"[\w@%+=:,./$-]+", word):
+        return word
+    return '"' + word.replace("\\", "\\\\").replace('"', '\\"') + '"'
+
+
+def _unquoted(word: str) -> str:
+    if word.startswith('"'):
+        word = re.sub(r"\\(.)", r"\1", word[1:-1])
+    return word.replace("%%", "%").replace("$$", "$")
+
+
+def known_groups(wanted: Iterable[str], known: Iterable[str]) -> tuple[str, ...]:
+    """Those groups that this computer has: systemd starts no unit with an unknown one."""
+    return tuple(dict.fromkeys(name for name in wanted if name in set(known)))

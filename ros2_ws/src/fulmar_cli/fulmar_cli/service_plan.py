@@ -1,0 +1,156 @@
+"""What `fulmar service install` writes: checked before anything is."""
+
+from __future__ import annotations
+
+import grp
+import os
+import pwd
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+from fulmar_bringup.console import warn
+from fulmar_bringup.service.device_rules import device_groups, device_rules
+from fulmar_bringup.service.installation import Files, systemctl, systemd_runs, write_files
+from fulmar_bringup.service.unit import Service, known_groups, unit_text
+from fulmar_bringup.standing_system import plan_system
+from fulmar_bringup.system import varied_system
+from fulmar_cli.extras import check_plan
+from fulmar_core.errors import ConfigError, FulmarError
+from hardware_drivers.presence import check_presence
+from hardware_drivers.settings import load_hardware
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """Arguments of `fulmar service install`."""
+
+    system: str
+    robot: str | None
+    name: str | None
+    task: str | None
+    controller: str | None
+    backend: str | None
+    hardware: str | None
+    policy: Path | None
+    recording: str
+    user: str | None
+
+
+@dataclass(frozen=True)
+class PlannedService:
+    """A service with its files, which are not written yet."""
+
+    service: Service
+    files: Files
+    unit: str
+    rules: tuple[str, ...]
+
+    @property
+    def texts(self) -> dict[Path, str]:
+        """Content of each file."""
+        rules = {self.files.rules: "\n".join((*self.rules, ""))} if self.rules else {}
+        return {self.files.unit: self.unit, **rules}
+
+    def write(self) -> tuple[list[Path], bool]:
+        """Write the files, and start the service where systemd runs; returns the files, and whether it was started."""
+        written = write_files(self.files, self.unit, self.rules)
+        if not systemd_runs(self.files.root):
+            return written, False
+        if self.rules and shutil.which("udevadm"):
+            for step in (("control", "--reload"), ("trigger",)):
+                subprocess.run(["udevadm", *step], check=False)
+        systemctl("daemon-reload")
+        systemctl("restart", self.service.unit)
+        return written, True
+
+
+def plan_service(wanted: Wanted, root: Path, *, dry_run: bool) -> PlannedService:
+    """Check a service, and make its texts.
+
+    Args:
+        wanted: What is asked for.
+        root: Folder that stands for /.
+        dry_run: Whether nothing is to be written, which needs no right to.
+
+    Raises:
+        ConfigError: A name or a file is wrong, an extra is missing, or the user is root or unknown.
+    """
+    hardware = wanted.hardware
+    if hardware is not None and hardware.endswith(".yaml"):
+        hardware = str(Path(hardware).absolute())  # the service has another working folder
+    chosen = varied_system(
+        wanted.system,
+        robot=wanted.robot,
+        robot_name=wanted.name,
+        task=wanted.task,
+        controller=wanted.controller,
+        backend=wanted.backend,
+        hardware=hardware,
+    )
+    policy = wanted.policy.absolute() if wanted.policy else None
+    request = plan_system(
+        chosen, record=Path("runs/planned"), command="", policy=policy, hardware=hardware,
+        recording=wanted.recording, unattended=True,
+    )  # fmt: skip
+    check_plan(request.plan)
+    if root == Path("/") and not dry_run and os.geteuid() != 0:
+        raise ConfigError(
+            f"only root may write below /etc: sudo {_program()} {' '.join(sys.argv[1:])}   # or --root DIR"
+        )
+    rules: tuple[str, ...] = ()
+    groups: tuple[str, ...] = ()
+    if request.plan.hardware:
+        file = load_hardware(request.plan.hardware)
+        rules, groups = device_rules(file), device_groups(file)
+        if root == Path("/"):
+            _warn_of_absence(request.plan.hardware)
+    service = Service(
+        f"{wanted.system}-{wanted.name}" if wanted.name else wanted.system,
+        wanted.system,
+        (str(_program()), "up", wanted.system, "--service", *_options(wanted, hardware, policy)),
+        _user(wanted.user, root),
+        known_groups(groups, (group.gr_name for group in grp.getgrall())),
+    )
+    return PlannedService(service, Files(root, service.name), unit_text(service, os.environ), rules)
+
+
+def _options(wanted: Wanted, hardware: str | None, policy: Path | None) -> list[str]:
+    given = {
+        "robot": wanted.robot, "name": wanted.name, "task": wanted.task, "controller": wanted.controller,
+        "backend": wanted.backend, "hardware": hardware, "policy": policy, "recording": wanted.recording,
+    }  # fmt: skip
+    return [word for key, value in given.items() if value is not None for word in (f"--{key}", str(value))]
+
+
+def _program() -> Path:
+    """The command in use: the script beside this interpreter."""
+    beside = Path(sys.executable).with_name("fulmar")
+    found = beside if beside.exists() else shutil.which("fulmar")
+    if found is None:
+        raise ConfigError("the command 'fulmar' was not found beside this Python or on PATH.")
+    return Path(found).absolute()
+
+
+def _user(name: str | None, root: Path) -> str:
+    """Who runs the service: never root, whose files and devices a mistake would reach."""
+    chosen = name or os.environ.get("SUDO_USER") or pwd.getpwuid(os.geteuid()).pw_name
+    if chosen == "root":
+        raise ConfigError("a service does not run as root: name who runs it by --user NAME.")
+    if root == Path("/"):
+        try:
+            pwd.getpwnam(chosen)
+        except KeyError:
+            raise ConfigError(
+                f"there is no user '{chosen}' here. Make one: sudo useradd --create-home {chosen}"
+            ) from None
+    return chosen
+
+
+def _warn_of_absence(hardware: str) -> None:
+    try:
+        check_presence(load_hardware(hardware).driver)
+    except FulmarError as error:
+        warn([f"{error} The service is installed all the same, and tries again when it starts."])

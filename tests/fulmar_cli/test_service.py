@@ -1,0 +1,160 @@
+"""`fulmar service`: its files, its mistakes, and what systemd says of the unit; `tests/ros/test_service.py` runs it."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import subprocess
+
+import pytest
+
+from fulmar_bringup.service.device_rules import device_groups, device_rules
+from fulmar_bringup.service.unit import RT_LIMIT, Service, command_of, system_of_unit, unit_text
+from fulmar_core.errors import BAD_USAGE, DONE, FAILED
+from fulmar_core.paths import config_names
+from hardware_drivers.settings import load_hardware
+
+USER = "games"  # every Debian has this user, and systemd warns of `nobody`
+
+
+@pytest.fixture
+def service(fulmar, tmp_path):
+    """Function that runs `fulmar service` below a folder; returns exit code, output and messages."""
+
+    def run(*arguments):
+        return fulmar("service", *arguments, "--root", str(tmp_path))
+
+    return run
+
+
+def unit_of(tmp_path, name):
+    return tmp_path / f"etc/systemd/system/fulmar-{name}.service"
+
+
+def test_what_install_writes_is_listed_and_removed_again(service, tmp_path):
+    code, printed, _ = service("install", "mujoco_lqr", "--user", USER, "--json")
+    assert code == DONE
+    written = json.loads(printed)
+    assert (written["service"], written["started"]) == ("mujoco_lqr", False)
+    link = tmp_path / "etc/systemd/system/multi-user.target.wants/fulmar-mujoco_lqr.service"
+    assert set(written["files"]) == {str(unit_of(tmp_path, "mujoco_lqr")), str(link)}
+    assert link.resolve() == unit_of(tmp_path, "mujoco_lqr").resolve()
+    (state,) = json.loads(service("status", "--json")[1])["services"]
+    assert (state["name"], state["system"], state["at_boot"]) == ("mujoco_lqr", "mujoco_lqr", True)
+    assert service("remove", "mujoco_lqr")[0] == DONE
+    assert not [path for path in tmp_path.rglob("*") if not path.is_dir()]
+
+
+@pytest.mark.parametrize(
+    ("system", "more"),
+    [
+        ("mujoco_policy", ()),
+        ("mujoco_lab", ("--name", "alpha", "--recording", "whole")),
+        ("mujoco_classical", ("--backend", "hardware", "--hardware", "turtlebot2")),
+        ("mujoco_lab", ("--backend", "hardware")),
+    ],
+)
+def test_systemd_finds_no_mistake_in_a_unit(system, more, service, tmp_path):
+    code, _, messages = service("install", system, *more, "--user", USER)
+    assert code == DONE, messages
+    (unit,) = (tmp_path / "etc/systemd/system").glob("fulmar-*.service")
+    assert shutil.which("systemd-analyze"), "apt install systemd: the unit is checked by systemd itself"
+    checked = subprocess.run(["systemd-analyze", "verify", unit], capture_output=True, text=True, check=False)
+    said = [line for line in checked.stderr.splitlines() if unit.name in line]
+    assert (checked.returncode, said) == (0, [])
+
+
+def test_a_unit_restarts_with_a_limit_stops_gently_and_is_nothing_of_root(service, tmp_path):
+    service("install", "mujoco_lqr", "--user", USER)
+    text = unit_of(tmp_path, "mujoco_lqr").read_text()
+    for line in (
+        f"User={USER}", "Restart=on-failure", "StartLimitBurst=5", "KillSignal=SIGTERM", "NoNewPrivileges=yes",
+        f"LimitRTPRIO={RT_LIMIT}", "LimitMEMLOCK=infinity", "WantedBy=multi-user.target", "StandardOutput=journal",
+    ):  # fmt: skip
+        assert f"\n{line}\n" in text
+    assert command_of(text)[1:4] == ("up", "mujoco_lqr", "--service")
+
+
+def test_a_unit_has_the_ros_settings_of_the_one_who_installs(service, tmp_path, monkeypatch):
+    monkeypatch.setenv("ROS_DOMAIN_ID", "42")
+    monkeypatch.setenv("HOME_OF_SECRETS", "1")
+    service("install", "mujoco_lqr", "--user", USER)
+    text = unit_of(tmp_path, "mujoco_lqr").read_text()
+    assert "Environment=ROS_DOMAIN_ID=42\n" in text
+    assert "SECRETS" not in text
+
+
+@pytest.mark.parametrize("word", ["/a b/fulmar", 'quo"ted', "100%", "$HOME", "back\\slash", "plain"])
+def test_words_of_the_command_survive_systemd_s_quoting(word):
+    text = unit_text(Service("a", "a system", ("/bin/fulmar", word), USER), {})
+    assert command_of(text) == ("/bin/fulmar", word)
+    assert system_of_unit(text) == "a system"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "words"),
+    [
+        (("install", "mujoco_lqrr", "--user", USER), BAD_USAGE, "Did you mean 'mujoco_lqr'"),
+        (("install", "mujoco_lqr", "--user", "root"), BAD_USAGE, "does not run as root"),
+        (("install", "mujoco_lqr", "--backend", "hardware", "--hardware", "a.yaml"), BAD_USAGE, "a.yaml"),
+        (("remove", "mujoco_lqr"), BAD_USAGE, "no service is installed"),
+        (("status", "mujoco_lqr"), BAD_USAGE, "no service is installed"),
+    ],
+)  # fmt: skip
+def test_a_mistake_is_one_line_and_writes_nothing(arguments, code, words, service, tmp_path):
+    found, _, messages = service(*arguments)
+    assert found == code
+    assert words in messages
+    assert len(messages.strip().splitlines()) == 1
+    assert not [path for path in tmp_path.rglob("*") if not path.is_dir()]
+
+
+def test_a_user_who_is_not_there_is_one_line(fulmar):
+    code, _, messages = fulmar("service", "install", "mujoco_lqr", "--user", "not_there", "--dry-run")
+    assert code == BAD_USAGE
+    assert "there is no user 'not_there'" in messages
+
+
+def test_a_unit_of_someone_else_is_left_alone(service, tmp_path):
+    path = unit_of(tmp_path, "mujoco_lqr")
+    path.parent.mkdir(parents=True)
+    path.write_text("[Unit]\n")
+    code, _, messages = service("install", "mujoco_lqr", "--user", USER)
+    assert code == BAD_USAGE
+    assert "not written by `fulmar service install`" in messages
+    assert path.read_text() == "[Unit]\n"
+
+
+def test_a_folder_that_cannot_be_written_is_one_line(service, tmp_path):
+    (tmp_path / "etc").write_text("a file")
+    code, _, messages = service("install", "mujoco_lqr", "--user", USER)
+    assert code == FAILED
+    assert len(messages.strip().splitlines()) == 1
+
+
+def test_nothing_is_written_where_only_the_files_are_asked_for(service, tmp_path):
+    code, printed, _ = service("install", "mujoco_lab", "--backend", "hardware", "--user", USER, "--dry-run")
+    assert code == DONE
+    assert "ExecStart=" in printed
+    assert 'KERNEL=="gpiochip0"' in printed
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("name", config_names("hardware"))
+def test_each_device_below_dev_has_a_rule_of_matches_and_assignments(name):
+    hardware = load_hardware(name)
+    rules = device_rules(hardware)
+    assert bool(rules) == str(getattr(hardware.driver, "port", "")).startswith("/dev/")
+    assert bool(device_groups(hardware)) == bool(rules)
+    for rule in rules:
+        for part in rule.split(", "):
+            assert re.fullmatch(
+                r'(ATTRS\{\w+\}|SUBSYSTEM|KERNEL)=="[^"]+"|(MODE|GROUP)="[^"]+"|SYMLINK\+="\w+"', part
+            )
+
+
+def test_files_are_written_anew_by_a_second_installation(service, tmp_path):
+    service("install", "mujoco_lqr", "--user", USER)
+    assert service("install", "mujoco_lqr", "--user", USER, "--recording", "whole")[0] == DONE
+    assert "--recording whole" in unit_of(tmp_path, "mujoco_lqr").read_text()
