@@ -8,12 +8,13 @@ from importlib.metadata import PackageNotFoundError, version
 
 from fulmar_cli.diagnosis.check_result import Finding
 from fulmar_cli.extras import EXTRAS
+from fulmar_cli.installed_as import install_command
 from fulmar_core.errors import FulmarError
 from fulmar_core.paths import config_directories, config_names
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 
-OLDEST_PYTHON, NEWEST_PYTHON = (3, 11), (3, 13)
+OLDEST_PYTHON, NEWEST_PYTHON = (3, 11), (3, 14)
 
 
 def check_python(found: tuple[int, ...] = sys.version_info[:3]) -> Finding:
@@ -38,8 +39,7 @@ def check_module(module: str, extra: str) -> Finding:
     try:
         importlib.import_module(module)
     except ImportError as error:
-        fix = f"make setup   # in the checkout; it brings the extra '{extra}'"
-        return Finding(module, "wrong", str(error), fix)
+        return Finding(module, "wrong", str(error), install_command(extra, module))
     try:
         return Finding(module, "ok", version(module))
     except PackageNotFoundError:
