@@ -39,7 +39,8 @@ def check_module(module: str, extra: str) -> Finding:
     try:
         importlib.import_module(module)
     except ImportError as error:
-        return Finding(module, "wrong", str(error), install_command(extra, module))
+        fix = f"{install_command(extra, module)}   # brings the extra '{extra}'"
+        return Finding(module, "wrong", str(error), fix)
     try:
         return Finding(module, "ok", version(module))
     except PackageNotFoundError:
