@@ -66,7 +66,7 @@ install_fulmar = $(BIN)/python -m pip install --disable-pip-version-check --quie
 help: ## Show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' Makefile
 	@echo
-	@echo "  PYTHON=python3.12    interpreter of .venv (3.11 to 3.13)"
+	@echo "  PYTHON=python3.12    interpreter of .venv (3.11 to 3.14)"
 	@echo "  PYTEST_ARGS='-k lqr' more arguments for pytest in 'make test'"
 
 .PHONY: setup
@@ -82,8 +82,8 @@ dev: $(DEV_STAMP) $(TF_STAMP) ## Install everything, also for training and tests
 peers: $(PEERS_STAMP) ## Install the outside programs that tests compare with, into .venv-peers (8.3 GiB)
 
 $(VENV)/bin/python $(PEERS)/bin/python:
-	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' || { \
-		echo "'$(PYTHON)' is $$($(PYTHON) --version 2>&1 || true), but Fulmar needs Python 3.11, 3.12 or 3.13." >&2; \
+	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 14))' || { \
+		echo "'$(PYTHON)' is $$($(PYTHON) --version 2>&1 || true), but Fulmar needs Python 3.11, 3.12, 3.13 or 3.14." >&2; \
 		echo "Name one that you have: make $(or $(MAKECMDGOALS),setup) PYTHON=python3.12" >&2; exit 1; }
 	@$(PYTHON) -m venv $(@:/bin/python=) || { rm -rf $(@:/bin/python=); \
 		echo "'$(PYTHON) -m venv' failed, see above. On Debian and Ubuntu: apt install python3-venv" >&2; exit 1; }
@@ -189,15 +189,14 @@ format: dev ## Format the sources and apply the safe fixes of the linter
 ros-build: dev ## Build the ROS workspace with colcon, into ros2_ws/{build,install,log}
 	cd ros2_ws && PATH="$$PWD/../$(BIN):$$PATH" ../$(BIN)/colcon build --base-paths src
 
-# Universal: one file serves Python 3.11 to 3.13. Neither command nor index is written into it. Extras stay: pip before
+# Universal: one file serves Python 3.11 to 3.14. Neither command nor index is written into it. Extras stay: pip before
 # 23.3 does not see that `coverage` is pinned where `coverage[toml]` is wanted, and takes the newest.
 compile = $(BIN)/uv pip compile --universal --python-version 3.11 --fork-strategy fewest \
 	--generate-hashes --no-strip-extras --no-header --no-annotate --quiet
 
 .PHONY: lock
 lock: $(DEV_STAMP) ## Make the locks anew (UPGRADE=1 takes the newest versions)
-	$(compile) $(if $(UPGRADE),--upgrade) pyproject.toml --extra ros --extra sim --extra policy --extra bags --extra hardware \
-		--extra view --group build --output-file $(RUN_LOCK)
+	$(compile) $(if $(UPGRADE),--upgrade) pyproject.toml --extra run --group build --output-file $(RUN_LOCK)
 	$(compile) $(if $(UPGRADE),--upgrade) pyproject.toml --all-extras --group dev --constraint $(RUN_LOCK) \
 		--output-file $(DEV_LOCK)
 	$(compile) $(if $(UPGRADE),--upgrade) pyproject.toml --extra ros --extra policy --extra bags --extra hardware \

@@ -11,9 +11,11 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 from packaging.version import Version
 
+from fulmar_cli.installed_as import EXTRAS_OF_SETUP
+
 RUN_LOCK, DEV_LOCK, PEERS_LOCK = "requirements.lock", "requirements-dev.lock", "requirements-peers.lock"
 LOCKS = [RUN_LOCK, DEV_LOCK, PEERS_LOCK]
-PYTHONS = ["3.11", "3.12", "3.13"]
+PYTHONS = ["3.11", "3.12", "3.13", "3.14"]
 RUN_EXTRAS = ["ros", "sim", "policy", "bags", "hardware", "view"]
 DEV_EXTRAS = ["datasets", "train", "cluster", "wandb"]
 INSTALLED = [
@@ -31,9 +33,9 @@ def entries(text):
             yield Requirement(pin.strip()), hashes
 
 
-def versions(text, python):
-    """What a lock installs on Linux x86-64 with one Python: {name: version}."""
-    machine = {
+def machine(python):
+    """Linux on x86-64 with one Python, for the markers of requirements."""
+    return {
         "python_version": python,
         "python_full_version": f"{python}.0",
         "sys_platform": "linux",
@@ -42,10 +44,14 @@ def versions(text, python):
         "implementation_name": "cpython",
         "platform_python_implementation": "CPython",
     }
+
+
+def versions(text, python):
+    """What a lock installs on Linux x86-64 with one Python: {name: version}."""
     return {
         canonicalize_name(requirement.name): str(requirement.specifier).removeprefix("==")
         for requirement, _ in entries(text)
-        if requirement.marker is None or requirement.marker.evaluate(machine)
+        if requirement.marker is None or requirement.marker.evaluate(machine(python))
     }
 
 
@@ -59,14 +65,15 @@ def locks(repository):
     return {name: (repository / name).read_text() for name in LOCKS}
 
 
-def wanted(project, extras, groups):
-    """Requirements of some extras and groups in pyproject.toml; extras None: without Fulmar itself."""
+def wanted(project, extras, groups, python):
+    """Requirements of some extras and groups with one Python; extras None: without Fulmar itself."""
     texts = [] if extras is None else [*project["project"]["dependencies"]]
     for extra in extras or ():
         texts += project["project"]["optional-dependencies"][extra]
     for group in groups:
         texts += [text for text in project["dependency-groups"][group] if isinstance(text, str)]
-    return [Requirement(text) for text in texts]
+    requirements = map(Requirement, texts)
+    return [one for one in requirements if one.marker is None or one.marker.evaluate(machine(python))]
 
 
 @pytest.mark.parametrize("name", LOCKS)
@@ -97,7 +104,7 @@ def test_every_pin_is_exact_and_hashed(locks, name):
 def test_a_pin_has_every_required_extra(project, locks, name, extras, groups):
     """Without it, pip before 23.3 selects the newest version of the extra, and then lacks its hash."""
     pinned = {canonicalize_name(requirement.name): requirement for requirement, _ in entries(locks[name])}
-    all_wanted = wanted(project, extras, groups) + [
+    all_wanted = wanted(project, extras, groups, "3.11") + [
         one for requirement in pinned.values() for one in wanted_by(requirement)
     ]
     with_extras = [one for one in all_wanted if one.extras]
@@ -123,7 +130,7 @@ def wanted_by(requirement):
 @pytest.mark.parametrize(("name", "extras", "groups"), INSTALLED)
 def test_the_pins_satisfy_pyproject(project, locks, name, extras, groups, python):
     pinned = versions(locks[name], python)
-    for requirement in wanted(project, extras, groups):
+    for requirement in wanted(project, extras, groups, python):
         version = pinned.get(canonicalize_name(requirement.name))
         assert version is not None, f"{requirement.name} is not in {name}. Run `make lock`."
         assert requirement.specifier.contains(version, prereleases=True), (
@@ -132,7 +139,12 @@ def test_the_pins_satisfy_pyproject(project, locks, name, extras, groups, python
 
 
 def test_the_locks_have_every_extra(project):
-    assert set(project["project"]["optional-dependencies"]) == {*RUN_EXTRAS, *DEV_EXTRAS}
+    assert set(project["project"]["optional-dependencies"]) == {*RUN_EXTRAS, *DEV_EXTRAS, "run"}
+
+
+def test_the_extra_run_is_what_the_run_time_lock_has(project):
+    assert project["project"]["optional-dependencies"]["run"] == [f"fulmar[{','.join(RUN_EXTRAS)}]"]
+    assert tuple(RUN_EXTRAS) == EXTRAS_OF_SETUP
 
 
 def test_the_run_time_lock_can_build_the_editable_installation(project, locks):

@@ -170,7 +170,7 @@ def test_the_demo_needs_no_learning_library(make):
 def test_an_old_interpreter_gets_one_clear_line(make, tmp_path):
     result = make("setup", too_old=True)
     assert result.returncode != 0
-    assert "is Python 3.9.2, but Fulmar needs Python 3.11, 3.12 or 3.13." in result.stderr
+    assert "is Python 3.9.2, but Fulmar needs Python 3.11, 3.12, 3.13 or 3.14." in result.stderr
     assert "make setup PYTHON=python3.12" in result.stderr
     assert not (tmp_path / ".venv").exists()
 

@@ -6,6 +6,7 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 from fulmar_bringup.console import log_line
+from fulmar_cli.installed_as import install_command
 from fulmar_core.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -84,6 +85,6 @@ def _advice(module: str) -> str | None:
         if module in modules:
             return (
                 f"this command needs '{module}', which the extra '{extra}' brings. "
-                f"Run `make dev` in the checkout, or install 'fulmar[{extra}]'."
+                f"Run: {install_command(extra, module)}"
             )
     return None

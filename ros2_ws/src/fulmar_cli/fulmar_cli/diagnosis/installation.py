@@ -9,6 +9,7 @@ from importlib.util import find_spec
 
 from fulmar_cli.diagnosis.check_result import Finding
 from fulmar_cli.extras import EXTRAS
+from fulmar_cli.installed_as import install_command
 from fulmar_core.errors import FulmarError
 from fulmar_core.paths import config_directories, config_names
 from fulmar_core.robot import load_robot
@@ -39,7 +40,7 @@ def check_module(module: str, extra: str) -> Finding:
     try:
         importlib.import_module(module)
     except ImportError as error:
-        fix = f"make setup   # in the checkout; it brings the extra '{extra}'"
+        fix = f"{install_command(extra, module)}   # brings the extra '{extra}'"
         return Finding(module, "wrong", str(error), fix)
     try:
         return Finding(module, "ok", version(module))

@@ -1,0 +1,77 @@
+"""The wheel: it has what the commands read, and nothing else."""
+
+from __future__ import annotations
+
+import email
+import re
+import subprocess
+import tomllib
+import zipfile
+
+import pytest
+
+SOURCES = "ros2_ws/src/"
+IN_SOURCES = ("core", "bags", "ros", "bringup", "evaluation", "benchmarks", "cli")
+# Folders of the repository, and where the wheel has what is in them.
+PLACES = {
+    "configs/": "fulmar_core/configs/",
+    "ros2_ws/src/fulmar_bringup/launch/": "fulmar_bringup/launch/",
+    "ros2_ws/src/fulmar_bringup/layouts/": "fulmar_bringup/layouts/",
+    **{f"{SOURCES}fulmar_{name}/fulmar_{name}/": f"fulmar_{name}/" for name in IN_SOURCES},
+    **{f"{name}/": f"{name}/" for name in ("sim_nodes", "policy_server", "hardware_drivers", "training")},
+}
+
+
+@pytest.fixture(scope="module")
+def content(wheel):
+    """Names of the wheel's files, without its own description."""
+    with zipfile.ZipFile(wheel) as archive:
+        return {name for name in archive.namelist() if ".dist-info/" not in name}
+
+
+@pytest.fixture(scope="module")
+def description(wheel):
+    with zipfile.ZipFile(wheel) as archive:
+        (name,) = (name for name in archive.namelist() if name.endswith(".dist-info/METADATA"))
+        return email.message_from_bytes(archive.read(name))
+
+
+def kept(repository):
+    """Files of the repository that git keeps, or would keep."""
+    words = ["git", "ls-files", "--cached", "--others", "--exclude-standard"]
+    return subprocess.run(words, cwd=repository, capture_output=True, text=True, check=True).stdout.split(
+        "\n"
+    )
+
+
+def test_it_has_every_file_of_every_package_and_nothing_else(repository, content):
+    wanted = {
+        target + path.removeprefix(source)
+        for path in kept(repository)
+        for source, target in PLACES.items()
+        if path.startswith(source) and (repository / path).is_file()
+    }
+    assert {"sim_nodes/sim_node.py", "fulmar_ros/fast_dds.xml", "fulmar_core/configs/policies.yaml"} <= wanted
+    assert content == wanted
+
+
+def test_it_is_small(wheel):
+    assert wheel.stat().st_size < 5_000_000
+
+
+def test_its_metadata_is_that_of_the_project(repository, description):
+    project = tomllib.loads((repository / "pyproject.toml").read_text())["project"]
+    assert description["Version"] == project["version"]
+    assert set(description["Requires-Python"].split(",")) == set(project["requires-python"].split(","))
+    assert set(description.get_all("Provides-Extra")) == set(project["optional-dependencies"])
+
+
+def test_its_description_has_no_relative_link(description):
+    text = description.get_payload()
+    assert "pip install" in text
+    assert re.findall(r"\]\((?!https:)", text) == []
+
+
+def test_the_pages_name_the_file_that_is_built(repository, wheel):
+    page = (repository / "docs" / "installation.md").read_text()
+    assert set(re.findall(r"fulmar-[\w.-]+\.whl", page)) == {wheel.name}
