@@ -15,7 +15,6 @@ from fulmar_core.robot import load_robot
 from fulmar_core.robot_name import frames_of
 from fulmar_core.topics import DESCRIPTION, ODOMETRY, STATIC_TRANSFORMS, TRANSFORMS
 from fulmar_core.urdf import body_frames, urdf_of
-from fulmar_ros.frame_wires import BATCH
 from fulmar_ros.plant_node import PlantNode
 from fulmar_ros.qos import subscriber_qos
 from fulmar_ros.runtime import spinning
@@ -154,8 +153,7 @@ def test_a_bag_has_the_model_and_the_frames(robot, more, ros_domain, tmp_path):
     stamps = [each.header.stamp.sec * NS + each.header.stamp.nanosec for each in transforms]
     np.testing.assert_array_equal(stamps, stamps_ns(bag.of(ODOMETRY)))
     assert {each.child_frame_id for each in transforms} == {frames.base}
-    together = 1 if "--estimator" in more else BATCH
-    assert {len(message) for message in received[:-1]} == {together}
+    assert {len(message) for message in received} == {1}
 
 
 @pytest.mark.slow

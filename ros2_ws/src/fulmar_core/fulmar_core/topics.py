@@ -172,8 +172,8 @@ ANSWER = Wire(
 )  # fmt: skip
 TRANSFORMS = Wire(
     "/tf", "tf2_msgs/msg/TFMessage", "plant", "stream", "with each odometry, where tf2_msgs is installed",
-    "`odom` → `base_link` of the odometry's publisher, in lock step ten in a message, and what other nodes publish; "
-    "not used for control", unit="m", frame="each its own",
+    "`odom` → `base_link` of the odometry's publisher, and what other nodes publish; not used for control", unit="m",
+    frame="each its own",
 )  # fmt: skip
 STATIC_TRANSFORMS = Wire(
     "/tf_static", "tf2_msgs/msg/TFMessage", "plant", "latched", "at load, where tf2_msgs is installed",

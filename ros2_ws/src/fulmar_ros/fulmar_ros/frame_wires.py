@@ -11,7 +11,6 @@ from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 from std_msgs.msg import String
 
-from fulmar_bags.message_reader import NS
 from fulmar_core.robot import Robot
 from fulmar_core.robot_name import Frames
 from fulmar_core.state import RigidBodyState
@@ -24,14 +23,8 @@ from fulmar_ros.wire_image import WireImage, marks
 TFMessage: Any = message_class(TRANSFORMS)  # None where tf2_msgs is not installed
 
 
-BATCH = 10  # poses in a message of lock step, where each message costs pace [-]
-
-
 class OdometryTransform:
-    """`odom` → `base_link` on /tf; whoever publishes the odometry has one.
-
-    Messages of lock step are cut by the number of poses, not by time, so that two runs have the same ones.
-    """
+    """`odom` → `base_link` on /tf; whoever publishes the odometry has one."""
 
     def __init__(
         self,
@@ -40,7 +33,6 @@ class OdometryTransform:
         *,
         publish: Callable[[Publisher, Any], None] = Publisher.publish,
         lockstep: bool = False,
-        batch: int = 1,
     ) -> None:
         """Create the publisher.
 
@@ -49,42 +41,23 @@ class OdometryTransform:
             frames: Of the robot.
             publish: Publishes a message, or its bytes.
             lockstep: As of `publisher_qos`.
-            batch: Poses in a message, >= 1; `flush` sends fewer.
         """
-        message = _fixed(frames.odom, frames.base)
+        message = TransformStamped()
+        message.header.frame_id, message.child_frame_id = frames.odom, frames.base
         p, q = message.transform.translation, message.transform.rotation
         p.x, p.y, p.z, q.x, q.y, q.z, q.w = numbers = marks(7)
         self._image = WireImage(
             TFMessage(transforms=[message]), numbers, texts=(frames.odom, frames.base), before=1
         )
-        self._waiting = [
-            _fixed(frames.odom, frames.base) for _ in range(batch)
-        ]  # those before `_count` are filled
-        self._count = 0
         self._publish = publish
         self.publisher = node.create_publisher(
             TFMessage, TRANSFORMS.name, publisher_qos(TRANSFORMS, lockstep=lockstep)
         )
 
     def publish(self, state: RigidBodyState, time_ns: int) -> None:
-        """Publish a pose, measured at a time [ns], as soon as its batch is full."""
+        """Publish a pose, measured at a time [ns]."""
         pose = (*state.position_in_world.tolist(), *state.quat_xyzw.tolist())
-        if len(self._waiting) == 1:
-            self._publish(self.publisher, self._image.write(time_ns, pose))
-            return
-        message = self._waiting[self._count]
-        stamp, p, q = message.header.stamp, message.transform.translation, message.transform.rotation
-        stamp.sec, stamp.nanosec = divmod(time_ns, NS)
-        p.x, p.y, p.z, q.x, q.y, q.z, q.w = pose
-        self._count += 1
-        if self._count == len(self._waiting):
-            self.flush()
-
-    def flush(self) -> None:
-        """Publish the poses that wait for their batch to be full."""
-        if self._count:
-            waiting, self._count = self._waiting[: self._count], 0
-            self._publish(self.publisher, TFMessage(transforms=waiting))
+        self._publish(self.publisher, self._image.write(time_ns, pose))
 
 
 def odometry_transform(

@@ -191,7 +191,6 @@ class PlantNode(LifecycleNode):
         with self.wires.lock:
             self.guard.reset()  # actuators begin at rest, not where the episode before left them
         self._lockstep.run(sample, steps, self._stop, on_step)
-        self.wires.end_transforms()
 
     def _clock_is_taken(self) -> bool:
         """Whether another node publishes the clock already; logs that ours is left out then."""

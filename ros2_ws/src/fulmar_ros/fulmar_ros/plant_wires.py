@@ -47,7 +47,7 @@ from fulmar_ros.convert import (
     stamp_of,
 )
 from fulmar_ros.deadline import Spread
-from fulmar_ros.frame_wires import BATCH, ModelWires, odometry_transform
+from fulmar_ros.frame_wires import ModelWires, odometry_transform
 from fulmar_ros.graph import writers_of
 from fulmar_ros.motion_capture import MakeCapture
 from fulmar_ros.operator_subscription import subscribe_operator
@@ -117,14 +117,8 @@ class PlantWires:
             self._publish = self._period.publish
         frames = own_frames(node, robot)
         transform = odometry_transform(
-            node,
-            frames,
-            wanted=transforms and odometry,
-            publish=publish,
-            lockstep=lockstep,
-            batch=BATCH if lockstep else 1,
+            node, frames, wanted=transforms and odometry, publish=publish, lockstep=lockstep
         )
-        self._transform = transform
         self._sensors = SensorWires(
             node, robot, frames, qos, self._publish, odometry=odometry, transform=transform
         )
@@ -256,13 +250,7 @@ class PlantWires:
 
     def flush(self) -> None:
         """Wait for a limited time until every subscriber has the last states."""
-        self.end_transforms()
         flush(self._publishers(), self._flush_s)
-
-    def end_transforms(self) -> None:
-        """Publish the transforms that wait for others."""
-        if self._transform is not None:
-            self._transform.flush()
 
     def wait_for_answer(self, time_ns: int, timeout_s: float) -> bool:
         """Wait until a command answers the odometry of this stamp; call with `lock` held."""
