@@ -33,9 +33,8 @@ class DifferentialBase(Chassis):
         drive, body = self._drive, super().add(spec)
         for name, (x, y) in self.places.items():
             self.add_wheel(body, name, (x, y, 0.0))
-        self.add_caster(body, "rear_caster", -abs(drive.caster_x))
-        if drive.caster_x > 0.0:
-            self.add_caster(body, "front_caster", drive.caster_x)
+        for name, x in drive.casters.items():
+            self.add_caster(body, name, x)
         for wheel in self.places:
             self.add_wheel_servo(spec, wheel, force=drive.wheel_force, response=drive.response)
         return body

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from fulmar_core.actuators.response import Response
-from fulmar_core.actuators.rolling import SERVO_S
+from fulmar_core.actuators.rolling import CASTER_RADIUS, SERVO_S
 from fulmar_core.disturbances.world import World
 from fulmar_core.dynamics.hydrodynamics import GRAVITY
 from fulmar_core.planar import PlanarState, PlanarWrench
@@ -109,7 +109,7 @@ class Chassis:
 
     def add_caster(self, body: mujoco.MjsBody, name: str, x: float) -> None:
         """Add one ball that slides on the floor without friction."""
-        radius = 0.4 * self.radius
+        radius = CASTER_RADIUS * self.radius
         body.add_geom(
             name=name,
             type=mujoco.mjtGeom.mjGEOM_SPHERE,

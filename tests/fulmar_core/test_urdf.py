@@ -54,6 +54,19 @@ def test_each_actuator_has_a_frame_at_its_place_along_its_force(name):
             np.testing.assert_allclose(place[:3, 1], (0.0, 1.0, 0.0), atol=1e-12)
 
 
+@pytest.mark.parametrize(
+    ("name", "places"), [("turtlebot2", (-0.135, 0.135)), ("jetbot", (-0.06,)), ("leatherback", ())]
+)
+def test_casters_touch_the_floor_on_which_the_wheels_stand(name, places):
+    robot, model = load_robot(name), read(load_robot(name))
+    casters = {link.name: link for link in model.robot.links if link.name.endswith("caster_link")}
+    assert tuple(model.get_transform(caster, "base_link")[0, 3] for caster in casters) == places
+    for caster, link in casters.items():
+        (ball,) = link.visuals
+        lowest = model.get_transform(caster, "base_link")[2, 3] - ball.geometry.sphere.radius
+        assert lowest == pytest.approx(-robot.actuators.wheel_radius, abs=1e-12)
+
+
 @pytest.mark.parametrize("name", ROBOTS)
 def test_mujoco_compiles_it_with_the_same_mass_and_moments(name):
     robot = load_robot(name)

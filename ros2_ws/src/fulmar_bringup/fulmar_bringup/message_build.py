@@ -10,6 +10,7 @@ import re
 import shutil
 import subprocess
 import sys
+import sysconfig
 import tempfile
 from collections.abc import Callable, Sequence
 from importlib.util import find_spec
@@ -44,24 +45,29 @@ def install_tf2_msgs(report: Callable[[str], None]) -> bool:
         prefix = Path(folder) / "environment"
         source = shutil.copytree(SOURCE, Path(folder) / "source")
         python = str(prefix / "bin" / "python")
+        # Packages on PYTHONPATH would pass for installed ones, and be missing where CMake looks.
+        clean = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
         pip = [python, "-m", "pip", "--disable-pip-version-check", "--no-input", "--quiet"]
         report("1/3 install ROS's generators of messages into a temporary environment (250 MB)")
-        _run([sys.executable, "-m", "venv", str(prefix)], "make an environment")
+        _run([sys.executable, "-m", "venv", str(prefix)], "make an environment", clean)
         lock = str(source / "requirements.lock")
-        _run([*pip, "install", "--require-hashes", "-r", lock], "install the generators")
+        _run([*pip, "install", "--require-hashes", "-r", lock], "install the generators", clean)
         report(f"2/3 compile {PACKAGE}")
         environment = {
-            **os.environ,
+            **clean,
             "PATH": f"{prefix / 'bin'}{os.pathsep}{os.environ.get('PATH', os.defpath)}",
             "AMENT_PREFIX_PATH": str(prefix),
             "CMAKE_PREFIX_PATH": str(prefix),
         }
-        environment.pop("PYTHONPATH", None)
         build = [*pip, "wheel", "--no-build-isolation", "--no-deps", "--wheel-dir", folder, str(source)]
         _run(build, "compile", environment)
         report(f"3/3 install it into {sys.prefix}")
         wheels = [str(wheel) for wheel in Path(folder).glob("*.whl")]
-        _run([*pip, "--python", sys.executable, "install", "--no-deps", "--no-index", *wheels], "install")
+        _run(
+            [*pip, "--python", sys.executable, "install", "--no-deps", "--no-index", *wheels],
+            "install",
+            clean,
+        )
     return True
 
 
@@ -74,13 +80,18 @@ def _check_tools() -> None:
                 f"no compiler was found ({', '.join(names)}; ${variable} names another one). "
                 "On Debian and Ubuntu: apt install g++ python3-dev"
             )
+    headers = Path(sysconfig.get_path("include"))
+    if not (headers / "Python.h").is_file():
+        raise ConfigError(
+            f"this Python has no headers ({headers / 'Python.h'}). On Debian and Ubuntu: apt install python3-dev"
+        )
     if find_spec("ensurepip") is None:
         raise ConfigError(
             "this Python cannot make environments. On Debian and Ubuntu: apt install python3-venv"
         )
 
 
-def _run(command: Sequence[str], step: str, environment: dict[str, str] | None = None) -> None:
+def _run(command: Sequence[str], step: str, environment: dict[str, str]) -> None:
     """Run a command in silence.
 
     Raises:

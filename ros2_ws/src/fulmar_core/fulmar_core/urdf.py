@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 from scipy.spatial.transform import Rotation
 
 from fulmar_core.actuators.pushing import Pushing
-from fulmar_core.actuators.rolling import Rolling
+from fulmar_core.actuators.rolling import CASTER_RADIUS, Rolling
 from fulmar_core.robot import Robot
 from fulmar_core.robot_name import PLAIN, Frames
 
@@ -40,7 +40,7 @@ def body_frames(robot: Robot) -> tuple[BodyFrame, ...]:
 
     Returns:
         `imu_link`, then `<name>_link` of each actuator that pushes, its x axis along the force of a positive command,
-        or of each wheel, its y axis along the axle.
+        or of each wheel, its y axis along the axle, and of each caster.
     """
     parts = [BodyFrame(IMU, (0.0, 0.0, 0.0))]
     if isinstance(robot.actuators, Pushing):
@@ -50,6 +50,8 @@ def body_frames(robot: Robot) -> tuple[BodyFrame, ...]:
         ]
     elif isinstance(robot.actuators, Rolling):
         parts += [BodyFrame(f"{name}_link", (x, y, 0.0)) for name, (x, y) in robot.actuators.wheels.items()]
+        sunk = (CASTER_RADIUS - 1.0) * robot.actuators.wheel_radius  # wheels and casters stand on one floor
+        parts += [BodyFrame(f"{name}_link", (x, 0.0, sunk)) for name, x in robot.actuators.casters.items()]
     return tuple(parts)
 
 
@@ -85,7 +87,7 @@ def urdf_of(robot: Robot, frames: Frames = PLAIN) -> str:
         name = frames.named(frame.name)
         link = ElementTree.SubElement(root, "link", name=name)
         if frame.name != IMU:
-            _add_part(ElementTree.SubElement(link, "visual"), robot)
+            _add_part(ElementTree.SubElement(link, "visual"), robot, frame)
         joint = ElementTree.SubElement(root, "joint", name=f"{name}_joint", type="fixed")
         _place(joint, frame.position, frame.rpy)
         ElementTree.SubElement(joint, "parent", link=frames.base)
@@ -101,10 +103,16 @@ def _add_hull(geometry: ElementTree.Element, robot: Robot, height: float) -> Non
         ElementTree.SubElement(geometry, "box", size=_numbers((*robot.body.footprint, height)))
 
 
-def _add_part(visual: ElementTree.Element, robot: Robot) -> None:
-    """Show a wheel, or a nozzle that ends where its force acts."""
+def _add_part(visual: ElementTree.Element, robot: Robot, frame: BodyFrame) -> None:
+    """Show a caster, a wheel, or a nozzle that ends where its force acts."""
     if isinstance(robot.actuators, Rolling):
         radius = robot.actuators.wheel_radius
+        if frame.name.removesuffix("_link") in robot.actuators.casters:
+            _place(visual, (0.0, 0.0, 0.0))
+            ball = ElementTree.SubElement(visual, "geometry")
+            ElementTree.SubElement(ball, "sphere", radius=_number(CASTER_RADIUS * radius))
+            _colour(visual, "wheel", WHEEL_COLOUR)
+            return
         _place(visual, (0.0, 0.0, 0.0), (0.5 * pi, 0.0, 0.0))
         _cylinder(ElementTree.SubElement(visual, "geometry"), radius, WHEEL_WIDTH * radius)
         _colour(visual, "wheel", WHEEL_COLOUR)

@@ -56,6 +56,12 @@ class DifferentialDrive(Rolling):
         return {"left_wheel": (0.0, half), "right_wheel": (0.0, -half)}
 
     @property
+    def casters(self) -> dict[str, float]:
+        """See `Rolling.casters`."""
+        rear = {"rear_caster": -abs(self.caster_x)}
+        return rear | {"front_caster": self.caster_x} if self.caster_x > 0.0 else rear
+
+    @property
     def scale(self) -> np.ndarray:
         """Largest command [m/s, rad/s]."""
         return np.array([self.max_speed, self.max_yaw_rate])

@@ -15,6 +15,7 @@ from fulmar_core.planar import PlanarState
 from fulmar_core.rotation import Array
 
 CLEARANCE = 0.4  # of the chassis above the floor, in wheel radii; our value [-]
+CASTER_RADIUS = 0.4  # of a ball caster, in wheel radii; our value [-]
 SERVO_S = 0.05  # time constant of a wheel's speed servo where the drive names none [s]
 
 
@@ -43,6 +44,11 @@ class Rolling(Actuators):
     @abstractmethod
     def wheels(self) -> dict[str, tuple[float, float]]:
         """Name of each wheel, and its place: ahead of the body's origin and to its left, at axle height [m]."""
+
+    @property
+    def casters(self) -> dict[str, float]:
+        """Name of each ball caster, and its place ahead of the body's origin [m]."""
+        return {}
 
     @abstractmethod
     def next_yaw_rate(
