@@ -10,11 +10,11 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.node import Node
 
-from fulmar_bringup.run_plan import PLANT
 from fulmar_core.robot_name import namespace_of
 from fulmar_core.safety.estop import HOLDS, SILENT
 from fulmar_core.safety.watchdog import NO_COMMAND
 from fulmar_core.topics import DIAGNOSTICS, ESTOP_TRIGGER
+from fulmar_ros.living_plant import PLANT
 from fulmar_ros.qos import subscriber_qos
 from fulmar_ros.runtime import ros_node
 

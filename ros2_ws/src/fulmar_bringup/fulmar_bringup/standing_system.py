@@ -81,6 +81,8 @@ def plan_system(
         raise ConfigError(
             "the controller of this system is external, and you start it. Use --only plant or another --controller."
         )
+    if only == CONTROLLER and recording is not None:
+        raise ConfigError("the recorder runs beside the plant: --recording goes with --only plant.")
     request = plan_run(
         robot=system.robot,
         name=system.name or None,
