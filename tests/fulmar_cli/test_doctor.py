@@ -158,7 +158,9 @@ def test_shared_memory_of_several_users_or_in_a_container_is_advised_against(tmp
     os.chown(tmp_path / "fastrtps_0123456789abcdef", os.getuid() + 1, -1)
     assert f"users {os.getuid()}, {os.getuid() + 1} share" in check().found
     assert (check().level, check().fix.split()[1]) == ("advice", "FASTDDS_BUILTIN_TRANSPORTS=UDPv4")
-    assert check(FASTDDS_BUILTIN_TRANSPORTS="UDPv4").level == "ok"
+    assert check(FASTDDS_BUILTIN_TRANSPORTS="UDPv4").level == "advice"
+    everywhere = {"FASTDDS_BUILTIN_TRANSPORTS": "UDPv4", "ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}
+    assert check(**everywhere).level == "ok"
 
 
 def test_publishers_that_do_not_reach_a_running_robot_are_named(monkeypatch):

@@ -56,7 +56,11 @@ class Containers:
         """Run a command in the controller's container, as its user; exit code and standard output."""
         command = in_container(self._hosts.other, [*FULMAR, *arguments], other_user=True)
         done = psutil.Popen(command, env=self._env, cwd="/", stdout=-1, stderr=-1, text=True)
-        output, errors = done.communicate(timeout=60.0)
+        try:
+            output, errors = done.communicate(timeout=60.0)
+        finally:
+            for process in [*done.children(recursive=True), done] if done.poll() is None else []:
+                process.kill()
         return int(done.returncode), output or errors
 
     def start_beside_controller(self, *arguments: str) -> Part:

@@ -19,7 +19,7 @@ from fulmar_ros.qos import subscriber_qos
 from fulmar_ros.runtime import ros_node
 
 REPORTING = ("plant", "controller", "recorder")  # nodes that publish diagnostics
-SETTLE_S = 0.4  # after the last node was discovered, for others
+SETTLE_S = 0.25  # after the last node was discovered, for others
 LOOK_S = 0.02
 LEVELS = {DiagnosticStatus.OK: "ok", DiagnosticStatus.WARN: "warn", DiagnosticStatus.ERROR: "error"}
 
@@ -104,12 +104,12 @@ class _Look:
         """Whether nothing is awaited any more."""
         if self._wanted is not None and self._wanted in REPORTING:
             robots = {robot for robot, node in self._reports if node == self._wanted}
-            return bool(robots) and (self._name is not None or self._settled(len(robots)))
+            return bool(robots) and (self._name is not None or self._settled())
         if self._wanted is not None:
-            return bool(self._discovered()) and self._settled(0)
-        return bool(self._reports) and self._settled(0) and not self._silent()
+            return bool(self._discovered()) and self._settled()
+        return bool(self._reports) and self._settled() and not self._silent()
 
-    def _settled(self, _count: int) -> bool:
+    def _settled(self) -> bool:
         found = self._discovered()
         if found != self._graph:
             self._graph, self._changed_s = found, time.monotonic()

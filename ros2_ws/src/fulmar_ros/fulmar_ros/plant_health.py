@@ -69,7 +69,7 @@ class PlantHealth:
         self._lockstep, self._realtime = lockstep, realtime
 
     def publish(self) -> None:
-        """Publish on change, and once a second."""
+        """Publish on change, to a subscriber that has come, and once a second."""
         self._wires.see_writers()
         level, message, key = self._status()
         more = self.more()
@@ -77,7 +77,8 @@ class PlantHealth:
         warning = more.get("warning", "") or unfit
         if warning and level == "ok":
             level, message = "warn", warning
-        changed = (self.mode, self.reason, key, warning, self._guard.watchdog.trips, self._guard.rejected)
+        guard, listeners = self._guard, self._health.listeners()
+        changed = (self.mode, self.reason, key, warning, guard.watchdog.trips, guard.rejected, listeners)
         now = time.monotonic()
         if changed == self._said and now - self._said_at < AT_LEAST_S:
             return

@@ -46,7 +46,7 @@ def status(
     if as_json:
         print_json({"well": well, "robots": [robot.as_dict() for robot in robots]})
     elif not robots:
-        what = " ".join(filter(None, (node and f"{node} of", f"'{name}'" if name else "any robot")))
+        what = (node or "robot") + (f" of '{name}'" if name and node else f" '{name}'" if name else "")
         domain = os.environ.get("ROS_DOMAIN_ID") or "0"
         console.print(
             f"no {what} is found in ROS domain {domain} within {timeout:g} s. Check ROS_DOMAIN_ID and "

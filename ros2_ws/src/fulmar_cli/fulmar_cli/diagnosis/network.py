@@ -133,13 +133,14 @@ def check_transports(
         container_marks: Files that exist in a container alone.
     """
     what, chosen = "transports", environment.get(TRANSPORTS, "")
-    if chosen == UDP_ONLY or any(name in environment for name in PROFILES):
+    wide = environment.get(DISCOVERY_RANGE) == "SUBNET"  # measured: with LOCALHOST UDP alone does not help
+    if (chosen == UDP_ONLY and wide) or any(name in environment for name in PROFILES):
         return Finding(what, "ok", f"{TRANSPORTS}={chosen}" if chosen else "a Fast DDS profile of your own")
     owners = set()
     for file in folder.glob("fastrtps_*"):
         with contextlib.suppress(OSError):  # its process has just ended
             owners.add(file.stat().st_uid)
-    fix = f"export {TRANSPORTS}={UDP_ONLY}   # for every node of the robot"
+    fix = f"export {TRANSPORTS}={UDP_ONLY} {DISCOVERY_RANGE}=SUBNET   # for every node of the robot"
     if len(owners | {os.getuid()}) > 1:
         users = ", ".join(map(str, sorted(owners | {os.getuid()})))
         found = f"users {users} share {folder}: messages between them are lost in it"
@@ -147,7 +148,7 @@ def check_transports(
     if any(mark.exists() for mark in container_marks):
         found = "a container: messages to nodes outside are lost, unless they share network, IPC and user"
         return Finding(what, "advice", found, fix)
-    return Finding(what, "ok", "shared memory and UDP")
+    return Finding(what, "ok", f"{TRANSPORTS}={chosen}" if chosen else "shared memory and UDP")
 
 
 def check_round_trip(timeout_s: float = 5.0) -> Finding:
