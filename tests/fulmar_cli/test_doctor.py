@@ -36,6 +36,7 @@ from fulmar_cli.diagnosis.network import (
     check_multicast,
     check_running_robots,
     check_shared_memory,
+    check_transports,
 )
 
 RANGE, STRANGER = (
@@ -142,6 +143,24 @@ def test_shared_memory_that_is_full_or_absent_is_wrong(tmp_path):
     assert (full.level, absent.level) == ("wrong", "wrong")
     assert "--shm-size" in full.fix
     assert "mount -t tmpfs" in absent.fix
+
+
+def test_shared_memory_of_several_users_or_in_a_container_is_advised_against(tmp_path):
+    marks = [tmp_path / "containerenv"]
+
+    def check(**environment):
+        return check_transports(environment, folder=tmp_path, container_marks=marks)
+
+    (tmp_path / "fastrtps_0123456789abcdef").write_bytes(b"x")
+    assert check().level == "ok"
+    marks[0].touch()
+    assert "a container" in check().found
+    os.chown(tmp_path / "fastrtps_0123456789abcdef", os.getuid() + 1, -1)
+    assert f"users {os.getuid()}, {os.getuid() + 1} share" in check().found
+    assert (check().level, check().fix.split()[1]) == ("advice", "FASTDDS_BUILTIN_TRANSPORTS=UDPv4")
+    assert check(FASTDDS_BUILTIN_TRANSPORTS="UDPv4").level == "advice"
+    everywhere = {"FASTDDS_BUILTIN_TRANSPORTS": "UDPv4", "ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}
+    assert check(**everywhere).level == "ok"
 
 
 def test_publishers_that_do_not_reach_a_running_robot_are_named(monkeypatch):

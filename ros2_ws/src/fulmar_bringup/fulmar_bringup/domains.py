@@ -60,11 +60,11 @@ def reserved_domains(count: int) -> Iterator[list[int]]:
 
 
 @contextlib.contextmanager
-def claimed_domain(name: str) -> Iterator[int]:
+def claimed_domain(name: str, part: str = "") -> Iterator[int]:
     """Claim a robot's name in the domain of the environment until the context ends, and give the domain id.
 
     Two runs of one name would mix. Not the lock of `reserved_domains`: a run may take place in a domain that its
-    parent process reserved for it.
+    parent process reserved for it. Plant and controller of a system on one computer have a lock each: `part`.
 
     Raises:
         ConfigError: Another run of this user has the name in it, or ROS_DOMAIN_ID is no domain.
@@ -72,12 +72,12 @@ def claimed_domain(name: str) -> Iterator[int]:
     text = os.environ.get("ROS_DOMAIN_ID", "") or "0"
     if not text.isdecimal() or int(text) > LARGEST:
         raise ConfigError(f"ROS_DOMAIN_ID = '{text}' must be a whole number from 0 to {LARGEST}.")
-    domain, folder = int(text), _lock_folder()
-    with _run_lock_file(folder, domain) as shared, (folder / f"{domain}.{name}.run").open("w") as lock:
+    domain, folder, own = int(text), _lock_folder(), ".".join(filter(None, (name, part)))
+    with _run_lock_file(folder, domain) as shared, (folder / f"{domain}.{own}.run").open("w") as lock:
         fcntl.flock(shared, fcntl.LOCK_SH)  # waits for no more than a look of `reserved_domains`
         if not _locked(lock):
             raise ConfigError(
-                f"another `fulmar run` is using ROS domain {domain} for '{name}', and two of one name would mix. "
+                f"another `fulmar run` is using ROS domain {domain} for '{own}', and two of one name would mix. "
                 "Wait for it to end, give this robot another --name, or set ROS_DOMAIN_ID to another number."
             )
         give_back_abandoned_memory()

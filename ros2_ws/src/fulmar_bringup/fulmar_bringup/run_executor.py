@@ -82,7 +82,7 @@ def run_nodes(request: RunRequest, watch: Watch) -> Execution:
     """
     if request.plan.hardware and not request.plan.emulated:
         check_presence(load_hardware(request.plan.hardware).driver)
-    with claimed_domain(request.plan.robot_name):
+    with claimed_domain(request.plan.robot_name, request.plan.only):
         return _run(request, watch)
 
 

@@ -11,6 +11,7 @@ from fulmar_core.recording import Recording
 from fulmar_core.robot_name import Frames, frames_of, namespace_of
 
 Parameter = bool | int | float | str | list[float] | list[int] | list[str]
+PLANT, CONTROLLER = PARTS = ("plant", "controller")  # values of `RunPlan.only`
 
 
 @dataclass(frozen=True)
@@ -73,6 +74,7 @@ class RunPlan:
         ""  # hardware file of an adapter, whose commands an external controller speaks; empty: none
     )
     adapter_topic: str = ""  # topic that it takes them from; empty: the file's
+    only: str = ""  # plant or controller: the other one runs in another place; empty: both
     nodes: tuple[NodeSpec, ...] = ()  # of the system's own, beside those that every system has
     markers: bool = False  # a node draws goal, limits and thrust for viewers
 

@@ -9,9 +9,11 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from fulmar_bringup.console import log_line
 from fulmar_bringup.planning import RunRequest, chosen_recording, plan_run
 from fulmar_bringup.processes import ProcessGroup
 from fulmar_bringup.readiness import raise_if_ended, wait_for_publisher, wait_for_reader, while_starting
+from fulmar_bringup.remote_parts import RemoteController, domain_text
 from fulmar_bringup.run_executor import (
     LAST_WORDS_S,
     STOPPED,
@@ -21,12 +23,12 @@ from fulmar_bringup.run_executor import (
     silence_limits_s,
     with_plant_reaction,
 )
-from fulmar_bringup.run_plan import RunPlan
+from fulmar_bringup.run_plan import CONTROLLER, PARTS, PLANT, RunPlan
 from fulmar_bringup.supervisor import Report, Supervisor
 from fulmar_bringup.system import System
 from fulmar_bringup.system_events import Emit, SystemEvents, distance_of, mode_of
 from fulmar_bringup.system_rows import own_nodes
-from fulmar_core.errors import ConfigError, RunFailed
+from fulmar_core.errors import ConfigError, RunFailed, UnknownNameError
 from fulmar_core.goal import PoseTuple
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
@@ -52,6 +54,7 @@ def plan_system(
     recording: str | None = None,
     markers: bool = True,
     unattended: bool = False,
+    only: str | None = None,
 ) -> RunRequest:
     """Plan a system that has no end.
 
@@ -70,11 +73,21 @@ def plan_system(
         recording: A mode of `fulmar_core.recording` instead of the system's own.
         markers: Whether a node draws for viewers.
         unattended: Whether a service starts it: an e-stop node begins pressed, and nothing is armed.
+        only: plant or controller, where the other one runs in another place.
 
     Raises:
-        ConfigError: As of `plan_run`; or a bag for each goal, where goals stream.
+        ConfigError: As of `plan_run`; a bag for each goal, where goals stream; or a controller alone, where the
+            system has an external one.
     """
     guards = replace(system.guards, estop=True) if unattended else system.guards
+    if only is not None and only not in PARTS:
+        raise UnknownNameError("part of --only", only, PARTS)
+    if only == CONTROLLER and controller_entry(system.controller).is_external:
+        raise ConfigError(
+            "the controller of this system is external, and you start it. Use --only plant or another --controller."
+        )
+    if only == CONTROLLER and recording is not None:
+        raise ConfigError("the recorder runs beside the plant: --recording goes with --only plant.")
     request = plan_run(
         robot=system.robot,
         name=system.name or None,
@@ -109,7 +122,12 @@ def plan_system(
             f"velocities stream: task '{system.task}' gets no bag for each goal. Use --recording whole or ring."
         )
     plan = replace(
-        request.plan, duration_s=0.0, unattended=unattended, recording=kept, nodes=own_nodes(system)
+        request.plan,
+        duration_s=0.0,
+        unattended=unattended,
+        recording=kept,
+        nodes=own_nodes(system),
+        only=only or "",
     )
     return replace(request, plan=plan)
 
@@ -123,7 +141,7 @@ class Ending:
 
 
 def keep_up(request: RunRequest, emit: Emit, show: Show) -> Ending:
-    """Run a system until Ctrl-C, SIGTERM or the end of one of its nodes.
+    """Run a system, or its plant alone, until Ctrl-C, SIGTERM or the end of one of its nodes.
 
     Args:
         request: Of `plan_system`.
@@ -144,7 +162,7 @@ def keep_up(request: RunRequest, emit: Emit, show: Show) -> Ending:
         plant_report = overseer.plant
         try:
             _get_ready(request, plan, overseer, group)
-            emit("started", **_who(plan), name=plan.robot_name, bag=str(request.record))
+            emit("started", **described(plan), name=plan.robot_name, bag=str(request.record))
             _follow(plan, overseer, group, SystemEvents(emit), show)
         except RunFailed as error:
             time.sleep(LAST_WORDS_S)
@@ -156,18 +174,34 @@ def keep_up(request: RunRequest, emit: Emit, show: Show) -> Ending:
         return ""
 
     failure = run_nodes(request, watch).failure
-    trips = plant_report.values.get("watchdog_trips")
     asked = re.fullmatch(rf"{STOPPED}|stopped by SIG[A-Z]+", failure)  # also while the nodes still start
-    return Ending("" if asked else failure, int(trips) if trips else None)
+    return Ending("" if asked else failure, trips_of(plant_report))
 
 
-def _who(plan: RunPlan) -> dict[str, Any]:
+def trips_of(plant: Report) -> int | None:
+    """Watchdog trips that a plant has reported; None where it has not reported any number."""
+    trips = plant.values.get("watchdog_trips")
+    return int(trips) if trips else None
+
+
+def described(plan: RunPlan) -> dict[str, Any]:
+    """Fields of the event `started`."""
     return {name: getattr(plan, name) for name in ("robot", "task", "controller", "backend", "control_hz")}
 
 
 def _get_ready(request: RunRequest, plan: RunPlan, overseer: Supervisor, group: ProcessGroup) -> None:
-    """Wait for the controller, publish the obstacles, and start the plant."""
+    """Wait for the controller, publish the obstacles, and start the plant.
+
+    A plant alone starts at once, and begins when its controller has come.
+    """
     external = controller_entry(plan.controller).is_external
+    if plan.only == PLANT:
+        if not plan.hardware or plan.emulated:
+            now_ns = time.time_ns() if plan.hardware else SIMULATION_START_NS
+            overseer.publish_obstacles(request.mission, now_ns)
+        overseer.start_plant(while_starting(group, overseer), lambda: group.last_words("plant"))
+        log_line(f"the plant of '{plan.robot_name}' waits for its controller, in {domain_text()}")
+        return
     if external:
         wait_for_publisher(plan, overseer, lambda: raise_if_ended(group))
     starting = while_starting(group, overseer)
@@ -191,8 +225,11 @@ def _follow(
     """
     plant_limit_s, controller_limit_s = silence_limits_s(plan)
     plant, controller = overseer.plant, overseer.controller
+    remote = RemoteController(plan, controller, silent_s=controller_limit_s) if plan.only == PLANT else None
 
     def report() -> bool:
+        if remote is not None:
+            remote.look(events)
         time_s = round(passed_s(plan, plant), 3)
         events.look(plant, controller, time_s)
         show(time_s, distance_of(controller.values), mode_of(plant, controller))
@@ -200,7 +237,8 @@ def _follow(
 
     def running() -> None:
         raise_if_ended(group)
-        raise_if_silent("controller", controller, controller_limit_s)
+        if remote is None:
+            raise_if_silent("controller", controller, controller_limit_s)
         raise_if_silent("plant", plant, plant_limit_s)
 
     overseer.wait_until(report, running)

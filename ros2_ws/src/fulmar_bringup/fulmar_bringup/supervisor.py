@@ -48,6 +48,10 @@ class Report:
     values: dict[str, str] = field(default_factory=dict)
     received_s: float = 0.0  # when, by a monotonic clock; 0: nothing yet [s]
 
+    def forget(self) -> None:
+        """As before the first status."""
+        self.level, self.message, self.values, self.received_s = "ok", "", {}, 0.0
+
 
 class Supervisor:
     """Operator of one robot."""
@@ -191,10 +195,11 @@ class Supervisor:
         """The obstacles alone, if the task has any; arguments as of `give_goal`."""
         if self._obstacles is None:
             return
-        self._publish_obstacles(goal, time_ns)
+        self.publish_obstacles(goal, time_ns)
         self.wait_until(lambda: self.controller.values.get("obstacles_stamp_ns") == str(time_ns), alive)
 
-    def _publish_obstacles(self, goal: Goal, time_ns: int) -> None:
+    def publish_obstacles(self, goal: Goal, time_ns: int) -> None:
+        """Publish the obstacles, if the task has any, for controllers that are there and those to come."""
         if self._obstacles is not None:
             self._sent_obstacles = [obstacles_message(goal.obstacles, time_ns, self._plan.frames)]
             self._obstacles.publish(self._sent_obstacles[0])
@@ -209,7 +214,7 @@ class Supervisor:
         self.wait_until(
             lambda: self._goal.get_subscription_count() > SUBSCRIPTIONS or time.monotonic() > until_s, alive
         )
-        self._publish_obstacles(goal, time_ns)
+        self.publish_obstacles(goal, time_ns)
         self._sent = [
             goal_message(part, self._task.goal_topic, stamp, self._plan.frames, form=self._task.state_type)
             for part, stamp in self._timed(goal, time_ns)

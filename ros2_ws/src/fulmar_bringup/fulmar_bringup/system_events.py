@@ -58,6 +58,11 @@ class SystemEvents:
         self._look_at_fault("plant", plant, time_s, excused=self._held or waits)
         self._look_at_fault("controller", controller, time_s, excused=self._held)
 
+    def forget_controller(self) -> None:
+        """Another controller process has begun, which counts its goals from zero."""
+        self._goals, self._refused, self._done, self._inside_s = "0", ("", "0"), 0, None
+        self._swap, self._acts_since = "", None
+
     def _is_commanded(self, plant: Reported, controller: Reported) -> bool:
         """Whether a plant can miss commands: it has reported since its controller began to act."""
         if controller.values.get("mode") == "armed":

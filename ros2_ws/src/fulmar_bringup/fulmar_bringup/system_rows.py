@@ -22,7 +22,7 @@ from fulmar_bringup.node_table import (
     recorder_spec,
     run_goals_spec,
 )
-from fulmar_bringup.run_plan import NodeSpec, RunPlan, node_row
+from fulmar_bringup.run_plan import CONTROLLER, NodeSpec, RunPlan, node_row
 from fulmar_bringup.system import System
 from fulmar_core.errors import ConfigError, did_you_mean
 from fulmar_core.robot import load_robot
@@ -51,7 +51,7 @@ def system_rows(
         port: Where a device is, in the place of what the hardware file says.
 
     Returns:
-        Rows by name, in the order of their start.
+        Rows by name, in the order of their start; those of one part, where the plan has only that.
 
     Raises:
         ConfigError: Two rows have one name, or a row has an input that nothing publishes.
@@ -71,7 +71,12 @@ def system_rows(
         rows.append(markers_spec(plan))
     _check_chain(plan)
     check_rows(rows, outside=_from_outside(plan))
-    return {row.name: row for row in _with_listeners(rows, plan)}
+    there = {row.name for row in commander_specs(plan)} if plan.only else set()
+    return {
+        row.name: row
+        for row in _with_listeners(rows, plan)
+        if not plan.only or (row.name in there) == (plan.only == CONTROLLER)
+    }
 
 
 def own_nodes(system: System) -> tuple[NodeSpec, ...]:

@@ -69,9 +69,12 @@ def check_plan(plan: RunPlan, *, backend: str = "") -> None:
     notes = [gains_note(plan.robot, name) for name in (plan.controller, plan.guards.fallback)]
     for note in dict.fromkeys(filter(None, notes)):
         log_line(f"info: {note}")
+    if plan.only == "controller":
+        require(*modules_of(plan.controller, ""))
+        return
     require(
         *modules_of(
-            plan.controller,
+            "external" if plan.only else plan.controller,
             backend or plan.backend,
             guards=plan.guards,
             hardware=plan.hardware,

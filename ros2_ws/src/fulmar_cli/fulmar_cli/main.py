@@ -34,6 +34,7 @@ from fulmar_cli.commands.policies import policies
 from fulmar_cli.commands.report import report
 from fulmar_cli.commands.run import run
 from fulmar_cli.commands.service import service
+from fulmar_cli.commands.status import status
 from fulmar_cli.commands.swap import swap
 from fulmar_cli.commands.teleop import teleop
 from fulmar_cli.commands.train import train
@@ -82,6 +83,7 @@ app.command()(run)
 app.command()(up)
 app.command()(goals)
 app.command()(teleop)
+app.command()(status)
 app.command()(estop)
 app.command()(swap)
 app.command()(commission)

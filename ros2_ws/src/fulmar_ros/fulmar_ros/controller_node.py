@@ -36,6 +36,7 @@ from fulmar_ros.deadline import ControlBeat
 from fulmar_ros.fallback import MakeController, PolicySwap, controllers_of, load_other
 from fulmar_ros.goal_messages import GoalMessage
 from fulmar_ros.graph import WireWatch
+from fulmar_ros.node_identity import identity_of
 from fulmar_ros.parameters import own_frames, read_parameters
 from fulmar_ros.qos import SAFE_REPEATS
 from fulmar_ros.runtime import RequestExit, settle_memory
@@ -90,7 +91,15 @@ class ControllerNode(LifecycleNode):
         self._beat = ControlBeat(
             1.0 / (hz * self.settings.rate), rate=self.settings.rate, copies=self.settings.copies
         )
-        self._status = ControllerStatus(self._swap, goals_streamed=self.settings.goals_streamed)
+        identity = identity_of(
+            self,
+            started_ns=time.time_ns(),
+            robot=self.settings.robot,
+            task=self.settings.task,
+            control_hz=hz,
+            rate=self.settings.rate,
+        )
+        self._status = ControllerStatus(self._swap, identity, goals_streamed=self.settings.goals_streamed)
         if self.settings.autostart:
             for transition in (self.trigger_configure, self.trigger_activate):
                 if transition() != DONE:

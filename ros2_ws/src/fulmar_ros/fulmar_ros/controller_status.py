@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 
 from fulmar_core.guarded_loop import GuardedLoop
 from fulmar_core.health.beliefs import Beliefs
@@ -24,9 +25,9 @@ class ControllerStatus:
         wire_problems: Publishers from which nothing arrives, in words.
     """
 
-    def __init__(self, swap: PolicySwap, *, goals_streamed: bool) -> None:
-        """Report swaps of policies too; streamed goals count as no change."""
-        self._swap, self._goals_streamed = swap, goals_streamed
+    def __init__(self, swap: PolicySwap, identity: Mapping[str, str], *, goals_streamed: bool) -> None:
+        """Report swaps of policies and the values of `node_identity` too; streamed goals count as no change."""
+        self._swap, self._identity, self._goals_streamed = swap, dict(identity), goals_streamed
         self.steps = 0
         self.inference_ms = Spread()
         self.wire_problems: list[str] = []
@@ -76,6 +77,7 @@ class ControllerStatus:
         level = "warn" if level == "ok" and doubtful else level
         age_ms = (time.monotonic_ns() - last_input_ns) / 1e6 if last_input_ns else 0.0
         values = {
+            **self._identity,
             "mode": decision.mode.value,
             "reason": decision.reason,
             "sha256": standby.sha256,

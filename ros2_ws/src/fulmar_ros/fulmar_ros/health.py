@@ -24,6 +24,10 @@ class Health:
         own = node.create_publisher(DiagnosticArray, DIAGNOSTICS.name, publisher_qos(DIAGNOSTICS))
         self._name, self.publishers = name, [*more, own]
 
+    def listeners(self) -> int:
+        """How many subscribers are matched: one that comes between two beats need not wait for the next."""
+        return int(self.publishers[-1].get_subscription_count())
+
     def publish(self, level: str, message: str, values: Mapping[str, str]) -> None:
         """Publish one status.
 

@@ -6,6 +6,10 @@ import os
 from pathlib import Path
 
 DISCOVERY_RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
+TRANSPORTS, UDP_ONLY = (
+    "FASTDDS_BUILTIN_TRANSPORTS",
+    "UDPv4",
+)  # between containers or users: without shared memory
 # Jazzy's name of the file, and that of later ones.
 PROFILES = ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE")
 # Announces nodes early, and resends lost messages early.

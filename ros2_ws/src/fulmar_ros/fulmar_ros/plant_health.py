@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import os
-import socket
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from rclpy.lifecycle import LifecycleNode
 
@@ -40,19 +38,14 @@ class PlantHealth:
         self.awaited = 0
         self._unnamed_looks = 0
         self._robot = robot
-        self._place: dict[str, str] = {}  # full name, host, process and age of the node
+        self._identity: dict[str, str] = {}  # as of `node_identity`
         self._said: tuple[object, ...] = ()
         self._said_at = 0.0
         self.more: Callable[[], dict[str, str]] = dict
 
-    def open(self, node: LifecycleNode, *, started_ns: int) -> None:
-        """Begin to publish; the node was created at `started_ns` of the wall clock [ns]."""
-        self._place = {
-            "node": node.get_fully_qualified_name(),
-            "host": socket.gethostname(),
-            "pid": str(os.getpid()),
-            "started_ns": str(started_ns),
-        }
+    def open(self, node: LifecycleNode, identity: Mapping[str, str]) -> None:
+        """Begin to publish, with the values of `node_identity`."""
+        self._identity = dict(identity)
         self._health = Health(node, f"{self._robot}: plant")
         self._wire_watch = WireWatch(node, self._wires.subscribed)
         self._timer = node.create_timer(LOOK_S, self.publish)
@@ -76,7 +69,7 @@ class PlantHealth:
         self._lockstep, self._realtime = lockstep, realtime
 
     def publish(self) -> None:
-        """Publish on change, and once a second."""
+        """Publish on change, to a subscriber that has come, and once a second."""
         self._wires.see_writers()
         level, message, key = self._status()
         more = self.more()
@@ -84,7 +77,8 @@ class PlantHealth:
         warning = more.get("warning", "") or unfit
         if warning and level == "ok":
             level, message = "warn", warning
-        changed = (self.mode, self.reason, key, warning, self._guard.watchdog.trips, self._guard.rejected)
+        guard, listeners = self._guard, self._health.listeners()
+        changed = (self.mode, self.reason, key, warning, guard.watchdog.trips, guard.rejected, listeners)
         now = time.monotonic()
         if changed == self._said and now - self._said_at < AT_LEAST_S:
             return
@@ -140,7 +134,7 @@ class PlantHealth:
 
     def _values(self) -> dict[str, str]:
         values = {
-            **self._place,
+            **self._identity,
             "mode": self.mode,
             "reason": self.reason,
             "steps": str(self._lockstep.steps),

@@ -22,6 +22,7 @@ from fulmar_core.topics import CLOCK, DIAGNOSTICS
 from fulmar_ros.air_bearing import AirBearingWires
 from fulmar_ros.living_plant import BRIEFLY_S, LATE_S, others_in, refuse_living_plant
 from fulmar_ros.motion_capture import MakeCapture, capture_maker
+from fulmar_ros.node_identity import identity_of
 from fulmar_ros.parameters import name_of, read_parameters
 from fulmar_ros.plant_clock import SimulatedTime, WallTime, other_clocks
 from fulmar_ros.plant_health import PlantHealth
@@ -132,7 +133,15 @@ class PlantNode(LifecycleNode):
         if isinstance(self._backend, AirBearing):
             self._air = AirBearingWires(self, self._backend, watched=not self.settings.between)
         self._make_loops(self._backend)
-        self.health.open(self, started_ns=self._started_ns)
+        identity = identity_of(
+            self,
+            started_ns=self._started_ns,
+            robot=self.settings.robot,
+            task=self.settings.task,
+            control_hz=self.settings.control_rate(self.robot),
+            rate=self.settings.rate,
+        )
+        self.health.open(self, identity)
         return DONE
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:

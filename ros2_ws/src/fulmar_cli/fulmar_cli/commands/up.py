@@ -26,6 +26,10 @@ RECORDING_HELP = (
     "whole: one bag. goals: one bag for each goal, DIR/goal_001 and so on. ring: only the time around a fault. "
     "The system file's by default."
 )
+ONLY_HELP = (
+    "Start this part alone; the other one runs in another container or on another host. plant: with guards and "
+    "recorder. See docs/systems.md."
+)
 
 
 def up(
@@ -50,6 +54,7 @@ def up(
     recording: Annotated[str | None, option("whole|ring|goals", RECORDING_HELP)] = None,
     markers: cli.MarkersOption = True,
     service: Annotated[bool, flag("--service", SERVICE_HELP)] = False,
+    only: Annotated[str | None, option("plant|controller", ONLY_HELP)] = None,
     as_json: Annotated[
         bool, flag("--json", "Print one JSON object a line for each event, and nothing else.")
     ] = False,
@@ -75,7 +80,11 @@ def up(
     fulmar estop
 
     fulmar estop --reset
+
+    fulmar up mujoco_lqr --only plant        # and on another host: fulmar up mujoco_lqr --only controller
     """
+    from fulmar_bringup.run_plan import CONTROLLER
+    from fulmar_bringup.split_controller import keep_controller_up
     from fulmar_bringup.standing_system import keep_up, plan_system
     from fulmar_bringup.system import varied_system
     from fulmar_cli.extras import check_plan
@@ -89,12 +98,12 @@ def up(
         chosen, record=record or dated_folder("runs", chosen.name or chosen.robot, chosen.controller),
         command=cli.invoked_command(), policy=policy, hardware=hardware, emulate=emulate, arm=arm, scenario=scenario,
         seed=seed, start=read_pose(start, "--start"), rate=rate, recording=recording, markers=markers,
-        unattended=service,
+        unattended=service, only=only,
     )  # fmt: skip
     check_plan(request.plan)
     report = _print_json if as_json else _print_words
     with live_line() as show:
-        end = keep_up(request, report, show)
+        end = (keep_controller_up if only == CONTROLLER else keep_up)(request, report, show)
     bags = sorted(
         {str(file.parent) for file in Path(request.record).rglob("*.mcap")}
     )  # one, or one for each goal

@@ -30,6 +30,7 @@ from fulmar_cli.diagnosis.network import (
     check_round_trip,
     check_running_robots,
     check_shared_memory,
+    check_transports,
 )
 
 PURPOSES = ("hardware", "sim")
@@ -62,6 +63,7 @@ def diagnose(purpose: str | None = None, name: str | None = None) -> list[Findin
         partial(check_discovery, environment, hardware=hardware),
         partial(check_multicast, environment),
         check_shared_memory,
+        partial(check_transports, environment),
         check_round_trip,
         check_running_robots,
         partial(check_timing, hardware=hardware),

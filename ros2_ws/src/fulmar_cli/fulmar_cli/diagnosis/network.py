@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shutil
 import socket
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from fulmar_bringup.domains import DOMAINS, LARGEST
@@ -16,12 +17,13 @@ from fulmar_bringup.shared_memory_cleanup import (
     give_back_abandoned_memory,
 )
 from fulmar_cli.diagnosis.check_result import Finding
-from fulmar_ros.middleware import DISCOVERY_RANGE
+from fulmar_ros.middleware import DISCOVERY_RANGE, PROFILES, TRANSPORTS, UDP_ONLY
 
 RANGES = ("SUBNET", "LOCALHOST", "OFF", "SYSTEM_DEFAULT")
 OURS = "LOCALHOST"  # what Fulmar sets where the environment says nothing
 GROUP = "239.255.0.1"  # of DDS discovery (OMG DDSI-RTPS 2.5, 9.6.2)
 LOOPBACK = "127.0.0.1"
+CONTAINER_MARKS = (Path("/.dockerenv"), Path("/run/.containerenv"))  # files of Docker and of Podman
 FREE_BYTES = 64_000_000  # of shared memory: Fast DDS takes half a megabyte for each process
 ROS_FIX = (
     "sudo ip link set lo up && ROS_DOMAIN_ID=77 fulmar doctor   # without loopback, or in a domain in use"
@@ -115,6 +117,38 @@ def check_shared_memory(folder: Path = SHARED_MEMORY, *, least_bytes: int = FREE
         grow = f"sudo mount -o remount,size=50% {folder}   # in a container: docker run --shm-size=1g"
         return Finding(what, "wrong", found, clean if left else grow)
     return Finding(what, "advice" if left else "ok", found, clean if left else "")
+
+
+def check_transports(
+    environment: Mapping[str, str],
+    *,
+    folder: Path = SHARED_MEMORY,
+    container_marks: Sequence[Path] = CONTAINER_MARKS,
+) -> Finding:
+    """Whether shared memory could lose messages between users or containers; Fast DDS reports no such loss.
+
+    Args:
+        environment: Environment of the nodes.
+        folder: Where shared memory lies.
+        container_marks: Files that exist in a container alone.
+    """
+    what, chosen = "transports", environment.get(TRANSPORTS, "")
+    wide = environment.get(DISCOVERY_RANGE) == "SUBNET"  # measured: with LOCALHOST UDP alone does not help
+    if (chosen == UDP_ONLY and wide) or any(name in environment for name in PROFILES):
+        return Finding(what, "ok", f"{TRANSPORTS}={chosen}" if chosen else "a Fast DDS profile of your own")
+    owners = set()
+    for file in folder.glob("fastrtps_*"):
+        with contextlib.suppress(OSError):  # its process has just ended
+            owners.add(file.stat().st_uid)
+    fix = f"export {TRANSPORTS}={UDP_ONLY} {DISCOVERY_RANGE}=SUBNET   # for every node of the robot"
+    if len(owners | {os.getuid()}) > 1:
+        users = ", ".join(map(str, sorted(owners | {os.getuid()})))
+        found = f"users {users} share {folder}: messages between them are lost in it"
+        return Finding(what, "advice", found, fix)
+    if any(mark.exists() for mark in container_marks):
+        found = "a container: messages to nodes outside are lost, unless they share network, IPC and user"
+        return Finding(what, "advice", found, fix)
+    return Finding(what, "ok", f"{TRANSPORTS}={chosen}" if chosen else "shared memory and UDP")
 
 
 def check_round_trip(timeout_s: float = 5.0) -> Finding:
