@@ -7,7 +7,8 @@ from dataclasses import replace
 import pytest
 
 from fulmar_bringup.bag_origin import run_info
-from fulmar_bringup.node_table import controller_spec, guard_specs, plant_spec, recorder_spec, run_goals_spec
+from fulmar_bringup.node_table import controller_spec, guard_specs, plant_spec, recorder_spec
+from fulmar_bringup.operator_rows import run_goals_spec
 from fulmar_bringup.plan_checks import read_remappings
 from fulmar_bringup.processes import command_line
 from fulmar_bringup.run_plan import RunPlan

@@ -32,7 +32,7 @@ def plan(tmp_path):
 def test_both_parts_together_have_the_rows_of_the_whole_system_and_share_none(plan):
     whole = replace(plan("plant"), only="")
     parts = [set(system_rows(plan(only), record={})) for only in ("plant", "controller")]
-    assert parts == [{"recorder", "plant"}, {"controller"}]
+    assert parts == [{"recorder", "plant", "markers"}, {"controller"}]
     assert set(system_rows(whole, record={})) == parts[0] | parts[1]
 
 

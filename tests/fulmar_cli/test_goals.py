@@ -7,7 +7,7 @@ from dataclasses import fields
 
 import pytest
 
-from fulmar_bringup.node_table import goals_spec
+from fulmar_bringup.operator_rows import goals_spec
 from fulmar_cli.commands.goals import goals
 from fulmar_core.errors import ConfigError, UnknownNameError
 from fulmar_core.goal_files import Poses, Positions, load_goals, single_goal

@@ -16,12 +16,11 @@ from fulmar_bringup.emulation import emulation_of
 from fulmar_bringup.node_table import (
     controller_spec,
     emulator_spec,
-    goals_spec,
     guard_specs,
     plant_spec,
     recorder_spec,
-    run_goals_spec,
 )
+from fulmar_bringup.operator_rows import goals_spec, run_goals_spec
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.system import Guards
 from fulmar_core.controller_settings import ControllerSettings

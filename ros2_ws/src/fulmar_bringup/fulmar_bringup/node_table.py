@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from fulmar_bringup.emulation import Emulation
-from fulmar_bringup.goal_plan import goal_rate, is_path_of_places
 from fulmar_bringup.run_plan import NodeSpec, Parameter, RunPlan, node_row
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.estimation.kinds import estimator_kind, load_estimator
 from fulmar_core.recording import Recording
 from fulmar_core.robot import load_robot
-from fulmar_core.robot_name import namespace_of
 from fulmar_core.safety.geofence import NO_AREA
 from fulmar_core.tasks import load_task
 from fulmar_core.topics import (
@@ -24,11 +22,7 @@ from fulmar_core.topics import (
     CLOCK,
     DESCRIPTION,
     DEVICE_STATE,
-    DIAGNOSTICS,
     ESTOP,
-    GOAL_WIRES,
-    JOY,
-    MARKERS,
     METADATA,
     MOCAP,
     OBSERVATION,
@@ -38,7 +32,6 @@ from fulmar_core.topics import (
     SENSOR_WIRES,
     STATIC_TRANSFORMS,
     STATUS,
-    TELEOP,
     TRANSFORMS,
     TRUTH,
     WIRES,
@@ -56,7 +49,9 @@ MODEL = (
 )  # of every plant; the last two need tf2_msgs
 
 
-def _row(plan: RunPlan, name: str, module: str, parameters: Mapping[str, Parameter], **more: Any) -> NodeSpec:
+def robot_row(
+    plan: RunPlan, name: str, module: str, parameters: Mapping[str, Parameter], **more: Any
+) -> NodeSpec:
     """A row of a plan's robot, with its topics renamed; `more` as of `NodeSpec`."""
     return node_row(plan.namespace, name, module, parameters, remappings=dict(plan.remappings), **more)
 
@@ -99,7 +94,7 @@ def controller_spec(plan: RunPlan) -> NodeSpec:
         parameters["odometry_may_repeat"] = True
     if plan.copies > 1:
         parameters["copies"] = plan.copies
-    return _row(
+    return robot_row(
         plan,
         "controller",
         "policy_server.controller_node",
@@ -120,7 +115,7 @@ def adapter_spec(plan: RunPlan) -> NodeSpec:
     parameters: dict[str, Parameter] = {"hardware": plan.adapter}
     if plan.adapter_topic:
         parameters["topic"] = plan.adapter_topic
-    return _row(
+    return robot_row(
         plan,
         "adapter",
         "hardware_drivers.adapter_node",
@@ -200,7 +195,7 @@ def plant_spec(plan: RunPlan, *, port: str = "") -> NodeSpec:
             parameters["unattended"] = True
         if port:
             parameters["port"] = port
-        return _row(
+        return robot_row(
             plan,
             "plant",
             "hardware_drivers.driver_node",
@@ -215,7 +210,7 @@ def plant_spec(plan: RunPlan, *, port: str = "") -> NodeSpec:
     poses = (MOCAP.name,) if estimated or plan.mocap_hz else ()
     odometry = () if estimated else (ODOMETRY.name,)
     period = (PERIOD.name,) if chain else ()
-    return _row(
+    return robot_row(
         plan,
         "plant",
         "sim_nodes.sim_node",
@@ -263,7 +258,7 @@ def emulator_spec(plan: RunPlan, emulation: Emulation) -> NodeSpec:
         **emulation.more,
     }
     parameters |= _motion_capture(plan)
-    return _row(
+    return robot_row(
         plan,
         "emulator",
         "sim_nodes.emulator_node",
@@ -285,7 +280,7 @@ def recorder_spec(plan: RunPlan, *, directory: str = "", info: str = "", files: 
     things = load_task(plan.task).things
     usual = asdict(Recording())
     unusual = {key: value for key, value in asdict(plan.recording).items() if value != usual[key]}
-    return _row(
+    return robot_row(
         plan,
         "recorder",
         "fulmar_ros.recorder_node",
@@ -297,88 +292,12 @@ def recorder_spec(plan: RunPlan, *, directory: str = "", info: str = "", files: 
     )
 
 
-def goals_spec(
-    robot: str,
-    goals: str,
-    *,
-    name: str = "",
-    as_path: bool = False,
-    control_hz: float = 10.0,
-    give_up_s: float = 0.0,
-) -> NodeSpec:
-    """The node that publishes goals from a file; no system has it by itself.
-
-    Args:
-        robot: Type of the robot that is to do it.
-        goals: Name of a file in `configs/goals`, or a path that ends in `.yaml`.
-        name: What the robot is called; its type by default.
-        as_path: Publish all positions or poses at once.
-        control_hz: Velocities come so often along a path [Hz].
-        give_up_s: Ends with exit code 1 where robot or controller are not there after so long; 0: waits [s].
-    """
-    parameters: dict[str, Parameter] = {
-        "goals": goals,
-        "robot": robot,
-        "control_hz": control_hz,
-        "as_path": as_path,
-    }
-    if give_up_s:
-        parameters["give_up_s"] = give_up_s
-    wires = {"inputs": (ODOMETRY.name,), "outputs": tuple(GOAL_WIRES)}
-    return node_row(namespace_of(name or robot), "goals", "fulmar_ros.goal_node", parameters, **wires)
-
-
-def run_goals_spec(plan: RunPlan) -> NodeSpec:
-    """The node that publishes the goals of a run, for as long as the run lasts."""
-    spec = goals_spec(
-        plan.robot,
-        plan.goals,
-        name=plan.name,
-        as_path=is_path_of_places(load_task(plan.task)),
-        control_hz=goal_rate(plan.control_hz),
-    )
-    more: dict[str, Parameter] = {"stay": True, "lockstep": plan.lockstep, "rate": plan.rate}
-    return replace(spec, parameters=spec.parameters | more, remappings=dict(plan.remappings))
-
-
-def markers_spec(plan: RunPlan) -> NodeSpec:
-    """The node that draws for viewers; nothing depends on it."""
-    task, area = load_task(plan.task), plan.guards.area
-    parameters: dict[str, Parameter] = {"robot": plan.robot, "task": plan.task}
-    if area != NO_AREA:
-        parameters["area"] = list(area)
-    goals = (wire.name for wire in goal_wires(task.goal_topic))
-    return _row(
-        plan,
-        "markers",
-        "fulmar_ros.markers_node",
-        parameters,
-        observed=(*goals, OBSTACLES.name, ACTUATORS_STATE.name, STATUS.name, DIAGNOSTICS.name),
-        outputs=(MARKERS.name,),
-        optional=True,
-    )
-
-
-def teleop_spec(robot: str, *, name: str = "", keyboard: bool = True, share: float = 0.5) -> NodeSpec:
-    """The node that a person drives with; it starts beside a system that runs, and no system has it by itself.
-
-    Args:
-        robot: Type of the robot.
-        name: What the robot is called; its type by default.
-        keyboard: Whether keys drive, or only joysticks.
-        share: Of full command.
-    """
-    parameters: dict[str, Parameter] = {"robot": robot, "keyboard": keyboard, "share": share}
-    wires = {"outputs": (TELEOP.name,), "observed": (JOY.name,)}
-    return node_row(namespace_of(name or robot), "teleop", "fulmar_ros.teleop_node", parameters, **wires)
-
-
 def guard_specs(plan: RunPlan) -> tuple[NodeSpec, ...]:
     """The nodes that a plan's guards ask for."""
     nodes = []
     if plan.guards.estop:
         nodes.append(
-            _row(
+            robot_row(
                 plan,
                 "estop",
                 "fulmar_ros.estop_node",
@@ -409,4 +328,4 @@ def _estimator_spec(plan: RunPlan, estimator: str) -> NodeSpec:
             parameters["upstream"] = upstream
         inputs, outputs = (*inputs, PERIOD.name), (*outputs, ANSWER.name)
     wires = {"inputs": inputs, "observed": observed, "outputs": outputs}
-    return _row(plan, "estimator", "fulmar_ros.estimator_node", parameters, **wires)
+    return robot_row(plan, "estimator", "fulmar_ros.estimator_node", parameters, **wires)

@@ -16,12 +16,11 @@ from fulmar_bringup.node_table import (
     commander_specs,
     emulator_spec,
     guard_specs,
-    markers_spec,
     paced_wire,
     plant_spec,
     recorder_spec,
-    run_goals_spec,
 )
+from fulmar_bringup.operator_rows import markers_spec, run_goals_spec
 from fulmar_bringup.run_plan import CONTROLLER, NodeSpec, RunPlan, node_row
 from fulmar_bringup.system import System
 from fulmar_core.errors import ConfigError, did_you_mean

@@ -80,7 +80,7 @@ def goals(
         example = name if place is None else f"--pose {pose}"
         raise ConfigError(f"whose goals? Example: fulmar goals {example} --robot floating_platform")
     from fulmar_bringup.goal_plan import check_pace, places_of, whole_pose
-    from fulmar_bringup.node_table import goals_spec
+    from fulmar_bringup.operator_rows import goals_spec
     from fulmar_bringup.processes import command_line
     from fulmar_core.goal_files import load_goals, single_goal
     from fulmar_core.goal_sequence import goal_sequence

@@ -36,7 +36,7 @@ def teleop(
 
     fulmar teleop kingfisher --no-keyboard --share 1
     """
-    from fulmar_bringup.node_table import teleop_spec
+    from fulmar_bringup.operator_rows import teleop_spec
     from fulmar_bringup.processes import command_line
     from fulmar_core.robot import load_robot
     from fulmar_core.topics import GIVE_BACK

@@ -13,7 +13,7 @@ from pathlib import Path
 import rclpy
 from rclpy.node import Node
 
-from fulmar_bringup.node_table import teleop_spec
+from fulmar_bringup.operator_rows import teleop_spec
 from fulmar_bringup.planning import RunRequest
 from fulmar_bringup.processes import ProcessGroup
 from fulmar_bringup.readiness import CONTROLLER_AND_RECORDER, while_starting
