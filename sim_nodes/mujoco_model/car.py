@@ -24,15 +24,12 @@ class Car(Chassis):
     def __init__(self, robot: Robot) -> None:
         assert isinstance(robot.actuators, Ackermann)
         self._car = robot.actuators
-        length, track = self._car.wheelbase, self._car.track
-        places = {f"rear_{side}": (0.0, share * track) for side, share in SIDES}
-        places |= {f"front_{side}": (length, share * track) for side, share in SIDES}
         super().__init__(
             robot,
             wheel_radius=self._car.wheel_radius,
             friction=self._car.friction,
-            wheels=places,
-            weight_x=0.5 * length,
+            wheels=self._car.wheels,
+            weight_x=0.5 * self._car.wheelbase,
         )
 
     def add(self, spec: mujoco.MjSpec) -> mujoco.MjsBody:

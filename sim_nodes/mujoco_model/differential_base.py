@@ -20,12 +20,11 @@ class DifferentialBase(Chassis):
     def __init__(self, robot: Robot) -> None:
         assert isinstance(robot.actuators, DifferentialDrive)
         self._drive = robot.actuators
-        half = 0.5 * self._drive.track
         super().__init__(
             robot,
             wheel_radius=self._drive.wheel_radius,
             friction=self._drive.friction,
-            wheels={"left_wheel": (0.0, half), "right_wheel": (0.0, -half)},
+            wheels=self._drive.wheels,
             weight_x=min(0.0, WEIGHT_TO_CASTER * self._drive.caster_x),
         )
 

@@ -66,15 +66,13 @@ class Floater:
         body.ipos, body.iquat = [OFF_CENTRE, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]
         # The world of an episode brings the rest of the tensor, and where the centre of mass is.
         body.mass, body.inertia = robot.body.mass, list(robot.body.inertia[:3])
-        low = -0.5 * robot.body.height
-        if robot.hydrodynamics is not None:
-            low = -robot.hydrodynamics.hydrostatics.draught
+        low, high = robot.hull_span
         add_hull(
             body,
             footprint=robot.body.footprint,
             radius=robot.body.radius,
             low=low,
-            high=low + robot.body.height,
+            high=high,
             ahead=robot.body.footprint_x,
         )
         for push in self._actuators.pushes:

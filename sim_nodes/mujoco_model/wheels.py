@@ -22,7 +22,6 @@ WHEEL_SHARE = 0.03  # of the robot's mass, for each wheel [-]
 WEIGHT_HEIGHT = (
     1.0 / 3.0
 )  # of the robot's height, where its centre of mass is, but at least as high as the axles [-]
-CLEARANCE = 0.4  # of the chassis above the floor, in wheel radii [-]
 TIGHT_S = 0.005  # with which a wheel gives way to a push; the rest of its lag is in how it takes commands [s]
 CONTACT_S = 0.01  # time constant of the floor contact [s]
 SETTLE_S = 1.0  # time in which a model comes to rest after its compilation [s]
@@ -77,12 +76,13 @@ class Chassis:
         outline = self.robot.body
         mass, place, inertia = self._chassis(outline.mass, outline.inertia[2], self._weight)
         body.mass, body.ipos, body.inertia = mass, list(place), list(inertia)
+        low, high = self.robot.hull_span
         add_hull(
             body,
             footprint=outline.footprint,
             radius=outline.radius,
-            low=(CLEARANCE - 1.0) * self.radius,
-            high=outline.height - self.radius,
+            low=low,
+            high=high,
             ahead=outline.footprint_x,
         )
         return body

@@ -12,7 +12,7 @@ import numpy as np
 from fulmar_core.actuators.families import FAMILIES
 from fulmar_core.actuators.family import Actuators
 from fulmar_core.actuators.pushing import Pushing
-from fulmar_core.actuators.rolling import Rolling
+from fulmar_core.actuators.rolling import CLEARANCE, Rolling
 from fulmar_core.calibration import VARIABLE, calibrated, calibration_in_use, load_calibration
 from fulmar_core.config import Kinds, load_config
 from fulmar_core.dynamics.hydrodynamics import Hydrodynamics
@@ -241,6 +241,18 @@ class Robot:
     def drifts(self) -> bool:
         """Whether it keeps its speed when its actuators are at rest: neither the floor nor water slows it down."""
         return self.hydrodynamics is None and isinstance(self.actuators, Pushing)
+
+    @property
+    def hull_span(self) -> tuple[float, float]:
+        """Bottom and top of the hull in the body's frame [m].
+
+        The body's origin lies at the height of the axles, at the waterline, or half way up.
+        """
+        height = self.body.height
+        if isinstance(self.actuators, Rolling):
+            return (CLEARANCE - 1.0) * self.actuators.wheel_radius, height - self.actuators.wheel_radius
+        low = -0.5 * height if self.hydrodynamics is None else -self.hydrodynamics.hydrostatics.draught
+        return low, low + height
 
     @property
     def recipe(self) -> str:

@@ -171,15 +171,25 @@ ANSWER = Wire(
     recorded=False,
 )  # fmt: skip
 TRANSFORMS = Wire(
-    "/tf", "tf2_msgs/msg/TFMessage", "device", "stream", "of its publishers",
-    "frames, recorded where tf2_msgs is installed; not used for control", unit="m", frame="each its own",
+    "/tf", "tf2_msgs/msg/TFMessage", "plant", "stream", "with each odometry, where tf2_msgs is installed",
+    "`odom` → `base_link` of the odometry's publisher, and what other nodes publish; not used for control", unit="m",
+    frame="each its own",
+)  # fmt: skip
+STATIC_TRANSFORMS = Wire(
+    "/tf_static", "tf2_msgs/msg/TFMessage", "plant", "latched", "at load, where tf2_msgs is installed",
+    "`base_link` → frames of its parts; of a simulation also `map` → `odom`, which are one", latest=100, unit="m",
+    frame="each its own",
+)  # fmt: skip
+DESCRIPTION = Wire(
+    "robot_description", "std_msgs/msg/String", "plant", "latched", "at load",
+    "URDF of the robot, made from its YAML; its links are called as the frames",
 )  # fmt: skip
 
 WIRES: tuple[Wire, ...] = (
     *SENSOR_WIRES.values(), MOCAP, TRUTH, ACTUATORS_STATE, ACTUATORS_HEALTH, CLOCK, COMMAND, VELOCITY_COMMAND,
     OBSERVATION, ACTION, METADATA, STATUS, DIAGNOSTICS, GOAL_POSE, GOAL_POINT, GOAL_PATH, GOAL_POSES,
     GOAL_VELOCITY, OBSTACLES, MARKERS, BLOCK, AIR_BEARING, DEVICE_STATE, ESTOP, ESTOP_RELEASED, TELEOP, JOY, SWAP,
-    TRANSFORMS, PERIOD, ANSWER,
+    TRANSFORMS, STATIC_TRANSFORMS, DESCRIPTION, PERIOD, ANSWER,
 )  # fmt: skip
 
 GOAL_WIRES: dict[str, Wire] = {wire.name: wire for wire in (GOAL_POSE, GOAL_POINT, GOAL_PATH, GOAL_VELOCITY)}

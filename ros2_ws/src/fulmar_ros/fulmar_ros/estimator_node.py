@@ -23,8 +23,9 @@ from fulmar_core.estimation.kinds import estimator_kind, load_estimator, make_es
 from fulmar_core.process import CONTROL_PRIORITY, take_priority_with_helpers
 from fulmar_core.robot import load_robot
 from fulmar_core.sensors.reading import Reading
-from fulmar_core.topics import Wire
+from fulmar_core.topics import ODOMETRY, Wire
 from fulmar_ros.estimator_wires import READERS, WRITERS, Read, Write
+from fulmar_ros.frame_wires import odometry_transform
 from fulmar_ros.health import Health
 from fulmar_ros.lockstep_answer import LockstepAnswer
 from fulmar_ros.parameters import name_of, own_frames, read_parameters
@@ -46,6 +47,7 @@ class EstimatorNodeSettings:
     lockstep: bool = False  # answer the periods of a plant in lock step
     upstream: tuple[str, ...] = ("",)  # in lock step: other nodes whose outputs are inputs of this one
     wait_for_subscribers: int = 0  # in lock step: of each output, before the first answer
+    transforms: bool = True  # publish /tf, where tf2_msgs is installed; off where another node does
 
 
 class EstimatorNode(Node):
@@ -74,6 +76,12 @@ class EstimatorNode(Node):
         self._said: tuple[object, ...] = ()
         self._said_s = 0.0
         self._outputs = [self._output(wire, lockstep=settings.lockstep) for wire in kind.publishes]
+        self._transform = odometry_transform(
+            self,
+            self._frames,
+            wanted=settings.transforms and ODOMETRY in kind.publishes,
+            lockstep=settings.lockstep,
+        )
         self._health = Health(self, f"{name_of(self, robot)}: estimator")
         self._period: LockstepAnswer | None = None
         topics = {}
@@ -150,6 +158,8 @@ class EstimatorNode(Node):
         return estimate
 
     def _note(self, estimate: Estimate) -> None:
+        if self._transform is not None:
+            self._transform.publish(estimate.value, estimate.stamp_ns)
         self._published_ns = estimate.stamp_ns
         self._published += 1
 

@@ -127,6 +127,7 @@ class PlantNode(LifecycleNode):
             lockstep=self.settings.lockstep,
             simulated_time=self.clock if isinstance(self.clock, SimulatedTime) else None,
             chain=self.settings.between,
+            transforms=self.settings.transforms,
         )
         if isinstance(self._backend, AirBearing):
             self._air = AirBearingWires(self, self._backend, watched=not self.settings.between)

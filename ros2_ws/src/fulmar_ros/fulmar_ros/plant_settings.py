@@ -38,6 +38,9 @@ class PlantSettings:
     mocap_hz: float = 0.0  # publish mocap/pose so often, also beside odom; 0: at every tick in its place [Hz]
     mocap_late_s: float = 0.0  # by which a pose is stamped and sent after its capture [s]
     chain: tuple[str, ...] = ("",)  # nodes between plant and controller that answer each period of lock step
+    transforms: bool = (
+        True  # publish /tf and /tf_static, where tf2_msgs is installed; off where another node does
+    )
     estop: bool = False  # nothing moves before a message of an e-stop
     autostart: bool = True
 

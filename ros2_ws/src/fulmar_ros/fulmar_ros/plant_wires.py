@@ -47,6 +47,7 @@ from fulmar_ros.convert import (
     stamp_of,
 )
 from fulmar_ros.deadline import Spread
+from fulmar_ros.frame_wires import ModelWires, odometry_transform
 from fulmar_ros.graph import writers_of
 from fulmar_ros.motion_capture import MakeCapture
 from fulmar_ros.operator_subscription import subscribe_operator
@@ -76,6 +77,7 @@ class PlantWires:
         lockstep: bool = False,
         simulated_time: SimulatedTime | None = None,
         chain: Sequence[str] = (),
+        transforms: bool = True,
     ) -> None:
         """Create every endpoint.
 
@@ -91,10 +93,11 @@ class PlantWires:
                 clock, without it, a person may take the actuators, and commands go before other work.
             simulated_time: Clock of a simulated plant, by which actuators follow commands.
             chain: Nodes between plant and controller that take part in lock step.
+            transforms: Whether frames are published, where tf2_msgs is installed.
         """
         self._mocap = mocap(self._publish_pose) if mocap is not None else None
         self._prior = lockstep  # whether the threads that commands pass have what priority they need
-        self._publish = publish_patiently if lockstep else Publisher.publish
+        self._publish = publish = publish_patiently if lockstep else Publisher.publish
         self._flush_s = FLUSH_S if lockstep else LAST_WORDS_S
         self.lock = threading.Condition()
         self.latency_ms = Spread()
@@ -113,7 +116,13 @@ class PlantWires:
         if self._period is not None:
             self._publish = self._period.publish
         frames = own_frames(node, robot)
-        self._sensors = SensorWires(node, robot, frames, qos, self._publish, odometry=odometry)
+        transform = odometry_transform(
+            node, frames, wanted=transforms and odometry, publish=publish, lockstep=lockstep
+        )
+        self._sensors = SensorWires(
+            node, robot, frames, qos, self._publish, odometry=odometry, transform=transform
+        )
+        self._model = ModelWires(node, robot, frames, qos, simulated=simulated, transforms=transforms)
         self._poses = (
             node.create_publisher(PoseStamped, MOCAP.name, qos(MOCAP)) if mocap is not None else None
         )
@@ -169,7 +178,9 @@ class PlantWires:
         made = (self._poses, self._state, self._truth, self._clock)
         rest = (publisher for publisher in made if publisher is not None)
         period = [self._period.publisher] if self._period is not None else []
-        return [*self._sensors.publishers, *rest, *self._things.values(), *period]
+        return [
+            *self._sensors.publishers, *self._model.publishers, *rest, *self._things.values(), *period,
+        ]  # fmt: skip
 
     def subscribers(self) -> int:
         """Matched subscriptions of periods, else of the odometry, of the poses, or of the actuators' state."""

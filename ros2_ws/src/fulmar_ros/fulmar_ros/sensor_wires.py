@@ -17,6 +17,7 @@ from fulmar_core.sensors.reading import Reading
 from fulmar_core.sensors.table import SENSORS
 from fulmar_core.wire import Wire
 from fulmar_ros.convert import OdometryWriter, stamp_of
+from fulmar_ros.frame_wires import OdometryTransform
 from fulmar_ros.message_class import message_class
 
 Encode = Callable[[Reading, int], Any]  # a reading and its stamp [ns] to a message, or to its bytes
@@ -66,6 +67,7 @@ class SensorWires:
         publish: Callable[[Publisher, Any], None],
         *,
         odometry: bool,
+        transform: OdometryTransform | None = None,
     ) -> None:
         """Create the publishers.
 
@@ -76,7 +78,9 @@ class SensorWires:
             qos: Quality of service of a wire.
             publish: Publishes a message, or its bytes.
             odometry: Whether to publish the odometry; if not, another node does.
+            transform: Publishes each odometry as a transform, too.
         """
+        self._transform = transform
         self._publish = publish
         self._made: dict[str, Publisher] = {}
         self._encode: dict[str, Encode] = {}
@@ -90,7 +94,8 @@ class SensorWires:
     @property
     def publishers(self) -> list[Publisher]:
         """All of them."""
-        return list(self._made.values())
+        transform = [self._transform.publisher] if self._transform is not None else []
+        return [*self._made.values(), *transform]
 
     @property
     def odometry(self) -> Publisher | None:
@@ -105,6 +110,8 @@ class SensorWires:
             sample_ns: Time of the sample [ns].
         """
         self.publish_odometry(readings, sample_ns)
+        if self._transform is not None and ODOMETRY in readings:
+            self._transform.publish(readings[ODOMETRY].value, sample_ns)
         for name in self._made:
             if name in readings and name != ODOMETRY:
                 self._publish_if_new(name, readings[name], sample_ns)

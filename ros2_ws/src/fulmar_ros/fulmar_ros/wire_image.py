@@ -20,7 +20,6 @@ Numbers: TypeAlias = Sequence[float]
 LATEST_NS = 2**31 * NS  # seconds of a message have 32 bits
 _STAMP = struct.Struct("=iI")
 _STAMP_AT = 4  # behind the four bytes that name the encoding: the header comes first, its stamp first in it
-_TEXTS_AT = _STAMP_AT + _STAMP.size
 _WORD = 4  # counts and lengths have so many bytes, and lie at multiples of it
 
 
@@ -40,14 +39,17 @@ class WireImage:
     The bytes that only fill up to the next multiple are of any value in received messages, and zero in written ones.
     """
 
-    def __init__(self, message: Any, *runs: Numbers, texts: Sequence[str], counts: int = 0) -> None:
+    def __init__(
+        self, message: Any, *runs: Numbers, texts: Sequence[str], counts: int = 0, before: int = 0
+    ) -> None:
         """Find where the numbers lie.
 
         Args:
-            message: Begins with a header, then texts, then numbers.
+            message: Begins with a header, or a sequence of one whose only part begins with it, then texts, then numbers.
             runs: Numbers in the message that lie side by side, in the order of its fields. Each must occur once.
             texts: Every text in the message, in the order of its fields, before the first run.
             counts: Lengths of sequences between the last text and the first run.
+            before: Lengths of sequences before the header.
 
         Raises:
             ValueError: A run is not in the message exactly once, or comes before the one before it; or the message has
@@ -64,7 +66,9 @@ class WireImage:
         self._image = bytearray(len(image))
         self._image[:_WORD] = image[:_WORD]
         self._image[self._places[0] :] = image[self._places[0] :]
-        at = _TEXTS_AT
+        self._stamp_at = _STAMP_AT + before * _WORD
+        self._keep(image, _STAMP_AT, self._stamp_at)
+        at = self._stamp_at + _STAMP.size
         for text in texts:
             mark = text.encode() + b"\0"
             end = image.index(mark, at + _WORD) + len(mark)  # behind its length
@@ -93,7 +97,7 @@ class WireImage:
             runs: As many numbers as the constructor got.
         """
         time_ns = min(max(time_ns, -LATEST_NS), LATEST_NS - 1)
-        _STAMP.pack_into(self._image, _STAMP_AT, *divmod(time_ns, NS))
+        _STAMP.pack_into(self._image, self._stamp_at, *divmod(time_ns, NS))
         for packing, place, run in zip(self._runs, self._places, runs, strict=True):
             packing.pack_into(self._image, place, *run)
         return bytes(self._image)
@@ -105,7 +109,7 @@ class WireImage:
         for begin, end, expected in self._fixed:
             if data[begin:end] != expected:
                 return None
-        seconds, rest = _STAMP.unpack_from(data, _STAMP_AT)
+        seconds, rest = _STAMP.unpack_from(data, self._stamp_at)
         runs = [packing.unpack_from(data, at) for packing, at in zip(self._runs, self._places, strict=True)]
         return seconds * NS + rest, runs
 

@@ -57,6 +57,17 @@ class Ackermann(Rolling):
         return "speed", "steering_angle"
 
     @property
+    def wheels(self) -> dict[str, tuple[float, float]]:
+        """See `Rolling.wheels`."""
+        half = 0.5 * self.track
+        return {
+            "rear_left": (0.0, half),
+            "rear_right": (0.0, -half),
+            "front_left": (self.wheelbase, half),
+            "front_right": (self.wheelbase, -half),
+        }
+
+    @property
     def scale(self) -> np.ndarray:
         """Largest command [m/s, rad]."""
         return np.array([self.max_speed, self.max_steering])

@@ -50,6 +50,12 @@ class DifferentialDrive(Rolling):
         return "speed", "turn_rate"
 
     @property
+    def wheels(self) -> dict[str, tuple[float, float]]:
+        """See `Rolling.wheels`."""
+        half = 0.5 * self.track
+        return {"left_wheel": (0.0, half), "right_wheel": (0.0, -half)}
+
+    @property
     def scale(self) -> np.ndarray:
         """Largest command [m/s, rad/s]."""
         return np.array([self.max_speed, self.max_yaw_rate])

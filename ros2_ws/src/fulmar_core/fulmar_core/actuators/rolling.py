@@ -14,6 +14,7 @@ from fulmar_core.disturbances.world import World
 from fulmar_core.planar import PlanarState
 from fulmar_core.rotation import Array
 
+CLEARANCE = 0.4  # of the chassis above the floor, in wheel radii; our value [-]
 SERVO_S = 0.05  # time constant of a wheel's speed servo where the drive names none [s]
 
 
@@ -22,11 +23,13 @@ class Rolling(Actuators):
 
     Attributes:
         track: Between left and right wheels [m].
+        wheel_radius: Of every wheel [m].
         wheel_force: The most that wheels push, as the family counts it [N].
         friction: Of the tyres on the floor [-].
     """
 
     track: float
+    wheel_radius: float
     wheel_force: float
     friction: float
     excitation = Excitation(hold_s=1.5, foresight_s=1.0)  # long enough to come up to speed, and to stop
@@ -35,6 +38,11 @@ class Rolling(Actuators):
     @abstractmethod
     def pull(self) -> float:
         """The most that all wheels push together [N]."""
+
+    @property
+    @abstractmethod
+    def wheels(self) -> dict[str, tuple[float, float]]:
+        """Name of each wheel, and its place: ahead of the body's origin and to its left, at axle height [m]."""
 
     @abstractmethod
     def next_yaw_rate(
