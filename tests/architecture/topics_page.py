@@ -45,7 +45,6 @@ DIRECTIONS = {
     "operator": "From the operator to plant and controller",
     "every node": "From every node to the operator",
     "display": "From the node that draws to viewers",
-    "device": "From other nodes to the recorder",
 }
 
 HEAD = "| Topic | Type | QoS | Rate | Unit | Frame | Content |\n|---|---|---|---|---|---|---|"

@@ -45,7 +45,7 @@ class WireImage:
         """Find where the numbers lie.
 
         Args:
-            message: Begins with a header, or a sequence of one whose only part begins with it, then texts, then numbers.
+            message: Begins with a header, or is a list of one part that begins with it; then texts, then numbers.
             runs: Numbers in the message that lie side by side, in the order of its fields. Each must occur once.
             texts: Every text in the message, in the order of its fields, before the first run.
             counts: Lengths of sequences between the last text and the first run.
