@@ -39,7 +39,9 @@ def test_every_robot_shows_its_body_at_once_and_nothing_that_was_not_received(ro
     assert [*shapes] == [("body", 0)]
     body = load_robot(robot).body
     assert shapes["body", 0].in_body
-    assert shapes["body", 0].size == (*(body.footprint or (2.0 * body.radius,) * 2), body.height)
+    low, high = load_robot(robot).hull_span
+    assert shapes["body", 0].size == (*(body.footprint or (2.0 * body.radius,) * 2), high - low)
+    assert shapes["body", 0].position == (body.footprint_x, 0.0, 0.5 * (low + high))
 
 
 def test_nothing_is_drawn_again_before_it_changes():

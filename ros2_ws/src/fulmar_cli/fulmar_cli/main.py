@@ -29,6 +29,7 @@ from fulmar_cli.commands.goals import goals
 from fulmar_cli.commands.identify import identify
 from fulmar_cli.commands.import_policy import import_policy
 from fulmar_cli.commands.install_tf import install_tf
+from fulmar_cli.commands.layout import layout
 from fulmar_cli.commands.list import list_names
 from fulmar_cli.commands.policies import policies
 from fulmar_cli.commands.report import report
@@ -82,6 +83,7 @@ app.command("list")(list_names)
 app.command()(run)
 app.command()(up)
 app.command()(goals)
+app.command()(layout)
 app.command()(teleop)
 app.command()(status)
 app.command()(estop)

@@ -78,7 +78,7 @@ class MarkersNode(Node):
         self._name, self._frames = name_of(self, robot), own_frames(self, robot)
         self._topic = task.goal_topic
         self._scene = Scene(robot, task, settings.area)
-        self._heard_s = self._reported_s = 0.0
+        self._received_s = self._reported_s = 0.0
         self._problem = ""
         self._message: MarkerArray | None = None
         self._publisher = self.create_publisher(MarkerArray, MARKERS.name, publisher_qos(MARKERS))
@@ -124,12 +124,12 @@ class MarkersNode(Node):
             self._scene.give_status({pair.key: pair.value for pair in message.status[0].values})
 
     def _on_applied(self, message: JointState) -> None:
-        self._heard_s = time.monotonic()
+        self._received_s = time.monotonic()
         self._scene.give_applied(message.name, message.effort)
 
     def _draw(self) -> None:
         now = time.monotonic()
-        if now - self._heard_s > SILENT_S:
+        if now - self._received_s > SILENT_S:
             self._scene.forget_applied()
         change = self._scene.change()
         if change is not None:

@@ -10,7 +10,7 @@ import numpy as np
 from fulmar_core.actuators.ackermann import Ackermann
 from fulmar_core.actuators.pushing import Pushing
 from fulmar_core.robot import Robot
-from fulmar_core.scene.shape import Color, Shape, arrow, circle, line
+from fulmar_core.scene.shape import Color, Kind, Shape, arrow, circle, line
 
 BODY, THRUST, DRIVE = "body", "thrust", "drive"
 GREY: Color = (0.6, 0.6, 0.65, 0.35)  # the model of `robot_description` shows through
@@ -22,13 +22,15 @@ AHEAD_S = 1.0  # a velocity is drawn as what it goes in this time [s]
 
 
 def body_shapes(robot: Robot) -> list[Shape]:
-    """The outline of the body: its footprint as a box, a ball, or a cylinder; its origin in the middle."""
-    body = robot.body
-    if body.footprint is not None:
-        size = (*body.footprint, body.height)
-        return [Shape(BODY, 0, "box", True, size, GREY, (body.footprint_x, 0.0, 0.0))]
+    """The outline of the body: a box, a ball or a cylinder, where the URDF has the hull."""
+    body, (low, high) = robot.body, robot.hull_span
     width, in_space = 2.0 * body.radius, robot.state_type.AXES == 3
-    return [Shape(BODY, 0, "sphere" if in_space else "cylinder", True, (width, width, body.height), GREY)]
+    kind: Kind = "sphere" if in_space else "cylinder"
+    across = (width, width)
+    if body.footprint is not None:
+        kind, across = "box", body.footprint
+    place = (body.footprint_x, 0.0, 0.5 * (low + high))
+    return [Shape(BODY, 0, kind, True, (*across, high - low), GREY, place)]
 
 
 def applied_shapes(robot: Robot, effort: Sequence[float]) -> list[Shape]:
@@ -69,7 +71,7 @@ def velocity_shapes(group: str, twist: Sequence[float], robot: Robot, color: Col
         robot: Arcs go around its body.
         color: Of both.
     """
-    above = 0.0 if robot.state_type.AXES == 3 else 0.5 * robot.body.height
+    above = 0.0 if robot.state_type.AXES == 3 else robot.hull_span[1]
     origin = (0.0, 0.0, above)
     velocity = [AHEAD_S * part for part in twist[:3]]
     rate = [AHEAD_S * part for part in twist[3:]]

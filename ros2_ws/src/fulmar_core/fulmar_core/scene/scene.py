@@ -64,7 +64,7 @@ class Scene:
             self._applied.append(values)
 
     def forget_applied(self) -> None:
-        """The plant fell silent: nobody knows what the actuators do."""
+        """The plant fell silent: what its actuators do is unknown."""
         self._applied.clear()
         self._shown = np.zeros_like(self._shown)
 

@@ -44,7 +44,7 @@ class Shape:
 
     @property
     def key(self) -> tuple[str, int]:
-        """What tells it apart from other shapes."""
+        """Unique among the shapes of a scene."""
         return self.group, self.number
 
 
