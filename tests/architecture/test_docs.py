@@ -20,7 +20,7 @@ ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
 PAGES = {path.stem: path for path in (ROOT / "README.md", *sorted(DOCS.glob("*.md")))}
 COMMAND = re.compile(r"^ *(fulmar [a-z].*)$", re.MULTILINE)
-INLINE = re.compile(r"`fulmar ([a-z]+)")
+INLINE = re.compile(r"`fulmar ([a-z]+(?:-[a-z]+)*)")
 FILE = re.compile(
     r"`((?:fulmar_|sim_nodes|policy_server|hardware_drivers|training|configs|tests)[\w/]*/[\w./]+)`"
 )
