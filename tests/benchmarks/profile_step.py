@@ -122,7 +122,7 @@ def serve(arguments: argparse.Namespace) -> None:
         nonlocal given
         if not given:
             given = True
-            node._on_goal(goal_message(goal_at((2.0, 1.0, 0.5)), topic, 1))
+            node._on_goal(goal_message(goal_at((2.0, 1.0, 0.5)), topic, 1), {})
         if steps >= WARM_UP_STEPS:
             watch.begin()
         on_odometry(node, message)

@@ -160,5 +160,5 @@ def plan_without(request):
 
 def test_a_system_with_goals_has_a_node_more():
     nodes = list_nodes(task="track_velocities", controller="classical", goals="circle")
-    assert [node.name for node in nodes] == ["recorder", "plant", "controller", "goals"]
+    assert [node.name for node in nodes] == ["recorder", "plant", "controller", "goals", "markers"]
     assert nodes[3].parameters["goals"].endswith("configs/goals/circle.yaml")

@@ -29,7 +29,7 @@ def test_a_system_file_of_the_user_s_own_starts_nodes_with_task_and_controller(t
     (tmp_path / "systems" / "circling.yaml").write_text(SYSTEM)
     monkeypatch.setenv(OWN_FOLDERS, str(tmp_path))
     with own_folder(tmp_path, monkeypatch):
-        recorder, plant, node = list_nodes(system="circling")
+        recorder, plant, node, _markers = list_nodes(system="circling")
     assert plant.parameters["task"] == node.parameters["task"] == "my_task:Circle"
     assert node.parameters["controller"] == "my_orbit:Orbit"
     carried = json.loads(str(recorder.parameters["attachments"]))

@@ -38,10 +38,10 @@ def rows(**choice):
 
 
 def test_an_external_controller_has_no_row_and_an_adapter_has_one():
-    assert set(rows()) == {"recorder", "plant"}
-    assert set(rows(task="track_velocities", goals="circle")) == {"recorder", "plant", "goals"}
+    assert set(rows()) == {"recorder", "plant", "markers"}
+    assert set(rows(task="track_velocities", goals="circle")) == {"recorder", "plant", "goals", "markers"}
     adapted = rows(adapter=KOBUKI, topic="/raw")
-    assert set(adapted) == {"recorder", "plant", "adapter"}
+    assert set(adapted) == {"recorder", "plant", "adapter", "markers"}
     assert adapted["adapter"].module == "hardware_drivers.adapter_node"
     assert adapted["adapter"].parameters["hardware"].endswith("configs/hardware/turtlebot2_kobuki_node.yaml")
     assert adapted["adapter"].parameters["topic"] == "/raw"

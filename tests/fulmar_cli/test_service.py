@@ -69,7 +69,7 @@ def test_a_unit_restarts_with_a_limit_stops_gently_and_is_nothing_of_root(servic
     service("install", "mujoco_lqr", "--user", USER)
     text = unit_of(tmp_path, "mujoco_lqr").read_text()
     for line in (
-        f"User={USER}", "Restart=on-failure", "StartLimitBurst=5", "KillSignal=SIGTERM", "NoNewPrivileges=yes",
+        f"User={USER}", "Restart=on-failure", "StartLimitBurst=20", "KillSignal=SIGTERM", "NoNewPrivileges=yes",
         f"LimitRTPRIO={RT_LIMIT}", "LimitMEMLOCK=infinity", "WantedBy=multi-user.target", "StandardOutput=journal",
     ):  # fmt: skip
         assert f"\n{line}\n" in text
@@ -124,6 +124,33 @@ def test_a_unit_of_someone_else_is_left_alone(service, tmp_path):
     assert code == BAD_USAGE
     assert "not written by `fulmar service install`" in messages
     assert path.read_text() == "[Unit]\n"
+
+
+def test_rules_of_someone_else_are_left_alone(service, tmp_path):
+    service("install", "mujoco_lqr", "--user", USER)
+    rules = tmp_path / "etc/udev/rules.d/70-fulmar-mujoco_lqr.rules"
+    rules.parent.mkdir(parents=True)
+    rules.write_text("# mine\n")
+    assert service("remove", "mujoco_lqr")[0] == DONE
+    assert rules.read_text() == "# mine\n"
+
+
+def test_rules_go_with_the_hardware_that_they_were_for(service, tmp_path):
+    service("install", "mujoco_lab", "--backend", "hardware", "--user", USER)
+    rules = tmp_path / "etc/udev/rules.d/70-fulmar-mujoco_lab.rules"
+    assert rules.exists()
+    service("install", "mujoco_lab", "--user", USER)
+    assert not rules.exists()
+
+
+def test_paths_of_a_sourced_ros_are_kept_and_those_of_wheels_are_not(service, tmp_path, monkeypatch):
+    monkeypatch.setenv("LD_LIBRARY_PATH", "/opt/ros/jazzy/lib")
+    monkeypatch.delenv("ROS_DISTRO", raising=False)
+    service("install", "mujoco_lqr", "--user", USER)
+    assert "LD_LIBRARY_PATH" not in unit_of(tmp_path, "mujoco_lqr").read_text()
+    monkeypatch.setenv("ROS_DISTRO", "jazzy")
+    service("install", "mujoco_lqr", "--user", USER)
+    assert "Environment=LD_LIBRARY_PATH=/opt/ros/jazzy/lib\n" in unit_of(tmp_path, "mujoco_lqr").read_text()
 
 
 def test_a_folder_that_cannot_be_written_is_one_line(service, tmp_path):

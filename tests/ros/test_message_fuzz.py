@@ -204,7 +204,7 @@ def test_a_controller_commands_nothing_but_finite_values_within_its_limits(
             elif isinstance(message, str):
                 controller._on_swap(String(data=message))
             else:
-                controller._on_goal(message)
+                controller._on_goal(message, {})
             controller._control(controller.guard.newest)
     finally:
         controller.wires.publish_command = publish  # type: ignore[method-assign]

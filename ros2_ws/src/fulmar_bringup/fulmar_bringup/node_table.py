@@ -82,6 +82,8 @@ def controller_spec(plan: RunPlan) -> NodeSpec:
         parameters["area"] = list(guards.area)
     if guards.estop:
         parameters["estop"] = True
+    if plan.unattended:
+        parameters["unattended"] = True
     if plan.backend == "hardware":
         hardware = load_hardware(plan.hardware)
         if hardware.has_bearing:

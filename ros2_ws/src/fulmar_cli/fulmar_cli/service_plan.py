@@ -107,12 +107,22 @@ def plan_service(wanted: Wanted, root: Path, *, dry_run: bool) -> PlannedService
         rules, groups = device_rules(file), device_groups(file)
         if root == Path("/"):
             _warn_of_absence(request.plan.hardware)
+    user = _user(wanted.user, root)
+    if root == Path("/") and not dry_run:
+        _check_program(str(_program()), user)
+    known = known_groups(groups, (group.gr_name for group in grp.getgrall()))
+    for group in set(groups) - set(known):
+        warn(
+            [
+                f"the group '{group}' of the rules does not exist: sudo groupadd --system {group}, then install again"
+            ]
+        )
     service = Service(
         f"{wanted.system}-{wanted.name}" if wanted.name else wanted.system,
         wanted.system,
         (str(_program()), "up", wanted.system, "--service", *_options(wanted, hardware, policy)),
-        _user(wanted.user, root),
-        known_groups(groups, (group.gr_name for group in grp.getgrall())),
+        user,
+        known,
     )
     return PlannedService(service, Files(root, service.name), unit_text(service, os.environ), rules)
 
@@ -147,6 +157,31 @@ def _user(name: str | None, root: Path) -> str:
                 f"there is no user '{chosen}' here. Make one: sudo useradd --create-home {chosen}"
             ) from None
     return chosen
+
+
+def _check_program(program: str, user: str) -> None:
+    """Refuse a program that the user of the service may not run, such as one in the home of root.
+
+    Raises:
+        ConfigError: With what the attempt said.
+    """
+    about = pwd.getpwnam(user)
+    try:
+        done = subprocess.run(
+            [program, "--version"],
+            user=about.pw_uid,
+            group=about.pw_gid,
+            cwd="/",
+            capture_output=True,
+            check=False,
+        )
+        words = done.stderr.decode(errors="replace").strip().splitlines()[-1:] if done.returncode else []
+    except OSError as error:
+        words = [str(error)]
+    if words:
+        raise ConfigError(
+            f"'{user}' cannot run {program} ({words[0]}). Install Fulmar where that user may read it."
+        )
 
 
 def _warn_of_absence(hardware: str) -> None:

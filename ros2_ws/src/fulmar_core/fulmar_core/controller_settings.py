@@ -35,6 +35,9 @@ class ControllerSettings:
     fallback: str = ""  # classical controller that takes over when a policy is refused, or its commands are
     trusted_keys: str = ""  # file or folder of public keys: no bundle runs that none of them has signed
     estop: bool = False  # nothing moves before an e-stop message is received
+    unattended: bool = (
+        False  # begun by a service: goals that were published before the reset of the e-stop do not count
+    )
     max_run_time_s: float = 0.0  # of acting, in the robot's own time; 0: for ever [s]
     # x_min, x_max, y_min, y_max that the robot must not leave, in space also z_min, z_max [m].
     area: tuple[float, ...] = NO_AREA

@@ -34,6 +34,7 @@ from fulmar_ros.controller_wires import ControllerWires
 from fulmar_ros.convert import OdometryReader, VectorReader
 from fulmar_ros.deadline import ControlBeat
 from fulmar_ros.fallback import MakeController, PolicySwap, controllers_of, load_other
+from fulmar_ros.goal_age import GoalAge
 from fulmar_ros.goal_messages import GoalMessage
 from fulmar_ros.graph import WireWatch
 from fulmar_ros.node_identity import identity_of
@@ -72,6 +73,7 @@ class ControllerNode(LifecycleNode):
         self._sending = threading.Lock()  # held from the look at whether commands may go out until one has
         hz = self.settings.control_rate(self.robot)
         self.guard: GuardedLoop | None = None  # while configured
+        self._goal_age = GoalAge(counts=self.settings.unattended)
         self._estop = EstopMonitor(required=self.settings.estop)  # a press outlives a new configuration
         self._swap = PolicySwap(
             self._load if self.settings.controller == POLICY else None,
@@ -204,6 +206,7 @@ class ControllerNode(LifecycleNode):
         self._publish_status()
 
     def _on_estop_released(self, _message: String) -> None:
+        self._goal_age.reset()
         self._estop.release(time.monotonic_ns())
         self._publish_status()
 
@@ -219,10 +222,11 @@ class ControllerNode(LifecycleNode):
         self._beliefs = Beliefs()
         self.wires.publish_metadata(self._guarded.switch.current.metadata)
 
-    def _on_goal(self, message: GoalMessage) -> None:
+    def _on_goal(self, message: GoalMessage, info: dict[str, int]) -> None:
         targets, problem = goal_of(message, self._frames)
         stamp = stamp_ns(message.header.stamp)
-        if targets is None:
+        problem = problem or self._goal_age.problem(info)
+        if targets is None or problem:
             self._guarded.refuse_goal(problem, stamp)
         else:
             problem = self._guarded.take_goal(targets, stamp, time.monotonic_ns())

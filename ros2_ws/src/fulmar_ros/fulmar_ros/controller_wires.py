@@ -56,7 +56,7 @@ class ControllerWires:
         observation_names: tuple[str, ...],
         *,
         on_odometry: Callable[[bytes], None],
-        on_goal: Callable[[GoalMessage], None],
+        on_goal: Callable[[GoalMessage, dict[str, int]], None],
         on_obstacles: Callable[[MarkerArray], None],
         on_thing: Callable[[str, PoseStamped], None],
         on_estop: Callable[[Bool], None],
@@ -74,7 +74,7 @@ class ControllerWires:
             task: Has the topic of the goals.
             observation_names: Of the terms that the controller observes.
             on_odometry: Receives odometry, serialised.
-            on_goal: Receives every goal.
+            on_goal: Receives every goal, with the info of its message.
             on_obstacles: Receives all obstacles whenever they change.
             on_thing: Receives the name of a thing and its pose.
             on_estop: Receives whether the e-stop is pressed.
@@ -128,7 +128,7 @@ class ControllerWires:
             node.create_subscription(String, SWAP.name, on_swap, subscriber_qos(SWAP, reliable=True)),
         ]
         for goal in goal_wires(task.goal_topic):
-            self._subscriptions += subscribe_operator(node, TYPES[goal.name], goal, on_goal)
+            self._subscriptions += subscribe_operator(node, TYPES[goal.name], goal, on_goal, with_info=True)
         reliably = [ESTOP, ESTOP_RELEASED, SWAP, *goal_wires(task.goal_topic)]
         if task.sees_obstacles:
             self._subscriptions += subscribe_operator(node, MarkerArray, OBSTACLES, on_obstacles)

@@ -52,12 +52,14 @@ def write_files(files: Files, unit: str, rules: tuple[str, ...]) -> list[Path]:
     if rules:
         texts[files.rules] = "\n".join((MARK, *rules, ""))
     for path in texts:
-        if path.exists() and MARK not in path.read_text(errors="replace"):
+        if path.exists() and not _is_ours(path):
             raise ConfigError(f"{path} is not written by `fulmar service install`: rename it first.")
     try:
         for path, text in texts.items():
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(text)
+        if not rules and _is_ours(files.rules):
+            files.rules.unlink()  # of another installation under this name
         files.link.parent.mkdir(parents=True, exist_ok=True)
         files.link.unlink(missing_ok=True)
         files.link.symlink_to(Path("..") / files.unit.name)
@@ -69,7 +71,12 @@ def write_files(files: Files, unit: str, rules: tuple[str, ...]) -> list[Path]:
 def installed(root: Path) -> list[str]:
     """Names of the services below a root."""
     units = sorted((root / UNITS).glob("fulmar-*.service"))
-    return [unit.stem.removeprefix("fulmar-") for unit in units if MARK in unit.read_text(errors="replace")]
+    return [unit.stem.removeprefix("fulmar-") for unit in units if _is_ours(unit)]
+
+
+def _is_ours(path: Path) -> bool:
+    """Whether a file is there, and written by `write_files`."""
+    return path.is_file() and MARK in path.read_text(errors="replace")
 
 
 def find(root: Path, name: str) -> Files:
@@ -93,7 +100,7 @@ def remove_files(files: Files) -> list[Path]:
     Raises:
         FulmarError: A file cannot be removed.
     """
-    there = [path for path in (files.link, files.rules, files.unit) if path.is_symlink() or path.exists()]
+    there = [path for path in (files.link, files.rules, files.unit) if path.is_symlink() or _is_ours(path)]
     try:
         for path in there:
             path.unlink()

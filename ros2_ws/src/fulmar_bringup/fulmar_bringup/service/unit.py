@@ -9,16 +9,17 @@ from dataclasses import dataclass
 from fulmar_core.process import RT_LIMIT
 
 MARK = "# Written by `fulmar service install`; `fulmar service remove` removes it."
-# Of the environment of the one who installs: where nodes find each other, own files, and on a Jazzy machine ROS itself.
+# Of the environment of the one who installs: where nodes find each other, and own files.
 PASSED = (
     "ROS_DOMAIN_ID", "ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_STATIC_PEERS", "RMW_IMPLEMENTATION",
     "FASTDDS_BUILTIN_TRANSPORTS", "FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE",
     "ROS_SECURITY_ENABLE", "ROS_SECURITY_STRATEGY", "ROS_SECURITY_KEYSTORE", "FULMAR_CONFIGS", "FULMAR_CALIBRATION",
-    "AMENT_PREFIX_PATH", "PYTHONPATH", "LD_LIBRARY_PATH",
 )  # fmt: skip
+# The same where ROS is sourced, which sets the first; ROS from wheels finds its own places.
+OF_SOURCED_ROS = ("ROS_DISTRO", "ROS_VERSION", "AMENT_PREFIX_PATH", "PYTHONPATH", "LD_LIBRARY_PATH")
 STATE = "fulmar"  # folder below /var/lib, the working folder; bags lie in its `runs`
-# Our values. Five failures within five minutes are no accident: the robot then stays down until a person looks.
-RESTART_S, FAILURES, WITHIN_S = 5, 5, 300
+# Our values. A device may appear minutes after a boot; after twenty failures the robot stays down until a person looks.
+RESTART_S, FAILURES, WITHIN_S = 10, 20, 1800
 # Valves close within a second; bags on a slow disk take longer.
 STOP_S = 15
 
@@ -34,6 +35,9 @@ StartLimitBurst={failures}
 Type=exec
 User={user}
 {groups}{environment}StateDirectory={state}
+# rclpy writes a log file for each node, which the journal has too: these go with the service.
+RuntimeDirectory=fulmar-{name}
+Environment=ROS_LOG_DIR=/run/fulmar-{name}
 WorkingDirectory=/var/lib/{state}
 ExecStart={command}
 # Every node brings its device to the safe state on SIGTERM, also where the process that started it has died.
@@ -44,6 +48,7 @@ TimeoutStopSec={stop}
 Restart=on-failure
 RestartSec={restart}
 RestartPreventExitStatus=2
+SuccessExitStatus=SIGTERM
 LimitRTPRIO={rtprio}
 LimitMEMLOCK=infinity
 StandardOutput=journal
@@ -90,9 +95,10 @@ def unit_text(service: Service, environment: Mapping[str, str]) -> str:
 
     Args:
         service: What runs.
-        environment: Of the one who installs; `PASSED` is taken from it.
+        environment: Of the one who installs; `PASSED` is taken from it, and paths of ROS where it is sourced.
     """
-    passed = {name: environment[name] for name in PASSED if environment.get(name)}
+    names = (*PASSED, *OF_SOURCED_ROS) if environment.get(OF_SOURCED_ROS[0]) else PASSED
+    passed = {name: environment[name] for name in names if environment.get(name)}
     return UNIT.format(
         mark=MARK,
         system=service.system,

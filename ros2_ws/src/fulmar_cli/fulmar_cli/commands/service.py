@@ -36,7 +36,7 @@ def install(
     hardware: cli.HardwareOption = None,
     policy: cli.PolicyOption = None,
     recording: Annotated[
-        str, option("whole|ring|goals", "ring: only the time around faults, so that the disk never fills.")
+        str, option("whole|ring|goals", "ring: only the time around faults, so that the disk fills slowly.")
     ] = "ring",
     user: Annotated[str | None, option("USER", "Who runs it; by default the person behind sudo.")] = None,
     root: RootOption = ROOT,
@@ -46,8 +46,8 @@ def install(
     """Let systemd run `fulmar up SYSTEM --service` from boot on, as a user who is not root.
 
     After a boot or a restart nothing moves: the e-stop is pressed until a person resets it, goals from before do not
-    count, and an autopilot is not armed, whatever the hardware file says. It restarts after a failure, at most five
-    times in five minutes. Devices of the hardware file get rules of udev. Bags lie in /var/lib/fulmar/runs.
+    count, and an autopilot is not armed, whatever the hardware file says. It restarts after a failure, at most twenty
+    times in half an hour. Devices of the hardware file get rules of udev. Bags lie in /var/lib/fulmar/runs.
 
     Try:
 
