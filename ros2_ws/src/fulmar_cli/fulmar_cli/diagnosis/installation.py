@@ -40,7 +40,7 @@ def check_module(module: str, extra: str) -> Finding:
     try:
         importlib.import_module(module)
     except ImportError as error:
-        fix = f"{install_command(extra, module)}   # brings the extra '{extra}'"
+        fix = f"{install_command([extra], [module])}   # brings the extra '{extra}'"
         return Finding(module, "wrong", str(error), fix)
     try:
         return Finding(module, "ok", version(module))
