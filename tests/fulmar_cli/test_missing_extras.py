@@ -73,6 +73,7 @@ ALONE = [
     *(("run floating_platform", extra) for extra in ("ros", "sim", "policy", "bags")),
     ("run floating_platform --backend hardware --goal 0,0,0", "hardware"),
     *(("evaluate floating_platform go_to_pose", extra) for extra in ("sim", "policy")),
+    *((f"report {POLICY}", extra) for extra in ("bags", "view")),
     ("check robot jetbot --plot plot.png", "view"),
     ("train floating_platform go_to_pose --wandb", "wandb"),
 ]
@@ -154,3 +155,7 @@ def test_without_extras_a_command_works_or_names_what_it_needs(name, answers):
 @pytest.mark.parametrize(("line", "extra"), ALONE)
 def test_a_single_missing_extra_is_named_before_anything_begins(line, extra, answers):
     check_advice(answers[line, (extra,)], [extra])
+
+
+def test_nothing_is_written_before_an_extra_is_missed(answers, folder):
+    assert list(folder.iterdir()) == []

@@ -1,4 +1,4 @@
-"""How this Fulmar was installed, and the command that adds an extra to it."""
+"""How this Fulmar was installed, and the commands that add an extra to it and repair it."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from importlib.metadata import Distribution, PackageNotFoundError, distribution
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 from urllib.parse import urlsplit
 from urllib.request import url2pathname
 
@@ -42,14 +43,50 @@ def install_command(extras: Sequence[str], modules: Sequence[str]) -> str:
         own = distribution("fulmar")
     except PackageNotFoundError:
         return _for_a_workspace(extras, modules)
-    wanted = _shortest(extras)
-    origin = json.loads(own.read_text("direct_url.json") or "{}")
-    if origin.get("dir_info", {}).get("editable"):
-        return _for_a_checkout(Path(url2pathname(urlsplit(origin["url"]).path)), wanted)
-    receipt = Path(sys.prefix) / "uv-receipt.toml"
-    if receipt.is_file():
-        return f"uv tool install {_requirement(own, origin, [*_extras_of(receipt), *wanted])}"
+    wanted, origin = _shortest(extras), _origin(own)
+    folder = _checkout(origin)
+    if folder is not None:
+        return _for_a_checkout(folder, wanted)
+    if _receipt().is_file():
+        return f"uv tool install {_requirement(own, origin, [*_extras_of(_receipt()), *wanted])}"
     return f"{_pip()} {_requirement(own, origin, wanted)}"
+
+
+def repair_command(folder: str) -> str:
+    """Shell command that restores files that came with this Fulmar.
+
+    Args:
+        folder: Where a checkout has them, from its root.
+    """
+    try:
+        own = distribution("fulmar")
+    except PackageNotFoundError:
+        return "colcon build   # in the workspace"
+    origin = _origin(own)
+    checkout = _checkout(origin)
+    if checkout is not None:
+        return f"git -C {shlex.quote(str(checkout))} restore {folder}"
+    if _receipt().is_file():
+        again = _requirement(own, origin, _extras_of(_receipt()))
+        return f"uv tool install --reinstall-package fulmar {again}"
+    again = "--force-reinstall" if find_spec("pip") else "--reinstall"
+    return f"{_pip()} {again} --no-deps {_requirement(own, origin, [])}"
+
+
+def _origin(own: Distribution) -> dict[str, Any]:
+    """Where it was installed from, as PEP 610 records it; empty for a package index."""
+    return json.loads(own.read_text("direct_url.json") or "{}")
+
+
+def _checkout(origin: dict[str, Any]) -> Path | None:
+    if not origin.get("dir_info", {}).get("editable"):
+        return None
+    return Path(url2pathname(urlsplit(origin["url"]).path))
+
+
+def _receipt() -> Path:
+    """What `uv tool` leaves in the environments that it makes."""
+    return Path(sys.prefix) / "uv-receipt.toml"
 
 
 def _shortest(extras: Sequence[str]) -> list[str]:
@@ -83,14 +120,14 @@ def _pip() -> str:
     return f"{shlex.quote(sys.executable)} -m pip install"
 
 
-def _requirement(own: Distribution, origin: dict[str, str], extras: list[str]) -> str:
+def _requirement(own: Distribution, origin: dict[str, Any], extras: list[str]) -> str:
     """This very Fulmar with some extras: the file or address it came from, else its version."""
     name = f"fulmar{_in_brackets(extras)}"
     return shlex.quote(f"{name} @ {origin['url']}" if "url" in origin else f"{name}=={own.version}")
 
 
 def _in_brackets(extras: Sequence[str]) -> str:
-    return f"[{','.join(dict.fromkeys(extras))}]"
+    return f"[{','.join(dict.fromkeys(extras))}]" if extras else ""
 
 
 def _extras_of(receipt: Path) -> list[str]:
