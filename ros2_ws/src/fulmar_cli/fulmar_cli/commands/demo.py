@@ -26,7 +26,7 @@ def demo(
     require("rclpy", "mujoco", "onnxruntime", "mcap", "rosbags", "matplotlib")
     from fulmar_bags.run_record import read_run
     from fulmar_bringup.planning import plan_run
-    from fulmar_evaluation.report import write_report
+    from fulmar_evaluation.report.run_report import write_report
     from fulmar_evaluation.run_outcome import run_and_evaluate
 
     out = out or Path("runs") / f"demo_{time.strftime('%Y%m%d_%H%M%S')}"
