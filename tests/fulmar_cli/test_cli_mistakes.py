@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import shutil
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -275,34 +273,6 @@ def test_a_bundle_for_a_rate_that_the_robot_cannot_keep_is_not_accepted(fulmar, 
     slow = replace(policy_bundle.read_passport(Path(SHIPPED)), control_hz=7.0)
     monkeypatch.setattr(policy_bundle, "read_passport", lambda _folder: slow)
     assert "control_hz = 7 must divide the physics rate" in complaint(fulmar("bundle", "check", SHIPPED))
-
-
-@pytest.mark.parametrize(
-    ("module", "extra", "words"),
-    [
-        ("mujoco", "sim", [*RUN, "--controller", "lqr"]),
-        ("mujoco", "sim", ["evaluate", "floating_platform", "go_to_pose", "--controller", "lqr"]),
-        ("onnxruntime", "policy", RUN),
-        ("onnxruntime", "policy", ["evaluate", "floating_platform", "go_to_pose"]),
-        ("rclpy", "ros", RUN),
-        ("mcap", "bags", ["report", "bag"]),
-        ("matplotlib", "view", ["report", "bag"]),
-        ("torch", "train", ["train", "floating_platform", "go_to_pose"]),
-    ],
-)
-def test_a_part_that_is_not_installed_is_named_with_its_extra(module, extra, words, tmp_path):
-    program = (
-        f"import sys; sys.modules[{module!r}] = None; sys.argv = {['fulmar', *words]!r}\n"
-        "from fulmar_cli import main as cli\n"
-        "cli.main()\n"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", program],
-        capture_output=True, text=True, timeout=60, check=False, cwd=tmp_path,
-    )  # fmt: skip
-    reported = complaint((done.returncode, done.stdout, done.stderr))
-    assert f"needs '{module}', which the extra '{extra}' brings" in reported
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_run_folder_is_never_trained_into(fulmar, tmp_path):

@@ -21,12 +21,11 @@ from fulmar_core.calibration import load_calibration
 from fulmar_core.rotation import rotate
 from fulmar_core.spatial import SpatialState, quat_of
 from fulmar_core.topics import ODOMETRY
-from fulmar_evaluation.report import write_report
 from fulmar_evaluation.report.bag_report import _drawings
 from fulmar_evaluation.report.control_plot import actuators_height, draw_actuators, open_spans
 from fulmar_evaluation.report.error_plot import draw_progress, strips
 from fulmar_evaluation.report.motion_plot import draw_motion
-from fulmar_evaluation.report.run_report import _overview
+from fulmar_evaluation.report.run_report import _overview, write_report
 from fulmar_evaluation.report.run_view import DISPLAY_NAMES, views
 from fulmar_evaluation.report.space_plot import draw_space
 from fulmar_evaluation.report.style import BODY_AXES, CONTROLLER_COLOURS, colours, house_style

@@ -40,29 +40,30 @@ EXTRAS: dict[str, tuple[str, ...]] = {
 
 def advice_for(error: ModuleNotFoundError) -> str | None:
     """How to install a module that is missing; None if no extra brings it."""
-    return _advice((error.name or "").partition(".")[0])
+    missing = (error.name or "").partition(".")[0]
+    return _advice([missing]) if _extra_of(missing) else None
 
 
 def require(*modules: str) -> None:
     """Refuse to begin work that would fail later for lack of a module.
 
     Raises:
-        ConfigError: For the first module that is not installed.
+        ConfigError: For all modules that are not installed.
     """
-    for module in modules:
-        if find_spec(module) is None:
-            raise ConfigError(_advice(module) or f"this command needs '{module}', which is not installed.")
+    missing = [module for module in dict.fromkeys(modules) if find_spec(module) is None]
+    if missing:
+        raise ConfigError(_advice(missing))
 
 
-def check_plan(plan: RunPlan, *, backend: str = "") -> None:
+def check_plan(plan: RunPlan, *, through: str = "ros") -> None:
     """Refuse a plan whose nodes would fail for lack of a module, and log where default gains are used.
 
     Args:
         plan: What is to run.
-        backend: Backend that is used in place of the plan's.
+        through: `ros`, or what runs it in place of nodes: `mujoco`, or `batch` for Fulmar's own dynamics.
 
     Raises:
-        ConfigError: For the first module that is not installed.
+        ConfigError: For all modules that are not installed.
     """
     from fulmar_bringup.system import gains_note, modules_of
 
@@ -70,24 +71,36 @@ def check_plan(plan: RunPlan, *, backend: str = "") -> None:
     for note in dict.fromkeys(filter(None, notes)):
         log_line(f"info: {note}")
     if plan.only == "controller":
-        require(*modules_of(plan.controller, ""))
+        require("rclpy", *modules_of(plan.controller, ""))
         return
     require(
+        *(("rclpy", "mcap", "rosbags") if through == "ros" else ()),
         *modules_of(
             "external" if plan.only else plan.controller,
-            backend or plan.backend,
+            "mock" if through == "batch" else plan.backend,
             guards=plan.guards,
             hardware=plan.hardware,
             emulated=plan.emulated,
-        )
+        ),
     )
 
 
-def _advice(module: str) -> str | None:
-    for extra, modules in EXTRAS.items():
-        if module in modules:
-            return (
-                f"this command needs '{module}', which the extra '{extra}' brings. "
-                f"Run: {install_command(extra, module)}"
-            )
-    return None
+def _extra_of(module: str) -> str:
+    return next((extra for extra, modules in EXTRAS.items() if module in modules), "")
+
+
+def _advice(missing: list[str]) -> str:
+    """One line about modules that are not installed, with the command that installs all that extras bring."""
+    names = _listed(missing)
+    extras = list(dict.fromkeys(filter(None, map(_extra_of, missing))))
+    if not extras:
+        return f"this command needs {names}, which no extra of fulmar brings: install it with pip."
+    brought = (
+        f"the extra {_listed(extras)} brings" if len(extras) == 1 else f"the extras {_listed(extras)} bring"
+    )
+    return f"this command needs {names}, which {brought}. Run: {install_command(extras, missing)}"
+
+
+def _listed(names: list[str]) -> str:
+    quoted = [f"'{name}'" for name in names]
+    return " and ".join(filter(None, (", ".join(quoted[:-1]), quoted[-1])))

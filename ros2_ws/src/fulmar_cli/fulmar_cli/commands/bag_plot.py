@@ -35,7 +35,7 @@ def plot(
     with knowing_what_it_carries(opened):
         if _has_a_task(bag) and odometry is None:
             from fulmar_bags.run_record import read_run
-            from fulmar_evaluation.report import write_report
+            from fulmar_evaluation.report.run_report import write_report
 
             record = read_run(bag)
             written = [write_report([record], file) for file in files]

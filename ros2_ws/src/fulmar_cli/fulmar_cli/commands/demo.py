@@ -21,13 +21,14 @@ def demo(
     ] = None,
 ) -> None:
     """Run the floating platform with its policy, then with LQR, over real ROS 2; end with a table and a report."""
+    from fulmar_cli.extras import require
+
+    require("rclpy", "mujoco", "onnxruntime", "mcap", "rosbags", "matplotlib")
     from fulmar_bags.run_record import read_run
     from fulmar_bringup.planning import plan_run
-    from fulmar_cli.extras import require
-    from fulmar_evaluation.report import write_report
+    from fulmar_evaluation.report.run_report import write_report
     from fulmar_evaluation.run_outcome import run_and_evaluate
 
-    require("mujoco", "onnxruntime", "matplotlib")
     out = out or Path("runs") / f"demo_{time.strftime('%Y%m%d_%H%M%S')}"
     outcomes = []
     for controller in ("policy", "lqr"):

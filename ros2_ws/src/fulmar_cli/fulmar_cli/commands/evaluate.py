@@ -82,5 +82,5 @@ def evaluate(
         seed=seed, scenario=scenario, control_hz=control_hz, jobs=jobs, episode_s=episode_s, steps=steps,
         worlds=worlds, bounds=bounds,
     )  # fmt: skip
-    check_plan(trial.plan, backend="mock" if through == "batch" else "")
+    check_plan(trial.plan, through=through)
     print_result(trial_figures(trial), lambda figures: print_figures(figures, output), as_json=as_json)

@@ -34,8 +34,8 @@ def report(
     from fulmar_bags.contents import open_bag
     from fulmar_bags.run_record import read_any_run
     from fulmar_core.tasks import load_task
-    from fulmar_evaluation.report import write_report
     from fulmar_evaluation.report.bag_report import write_bag_report
+    from fulmar_evaluation.report.run_report import write_report
     from fulmar_evaluation.report.writer import default_report
     from fulmar_evaluation.rerun.embedded_configs import knowing_what_they_carry
 

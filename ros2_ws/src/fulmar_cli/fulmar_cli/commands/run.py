@@ -118,8 +118,6 @@ def run(
     from fulmar_bringup.planning import plan_run
     from fulmar_cli.extras import check_plan
     from fulmar_core.robot import use_calibration
-    from fulmar_evaluation.run_outcome import run_and_evaluate
-    from fulmar_evaluation.run_summary import summary_text
 
     use_calibration(calibration, robot)
     place = read_goal(goal, robot=robot)
@@ -142,6 +140,9 @@ def run(
         adapter=adapter, topic=topic, markers=markers,
     )  # fmt: skip
     check_plan(request.plan)
+    from fulmar_evaluation.run_outcome import run_and_evaluate
+    from fulmar_evaluation.run_summary import summary_text
+
     outcome = run_and_evaluate(replace(request, end_on_estop=end_on_estop))
     print_result(outcome.summary, lambda summary: write_line(summary_text(summary)), as_json=as_json)
     if outcome.failure:

@@ -9,7 +9,7 @@ from importlib.util import find_spec
 
 from fulmar_cli.diagnosis.check_result import Finding
 from fulmar_cli.extras import EXTRAS
-from fulmar_cli.installed_as import install_command
+from fulmar_cli.installed_as import install_command, repair_command
 from fulmar_core.errors import FulmarError
 from fulmar_core.paths import config_directories, config_names
 from fulmar_core.robot import load_robot
@@ -40,7 +40,7 @@ def check_module(module: str, extra: str) -> Finding:
     try:
         importlib.import_module(module)
     except ImportError as error:
-        fix = f"{install_command(extra, module)}   # brings the extra '{extra}'"
+        fix = f"{install_command([extra], [module])}   # brings the extra '{extra}'"
         return Finding(module, "wrong", str(error), fix)
     try:
         return Finding(module, "ok", version(module))
@@ -66,7 +66,8 @@ def check_configuration() -> Finding:
         for name in config_names("tasks"):
             load_task(name)
     except FulmarError as error:
-        return Finding("configuration", "wrong", str(error), "git status configs   # and correct that line")
+        fix = f"{repair_command('configs')}   # discards your changes; or correct that line"
+        return Finding("configuration", "wrong", str(error), fix)
     return Finding("configuration", "ok", ", ".join(map(str, config_directories())))
 
 
@@ -83,5 +84,5 @@ def check_policies() -> Finding:
             robot, task = load_robot(passport.robot), load_task(passport.task)
             Policy(folder, robot, task, control_hz=passport.control_hz)
     except (FulmarError, ImportError) as error:
-        return Finding("shipped policies", "wrong", str(error), "git checkout policy_server")
+        return Finding("shipped policies", "wrong", str(error), repair_command("policy_server"))
     return Finding("shipped policies", "ok", ", ".join(folder.name for folder in folders) or "none")
