@@ -138,12 +138,12 @@ def test_every_standing_service_speaks_udp_and_finds_containers_of_other_users(c
         assert service["environment"]["ROS_AUTOMATIC_DISCOVERY_RANGE"] == "SUBNET"
 
 
-def test_plant_and_controller_are_of_one_system_and_robot_and_one_e_stop_node_guards_them(compose):
+def test_plant_and_controller_are_of_one_system_and_robot_with_an_e_stop(compose):
     plant, controller = (parsed(compose["services"][name]["command"]) for name in ("plant", "controller"))
     assert (plant["only"], controller["only"]) == ("plant", "controller")
-    for key in ("system", "name", "robot", "task", "rate"):
+    for key in ("system", "name", "robot", "task", "rate", "estop"):
         assert plant[key] == controller[key]
-    assert [plant["estop"], controller["estop"]] == [True, False]
+    assert plant["estop"]
 
 
 def test_the_device_of_the_real_robot_has_the_name_of_the_udev_rule_and_lies_where_its_driver_looks(compose):
