@@ -4,26 +4,35 @@
 ARG BASE=docker.io/library/ros:jazzy
 FROM ${BASE} AS builder
 RUN apt-get update \
-    && apt-get install --yes --no-install-recommends python3-venv g++ python3-dev \
+    && apt-get install --yes --no-install-recommends python3-venv python3-numpy g++ python3-dev \
     && rm -rf /var/lib/apt/lists/*
 WORKDIR /src
+COPY docker/install-beside-ros.sh docker/
+COPY requirements.lock pyproject.toml ./
+RUN docker/install-beside-ros.sh wheels
 COPY . .
-# NumPy stays that of the system, against which rclpy is built.
-RUN python3 -m venv --system-site-packages /opt/fulmar \
-    && /opt/fulmar/bin/pip install --no-cache-dir "numpy<2" ".[sim,policy,bags,hardware,view]"
+RUN docker/install-beside-ros.sh fulmar
 
 FROM ${BASE}
-COPY --from=builder /opt/fulmar /opt/fulmar
-RUN useradd --create-home --shell /usr/sbin/nologin fulmar \
+# Ubuntu's images have a user `ubuntu` with the number 1000.
+RUN apt-get update \
+    && apt-get install --yes --no-install-recommends tini python3-numpy \
+    && rm -rf /var/lib/apt/lists/* \
+    && if id ubuntu > /dev/null 2>&1; then userdel --remove ubuntu; fi \
+    && useradd --uid 1000 --create-home --shell /usr/sbin/nologin fulmar \
     && install --directory --owner=fulmar --group=fulmar /runs
 ENV PATH=/opt/fulmar/bin:$PATH \
     PYTHONUNBUFFERED=1 \
     PYTHONDONTWRITEBYTECODE=1 \
     MPLCONFIGDIR=/tmp/matplotlib \
     ROS_HOME=/tmp/ros
+LABEL org.opencontainers.image.title="Fulmar" \
+    org.opencontainers.image.description="Simulated and real robots, controllers and recorder, on ROS 2 Jazzy" \
+    org.opencontainers.image.licenses="Apache-2.0"
+COPY --from=builder /opt/fulmar /opt/fulmar
 WORKDIR /
-USER fulmar
+USER 1000:1000
 STOPSIGNAL SIGTERM
 # The base image's own entry point sources ROS.
-ENTRYPOINT ["/ros_entrypoint.sh", "fulmar"]
+ENTRYPOINT ["tini", "-s", "--", "/ros_entrypoint.sh", "fulmar"]
 CMD ["--help"]
