@@ -17,6 +17,7 @@ from fulmar_cli.installed_as import install_command
 from tests.fulmar_cli.bag_commands import POLICY
 from tests.fulmar_cli.command_line import SHIPPED
 
+pytestmark = pytest.mark.slow
 ALL = tuple(EXTRAS)
 # What each command is given, and the extras that it names where all are missing: none, and it works without.
 GIVEN = {
@@ -26,6 +27,8 @@ GIVEN = {
     "goals": ("--robot floating_platform --pose 1,0,0", ("ros",)),
     "teleop": ("floating_platform", ("ros",)),
     "estop": ("", ("ros",)),
+    "status": ("", ("ros",)),
+    "layout": ("floating_platform --out -", ()),
     "swap": (f"floating_platform {SHIPPED}", ("ros",)),
     "commission": ("turtlebot2 --emulate", ("ros",)),
     "faults": ("", ("ros",)),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -170,6 +171,11 @@ def plan_run(
     if record.exists():
         raise ConfigError(
             f"{record} exists already; nothing recorded is overwritten. Give --record another folder."
+        )
+    there = next(folder for folder in record.absolute().parents if folder.exists())
+    if not os.access(there, os.W_OK | os.X_OK):
+        raise ConfigError(
+            f"{record}: cannot write a bag in {there}: Permission denied. Name a folder that you may write."
         )
     if hardware and not emulate:
         # Where a robot stands is where its odometry begins.
