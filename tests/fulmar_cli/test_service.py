@@ -116,7 +116,7 @@ def test_a_user_who_is_not_there_is_one_line(fulmar):
     assert "there is no user 'not_there'" in messages
 
 
-def test_a_unit_of_someone_else_is_left_alone(service, tmp_path):
+def test_a_foreign_unit_is_left_alone(service, tmp_path):
     path = unit_of(tmp_path, "mujoco_lqr")
     path.parent.mkdir(parents=True)
     path.write_text("[Unit]\n")
@@ -126,7 +126,7 @@ def test_a_unit_of_someone_else_is_left_alone(service, tmp_path):
     assert path.read_text() == "[Unit]\n"
 
 
-def test_rules_of_someone_else_are_left_alone(service, tmp_path):
+def test_foreign_rules_are_left_alone(service, tmp_path):
     service("install", "mujoco_lqr", "--user", USER)
     rules = tmp_path / "etc/udev/rules.d/70-fulmar-mujoco_lqr.rules"
     rules.parent.mkdir(parents=True)
