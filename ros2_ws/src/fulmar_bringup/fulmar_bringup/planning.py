@@ -173,7 +173,7 @@ def plan_run(
             f"{record} exists already; nothing recorded is overwritten. Give --record another folder."
         )
     there = next(folder for folder in record.absolute().parents if folder.exists())
-    if not os.access(there, os.W_OK | os.X_OK):
+    if there.is_dir() and not os.access(there, os.W_OK | os.X_OK):
         raise ConfigError(
             f"{record}: cannot write a bag in {there}: Permission denied. Name a folder that you may write."
         )
