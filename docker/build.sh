@@ -56,16 +56,16 @@ make_base() {
     folder=$(mktemp -d) || fail "no temporary folder can be made"
     # shellcheck disable=SC2064 # the folder of now
     trap "rm -rf '$folder'" EXIT
-    debootstrap --variant=minbase --include=ca-certificates "$SUITE" "$folder/root" > "$folder/log" 2>&1 || {
+    debootstrap --variant=minbase --include=ca-certificates "$SUITE" "$folder/debian" > "$folder/log" 2>&1 || {
         tail -n 3 "$folder/log" >&2
         fail "debootstrap failed, see above"
     }
     # debootstrap copies the resolver and the name of this machine.
-    rm -rf "$folder"/root/var/cache/apt/archives/*.deb "$folder"/root/var/lib/apt/lists/* || fail "debootstrap's archives cannot be removed"
-    : > "$folder/root/etc/resolv.conf" || fail "etc/resolv.conf of the base cannot be written"
-    echo localhost > "$folder/root/etc/hostname" || fail "etc/hostname of the base cannot be written"
+    rm -rf "$folder"/debian/var/cache/apt/archives/*.deb "$folder"/debian/var/lib/apt/lists/* || fail "debootstrap's archives cannot be removed"
+    : > "$folder/debian/etc/resolv.conf" || fail "etc/resolv.conf of the base cannot be written"
+    echo localhost > "$folder/debian/etc/hostname" || fail "etc/hostname of the base cannot be written"
     container=$(buildah from scratch) || fail "buildah cannot make an empty container, see above"
-    buildah add --quiet "$container" "$folder/root" / > /dev/null || fail "buildah cannot copy the base, see above"
+    buildah add --quiet "$container" "$folder/debian" / > /dev/null || fail "buildah cannot copy the base, see above"
     buildah commit --quiet "$container" "$LOCAL_BASE" > /dev/null || fail "buildah cannot commit $LOCAL_BASE, see above"
     buildah rm "$container" > /dev/null || fail "buildah cannot remove its container, see above"
 }
