@@ -13,7 +13,6 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackRet
 from std_msgs.msg import Bool, String
 from visualization_msgs.msg import MarkerArray
 
-from fulmar_bags.message_reader import goal_of, obstacles_of, stamp_ns, thing_of
 from fulmar_core.control_loop import Step
 from fulmar_core.controller_settings import POLICY, ControllerSettings
 from fulmar_core.controllers.controller import Controller, Inputs
@@ -34,9 +33,9 @@ from fulmar_ros.controller_wires import ControllerWires
 from fulmar_ros.convert import OdometryReader, VectorReader
 from fulmar_ros.deadline import ControlBeat
 from fulmar_ros.fallback import MakeController, PolicySwap, controllers_of, load_other
-from fulmar_ros.goal_age import GoalAge
 from fulmar_ros.goal_messages import GoalMessage
 from fulmar_ros.graph import WireWatch
+from fulmar_ros.mission_inputs import MissionInputs
 from fulmar_ros.node_identity import identity_of
 from fulmar_ros.parameters import own_frames, read_parameters
 from fulmar_ros.qos import SAFE_REPEATS
@@ -73,7 +72,6 @@ class ControllerNode(LifecycleNode):
         self._sending = threading.Lock()  # held from the look at whether commands may go out until one has
         hz = self.settings.control_rate(self.robot)
         self.guard: GuardedLoop | None = None  # while configured
-        self._goal_age = GoalAge(counts=self.settings.unattended)
         self._estop = EstopMonitor(required=self.settings.estop)  # a press outlives a new configuration
         self._swap = PolicySwap(
             self._load if self.settings.controller == POLICY else None,
@@ -81,8 +79,11 @@ class ControllerNode(LifecycleNode):
             warn=self.get_logger().warning,
         )
         self._names = self.robot.actuators.names
-        self._frames = own_frames(self, self.robot)
-        self._read_odometry, self._read_applied = OdometryReader(self._frames), VectorReader(self._names)
+        frames = own_frames(self, self.robot)
+        self._mission_inputs = MissionInputs(
+            frames, self.get_logger().warning, refuses_old_goals=self.settings.unattended
+        )
+        self._read_odometry, self._read_applied = OdometryReader(frames), VectorReader(self._names)
         self._late: Measurement | None = (
             None  # waits in lock step for the things or the goal of the same stamp
         )
@@ -206,7 +207,7 @@ class ControllerNode(LifecycleNode):
         self._publish_status()
 
     def _on_estop_released(self, _message: String) -> None:
-        self._goal_age.reset()
+        self._mission_inputs.goal_age.reset()
         self._estop.release(time.monotonic_ns())
         self._publish_status()
 
@@ -223,34 +224,17 @@ class ControllerNode(LifecycleNode):
         self.wires.publish_metadata(self._guarded.switch.current.metadata)
 
     def _on_goal(self, message: GoalMessage, info: dict[str, int]) -> None:
-        targets, problem = goal_of(message, self._frames)
-        stamp = stamp_ns(message.header.stamp)
-        problem = problem or self._goal_age.problem(info)
-        if targets is None or problem:
-            self._guarded.refuse_goal(problem, stamp)
-        else:
-            problem = self._guarded.take_goal(targets, stamp, time.monotonic_ns())
-        if problem:
-            self.get_logger().warning(f"goal refused: {problem}")
+        self._mission_inputs.take_goal(self._guarded, message, info)
         self._publish_status()
         self._go_on()
 
     def _on_obstacles(self, message: MarkerArray) -> None:
-        discs, problem = obstacles_of(message, self._frames)
-        if discs is None:
-            self.get_logger().warning(f"obstacles refused: {problem}")
-            return
-        stamp = stamp_ns(message.markers[0].header.stamp) if message.markers else 0
-        self._guarded.take_obstacles(discs, stamp)
-        self._publish_status()
+        if self._mission_inputs.take_obstacles(self._guarded, message):
+            self._publish_status()
 
     def _on_thing(self, name: str, message: PoseStamped) -> None:
-        pose, problem = thing_of(message, self._frames)
-        if pose is None:
-            self.get_logger().warning(f"place of the {name} refused: {problem}")
-            return
-        self._guarded.take_thing(name, pose, stamp_ns(message.header.stamp))
-        self._go_on()
+        if self._mission_inputs.take_thing(self._guarded, name, message):
+            self._go_on()
 
     def _on_applied(self, data: bytes) -> None:
         applied = self._read_applied.read(data)
