@@ -13,9 +13,9 @@ from fulmar_bringup.readiness import raise_if_ended, while_starting
 from fulmar_bringup.remote_parts import domain_text, mismatch
 from fulmar_bringup.run_executor import STOPPED, passed_s, raise_if_silent, silence_limits_s
 from fulmar_bringup.run_plan import CONTROLLER, RunPlan
-from fulmar_bringup.standing_system import Ending, Show, described, trips_of
+from fulmar_bringup.standing_system import Ending, Show, described, report_newest, trips_of
 from fulmar_bringup.supervisor import Supervisor, supervisor
-from fulmar_bringup.system_events import Emit, SystemEvents, distance_of, mode_of
+from fulmar_bringup.system_events import Emit, SystemEvents
 from fulmar_bringup.system_rows import system_rows
 from fulmar_core.errors import ConfigError, RunFailed
 from fulmar_ros.node_identity import STARTED_NS
@@ -128,9 +128,7 @@ def _follow(
     def report() -> bool:
         if lost():
             return True
-        time_s = round(passed_s(plan, plant), 3)
-        events.look(plant, controller, time_s)
-        show(time_s, distance_of(controller.values), mode_of(plant, controller))
+        report_newest(plan, overseer, events, show)
         return False
 
     def running() -> None:

@@ -178,6 +178,14 @@ def keep_up(request: RunRequest, emit: Emit, show: Show) -> Ending:
     return Ending("" if asked else failure, trips_of(plant_report))
 
 
+def report_newest(plan: RunPlan, overseer: Supervisor, events: SystemEvents, show: Show) -> None:
+    """Turn the newest reports of plant and controller into events, and show where the robot stands."""
+    plant, controller = overseer.plant, overseer.controller
+    time_s = round(passed_s(plan, plant), 3)
+    events.look(plant, controller, time_s)
+    show(time_s, distance_of(controller.values), mode_of(plant, controller))
+
+
 def trips_of(plant: Report) -> int | None:
     """Watchdog trips that a plant has reported; None where it has not reported any number."""
     trips = plant.values.get("watchdog_trips")
@@ -230,9 +238,7 @@ def _follow(
     def report() -> bool:
         if remote is not None:
             remote.look(events)
-        time_s = round(passed_s(plan, plant), 3)
-        events.look(plant, controller, time_s)
-        show(time_s, distance_of(controller.values), mode_of(plant, controller))
+        report_newest(plan, overseer, events, show)
         return False
 
     def running() -> None:
