@@ -20,13 +20,8 @@ from tests.new_robots import new_robot
 from tests.pairs import each_pair
 from training import kernel
 from training.compiled import CompiledStep
-from training.kernel import compiler_found, leaves, parts_of
+from training.kernel import leaves, parts_of
 from training.vec_env import BatchVecEnv
-
-pytestmark = pytest.mark.skipif(
-    not compiler_found(),
-    reason="torch compiles with g++, or what CXX names, and there is none; others test these steps by NumPy",
-)
 
 RANDOMISED = load_scenario("randomised")
 ROBOT, TASK = load_robot("turtlebot2"), load_task("track_velocities")  # quick to compile

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import math
 import subprocess
 import sys
@@ -71,10 +70,6 @@ def test_nobody_who_does_not_ask_imports_it():
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(
-    importlib.util.find_spec("wandb") is None,
-    reason="the extra 'wandb', which training does not need, is not installed; what it is sent is tested above",
-)
 def test_without_a_network_the_curves_stay_in_the_run_folder(tmp_path, monkeypatch):
     for name, value in {"WANDB_MODE": "offline", "WANDB_SILENT": "true", "WANDB_DIR": str(tmp_path)}.items():
         monkeypatch.setenv(name, value)
