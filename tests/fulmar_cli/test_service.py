@@ -15,7 +15,7 @@ from fulmar_core.errors import BAD_USAGE, DONE, FAILED
 from fulmar_core.paths import config_names
 from hardware_drivers.settings import load_hardware
 
-USER = "games"  # every Debian has this user, and systemd warns of `nobody`
+USER = "games"  # a user of every Debian, for whom systemd has no warning
 
 
 @pytest.fixture

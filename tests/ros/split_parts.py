@@ -13,7 +13,7 @@ import psutil
 
 from tests.ros.neighbour import until
 
-NOBODY = "65534"  # another user than that of the plant
+OTHER_USER = "65534"  # another user than that of the plant
 # The interpreter may lie in the home of the other user; this lets it be read, and nothing be written.
 READS_ALL = ("--inh-caps", "+dac_read_search", "--ambient-caps", "+dac_read_search")
 # IPC and mount namespaces, and shared memory that nothing outside sees.
@@ -23,7 +23,9 @@ PRIVATE_MEMORY = 'mount -t tmpfs -o mode=1777 tmpfs /dev/shm && exec "$@"'
 def in_container(host: str, command: list[str], *, other_user: bool) -> list[str]:
     """A command in a network namespace, with IPC, mounts and shared memory of its own."""
     user = (
-        ["setpriv", "--reuid", NOBODY, "--regid", NOBODY, "--clear-groups", *READS_ALL] if other_user else []
+        ["setpriv", "--reuid", OTHER_USER, "--regid", OTHER_USER, "--clear-groups", *READS_ALL]
+        if other_user
+        else []
     )
     return [
         *("ip", "netns", "exec", host, "unshare", "--ipc", "--mount", "--propagation", "private"),

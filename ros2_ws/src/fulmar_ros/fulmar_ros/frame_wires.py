@@ -24,7 +24,7 @@ TFMessage: Any = message_class(TRANSFORMS)  # None where tf2_msgs is not install
 
 
 class OdometryTransform:
-    """`odom` → `base_link` on /tf; whoever publishes the odometry has one."""
+    """Publishes `odom` → `base_link` on /tf; each node that publishes odometry has one."""
 
     def __init__(
         self,

@@ -44,7 +44,7 @@ ExecStart={command}
 KillMode=control-group
 KillSignal=SIGTERM
 TimeoutStopSec={stop}
-# It comes back with the e-stop pressed. A mistake in a file (exit code 2) does not mend itself.
+# After a restart the e-stop is pressed. A mistake in a file (exit code 2) needs a person.
 Restart=on-failure
 RestartSec={restart}
 RestartPreventExitStatus=2
