@@ -5,6 +5,9 @@ from __future__ import annotations
 import pytest
 
 from fulmar_bringup.domain_status import NodeStatus
+from fulmar_bringup.run_plan import NODES, RunPlan
+from fulmar_bringup.system import Guards
+from fulmar_bringup.system_rows import system_rows
 
 
 @pytest.mark.parametrize(
@@ -23,3 +26,9 @@ from fulmar_bringup.domain_status import NodeStatus
 def test_a_node_in_error_silent_or_absent_is_not_well(node, level, reason, well, well_alone):
     status = NodeStatus(node, level, reason=reason)
     assert (status.well(), status.well(alone=True)) == (well, well_alone)
+
+
+def test_it_knows_the_name_of_every_node_of_a_system():
+    guards = Guards(estop=True, estimator="mocap_imu")
+    plan = RunPlan("floating_platform", "go_to_pose", "lqr", "mujoco", 50.0, guards=guards, markers=True)
+    assert set(system_rows(plan, record={})) == set(NODES) - {"emulator"}

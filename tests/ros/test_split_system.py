@@ -131,6 +131,8 @@ def test_a_goal_an_e_stop_and_a_killed_controller_reach_the_plant_of_another_con
     status = json_of(words)
     assert code == DONE, status
     assert status["robots"][0]["estop"] == "released"
+    nodes = {node["node"]: node for node in status["robots"][0]["nodes"]}
+    assert (nodes["estop"]["level"], nodes["estop"]["reason"]) == ("ok", "released")  # as it reports itself
 
     drive_away(containers)
     assert containers.beside_controller("estop")[0] == DONE

@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.node import Node
 
+from fulmar_bringup.run_plan import NODES, PARTS, PLANT, REPORTING
 from fulmar_core.robot_name import namespace_of
 from fulmar_core.safety.estop import HOLDS, SILENT
 from fulmar_core.safety.watchdog import NO_COMMAND
 from fulmar_core.topics import DIAGNOSTICS, ESTOP_TRIGGER
-from fulmar_ros.living_plant import PLANT
 from fulmar_ros.qos import subscriber_qos
 from fulmar_ros.runtime import ros_node
 
-REPORTING = ("plant", "controller", "recorder")  # nodes that publish diagnostics
 SETTLE_S = 0.25  # after the last node was discovered, for others
 LOOK_S = 0.02
 LEVELS = {DiagnosticStatus.OK: "ok", DiagnosticStatus.WARN: "warn", DiagnosticStatus.ERROR: "error"}
@@ -119,7 +117,7 @@ class _Look:
         """Robots and nodes in the graph, of the robot and the node that were asked for."""
         found = {(space.strip("/"), node) for node, space in self._node.get_node_names_and_namespaces()}
         robots = {robot for robot, node in found if node in REPORTING}
-        kinds = {self._wanted} if self._wanted else {*REPORTING, "estop", "estimator", "emulator"}
+        kinds = {self._wanted} if self._wanted else set(NODES)
         return {
             (robot, node)
             for robot, node in found
@@ -137,15 +135,14 @@ class _Look:
 
     def _robot(self, name: str) -> RobotStatus:
         kinds = {node for robot, node in self._graph | self._reports.keys() if robot == name}
-        kinds = {self._wanted} if self._wanted else kinds | {"plant", "controller"}
-        order = (*REPORTING, *sorted(kinds - set(REPORTING)))
-        nodes = [self._status(name, node) for node in order if node in kinds]
+        kinds = {self._wanted} if self._wanted else kinds | set(PARTS)
+        nodes = [self._status(name, node) for node in NODES if node in kinds]
         return RobotStatus(name, self._estop(name), nodes)
 
     def _status(self, robot: str, node: str) -> NodeStatus:
         if (robot, node) not in self._reports:
             there = (robot, node) in self._graph
-            silent = "silent" if node in REPORTING else "ok"  # the others publish no diagnostics
+            silent = "silent" if node in REPORTING else "ok"  # an emulator publishes no diagnostics
             return NodeStatus(node, silent if there else "absent")
         status, stamp_s = self._reports[robot, node]
         values = {pair.key: pair.value for pair in status.values}
@@ -160,13 +157,11 @@ class _Look:
         )
 
     def _estop(self, robot: str) -> str:
-        for node in ("plant", "controller"):
+        for node in PARTS:
             if (robot, node) in self._reports:
                 reason = self._reports[robot, node][0].message
                 if reason.startswith(HOLDS):
                     return "silent" if reason.startswith(SILENT) else "pressed"
         button = f"{namespace_of(robot)}/{ESTOP_TRIGGER}"
-        offered: Callable[[], bool] = lambda: any(  # noqa: E731
-            service == button for service, _ in self._node.get_service_names_and_types()
-        )
-        return "released" if offered() else "none"
+        services = {service for service, _ in self._node.get_service_names_and_types()}
+        return "released" if button in services else "none"

@@ -12,6 +12,9 @@ from fulmar_core.robot_name import Frames, frames_of, namespace_of
 
 Parameter = bool | int | float | str | list[float] | list[int] | list[str]
 PLANT, CONTROLLER = PARTS = ("plant", "controller")  # values of `RunPlan.only`
+# Nodes of a system by name: those that publish diagnostics, and all.
+REPORTING = (*PARTS, "recorder", "estop", "estimator", "markers")
+NODES = (*REPORTING, "emulator")
 
 
 @dataclass(frozen=True)

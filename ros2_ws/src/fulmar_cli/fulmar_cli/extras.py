@@ -65,12 +65,13 @@ def check_plan(plan: RunPlan, *, through: str = "ros") -> None:
     Raises:
         ConfigError: For all modules that are not installed.
     """
+    from fulmar_bringup.run_plan import CONTROLLER
     from fulmar_bringup.system import gains_note, modules_of
 
     notes = [gains_note(plan.robot, name) for name in (plan.controller, plan.guards.fallback)]
     for note in dict.fromkeys(filter(None, notes)):
         log_line(f"info: {note}")
-    if plan.only == "controller":
+    if plan.only == CONTROLLER:
         require("rclpy", *modules_of(plan.controller, ""))
         return
     require(

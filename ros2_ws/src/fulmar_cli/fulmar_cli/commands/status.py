@@ -14,12 +14,10 @@ from fulmar_core.errors import DONE, FAILED, UnknownNameError
 if TYPE_CHECKING:
     from fulmar_bringup.domain_status import NodeStatus, RobotStatus
 
-NODES = ("plant", "controller", "recorder", "estop", "estimator", "emulator")
-
 
 def status(
     name: Annotated[str | None, argument("[NAME]", "Name of the only robot; every one by default.")] = None,
-    node: Annotated[str | None, option("|".join(NODES[:3]) + "|...", "The only node to look for.")] = None,
+    node: Annotated[str | None, option("plant|controller|...", "The only node to look for.")] = None,
     timeout: Annotated[
         float, option("S", "Longest wait for a node that does not report.", min=0.1, max=60.0)
     ] = 3.0,
@@ -38,6 +36,7 @@ def status(
     fulmar status floating_platform --node plant
     """
     from fulmar_bringup.domain_status import domain_status
+    from fulmar_bringup.run_plan import NODES
 
     if node is not None and node not in NODES:
         raise UnknownNameError("node", node, NODES)
