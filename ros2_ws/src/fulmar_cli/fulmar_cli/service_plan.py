@@ -13,7 +13,13 @@ from pathlib import Path
 
 from fulmar_bringup.console import warn
 from fulmar_bringup.service.device_rules import device_groups, device_rules
-from fulmar_bringup.service.installation import Files, systemctl, systemd_runs, write_files
+from fulmar_bringup.service.installation import (
+    Files,
+    systemctl,
+    systemd_runs,
+    texts_of,
+    write_files,
+)
 from fulmar_bringup.service.unit import Service, known_groups, unit_text
 from fulmar_bringup.standing_system import plan_system
 from fulmar_bringup.system import varied_system
@@ -43,27 +49,19 @@ class Wanted:
 class PlannedService:
     """A service with its files, which are not written yet."""
 
-    service: Service
     files: Files
-    unit: str
-    rules: tuple[str, ...]
-
-    @property
-    def texts(self) -> dict[Path, str]:
-        """Content of each file."""
-        rules = {self.files.rules: "\n".join((*self.rules, ""))} if self.rules else {}
-        return {self.files.unit: self.unit, **rules}
+    texts: dict[Path, str]  # content of each file
 
     def write(self) -> tuple[list[Path], bool]:
         """Write the files, and start the service where systemd runs; returns the files, and whether it was started."""
-        written = write_files(self.files, self.unit, self.rules)
+        written = write_files(self.files, self.texts)
         if not systemd_runs(self.files.root):
             return written, False
-        if self.rules and shutil.which("udevadm"):
+        if self.files.rules in self.texts and shutil.which("udevadm"):
             for step in (("control", "--reload"), ("trigger",)):
                 subprocess.run(["udevadm", *step], check=False)
         systemctl("daemon-reload")
-        systemctl("restart", self.service.unit)
+        systemctl("restart", self.files.unit.name)
         return written, True
 
 
@@ -124,7 +122,8 @@ def plan_service(wanted: Wanted, root: Path, *, dry_run: bool) -> PlannedService
         user,
         known,
     )
-    return PlannedService(service, Files(root, service.name), unit_text(service, os.environ), rules)
+    files = Files(root, service.name)
+    return PlannedService(files, texts_of(files, unit_text(service, os.environ), rules))
 
 
 def _options(wanted: Wanted, hardware: str | None, policy: Path | None) -> list[str]:

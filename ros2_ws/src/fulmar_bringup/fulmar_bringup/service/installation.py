@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import subprocess
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -38,8 +39,17 @@ class Files:
         return self.root / RULES / f"70-fulmar-{self.name}.rules"
 
 
-def write_files(files: Files, unit: str, rules: tuple[str, ...]) -> list[Path]:
+def texts_of(files: Files, unit: str, rules: Sequence[str]) -> dict[Path, str]:
+    """Content of each file: of the unit, and of the rules if there are any."""
+    return {files.unit: unit} | ({files.rules: "\n".join((MARK, *rules, ""))} if rules else {})
+
+
+def write_files(files: Files, texts: Mapping[Path, str]) -> list[Path]:
     """Write unit and rules, and let the unit begin at boot.
+
+    Args:
+        files: Of the service.
+        texts: As of `texts_of`.
 
     Returns:
         What was written.
@@ -48,9 +58,6 @@ def write_files(files: Files, unit: str, rules: tuple[str, ...]) -> list[Path]:
         ConfigError: A file of that name is there which is not ours.
         FulmarError: A folder cannot be written.
     """
-    texts = {files.unit: unit}
-    if rules:
-        texts[files.rules] = "\n".join((MARK, *rules, ""))
     for path in texts:
         if path.exists() and not _is_ours(path):
             raise ConfigError(f"{path} is not written by `fulmar service install`: rename it first.")
@@ -58,7 +65,7 @@ def write_files(files: Files, unit: str, rules: tuple[str, ...]) -> list[Path]:
         for path, text in texts.items():
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(text)
-        if not rules and _is_ours(files.rules):
+        if files.rules not in texts and _is_ours(files.rules):
             files.rules.unlink()  # of another installation under this name
         files.link.parent.mkdir(parents=True, exist_ok=True)
         files.link.unlink(missing_ok=True)

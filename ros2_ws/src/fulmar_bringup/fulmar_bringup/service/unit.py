@@ -79,16 +79,6 @@ class Service:
     user: str
     groups: tuple[str, ...] = ()  # beside the user's own
 
-    @property
-    def unit(self) -> str:
-        """Name of the unit."""
-        return unit_name(self.name)
-
-
-def unit_name(name: str) -> str:
-    """Name of the unit of a service."""
-    return f"fulmar-{name}.service"
-
 
 def unit_text(service: Service, environment: Mapping[str, str]) -> str:
     """The unit as a file.

@@ -68,14 +68,14 @@ def install(
     written, began = planned.write()
     if as_json:
         print_json(
-            {"service": planned.service.name, "files": [str(path) for path in written], "started": began}
+            {"service": planned.files.name, "files": [str(path) for path in written], "started": began}
         )
         return
     for path in written:
         write_line(f"wrote {path}")
     if began:
         write_line(
-            f"started {planned.service.unit}: the e-stop is pressed; `fulmar estop --reset` releases it"
+            f"started {planned.files.unit.name}: the e-stop is pressed; `fulmar estop --reset` releases it"
         )
     else:
         write_line("systemd does not run here: the service begins with the next boot")
