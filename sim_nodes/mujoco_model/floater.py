@@ -10,6 +10,7 @@ import numpy as np
 from fulmar_core.actuators.pushing import Push, Pushing
 from fulmar_core.dynamics.hydrodynamics import GRAVITY
 from fulmar_core.robot import Robot
+from fulmar_core.urdf import PART_COLOUR
 from sim_nodes.mujoco_model.scenery import BODY, add_hull
 from sim_nodes.mujoco_model.water import Water
 
@@ -125,7 +126,7 @@ class Floater:
 
 
 def _add_push(spec: mujoco.MjSpec, body: mujoco.MjsBody, push: Push) -> None:
-    body.add_site(name=push.name, pos=list(push.position), size=[0.02, 0.02, 0.02], rgba=[0.9, 0.4, 0.2, 1])
+    body.add_site(name=push.name, pos=list(push.position), size=[0.02, 0.02, 0.02], rgba=list(PART_COLOUR))
     add_actuator(spec, push.name, push.name, [*push.direction, 0.0, 0.0, 0.0])
 
 

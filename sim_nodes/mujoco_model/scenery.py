@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import mujoco
 
+from fulmar_core.urdf import HULL_COLOUR
+
 BODY, IMU_SITE = "base_link", "imu_link"
 FLOOR_BIT, THING_BIT = 1, 2  # what touches the floor, and what touches one another above it
-
-HULL_COLOUR = [0.25, 0.45, 0.7, 1.0]
-DARK = [0.15, 0.15, 0.17, 1.0]
 
 
 def add_scenery(spec: mujoco.MjSpec, colour: list[float] | None) -> None:
@@ -72,7 +71,7 @@ def add_hull(
         type=shape,
         size=size,
         pos=[ahead, 0.0, 0.5 * (low + high)],
-        rgba=HULL_COLOUR,
+        rgba=list(HULL_COLOUR),
         mass=0.0,
         contype=THING_BIT,
         conaffinity=THING_BIT,

@@ -9,12 +9,13 @@ import mujoco
 import numpy as np
 
 from fulmar_core.actuators.response import Response
-from fulmar_core.actuators.rolling import CASTER_RADIUS, SERVO_S
+from fulmar_core.actuators.rolling import CASTER_RADIUS, SERVO_S, WHEEL_WIDTH
 from fulmar_core.disturbances.world import World
 from fulmar_core.dynamics.hydrodynamics import GRAVITY
 from fulmar_core.planar import PlanarState, PlanarWrench
 from fulmar_core.robot import Robot
-from sim_nodes.mujoco_model.scenery import BODY, DARK, FLOOR_BIT, add_hull
+from fulmar_core.urdf import WHEEL_COLOUR
+from sim_nodes.mujoco_model.scenery import BODY, FLOOR_BIT, add_hull
 
 STEP_S = 0.004  # contacts and wheel servos need finer steps than the robots' physics ticks [s]
 # Our values: no YAML says how heavy a wheel is or how high the weight lies.
@@ -97,8 +98,8 @@ class Chassis:
         wheel.add_geom(
             name=name,
             type=mujoco.mjtGeom.mjGEOM_ELLIPSOID,
-            size=[self.radius, 0.3 * self.radius, self.radius],
-            rgba=DARK,
+            size=[self.radius, 0.5 * WHEEL_WIDTH * self.radius, self.radius],
+            rgba=list(WHEEL_COLOUR),
             condim=3,
             friction=[self.friction, 0.0, 0.0],
             priority=1,
@@ -115,7 +116,7 @@ class Chassis:
             type=mujoco.mjtGeom.mjGEOM_SPHERE,
             size=[radius, 0.0, 0.0],
             pos=[x, 0.0, radius - self.radius],
-            rgba=DARK,
+            rgba=list(WHEEL_COLOUR),
             mass=0.0,
             condim=1,
             priority=1,

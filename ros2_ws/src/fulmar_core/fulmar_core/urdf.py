@@ -10,14 +10,15 @@ from xml.etree import ElementTree
 from scipy.spatial.transform import Rotation
 
 from fulmar_core.actuators.pushing import Pushing
-from fulmar_core.actuators.rolling import CASTER_RADIUS, Rolling
+from fulmar_core.actuators.rolling import CASTER_RADIUS, WHEEL_WIDTH, Rolling
 from fulmar_core.robot import Robot
 from fulmar_core.robot_name import PLAIN, Frames
 
 IMU = "imu_link"
-HULL_COLOUR, PART_COLOUR, WHEEL_COLOUR = "0.25 0.45 0.7 1", "0.9 0.4 0.2 1", "0.15 0.15 0.17 1"
+HULL_COLOUR = (0.25, 0.45, 0.7, 1.0)  # red, green, blue, opacity
+PART_COLOUR = (0.9, 0.4, 0.2, 1.0)
+WHEEL_COLOUR = (0.15, 0.15, 0.17, 1.0)
 NOZZLE = 0.04  # length and, halved, diameter of the cylinder that shows an actuator; our value [m]
-WHEEL_WIDTH = 0.6  # of a wheel, in radii, as the simulation has it [-]
 
 
 @dataclass(frozen=True)
@@ -126,8 +127,9 @@ def _cylinder(geometry: ElementTree.Element, radius: float, length: float) -> No
     ElementTree.SubElement(geometry, "cylinder", radius=_number(radius), length=_number(length))
 
 
-def _colour(visual: ElementTree.Element, name: str, rgba: str) -> None:
-    ElementTree.SubElement(ElementTree.SubElement(visual, "material", name=name), "color", rgba=rgba)
+def _colour(visual: ElementTree.Element, name: str, rgba: Sequence[float]) -> None:
+    material = ElementTree.SubElement(visual, "material", name=name)
+    ElementTree.SubElement(material, "color", rgba=_numbers(rgba))
 
 
 def _place(parent: ElementTree.Element, xyz: Sequence[float], rpy: Sequence[float] = (0.0, 0.0, 0.0)) -> None:

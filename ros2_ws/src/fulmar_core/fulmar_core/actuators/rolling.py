@@ -15,6 +15,7 @@ from fulmar_core.planar import PlanarState
 from fulmar_core.rotation import Array
 
 CLEARANCE = 0.4  # of the chassis above the floor, in wheel radii; our value [-]
+WHEEL_WIDTH = 0.6  # of a wheel, in its radii; our value [-]
 CASTER_RADIUS = 0.4  # of a ball caster, in wheel radii; our value [-]
 SERVO_S = 0.05  # time constant of a wheel's speed servo where the drive names none [s]
 
