@@ -16,7 +16,6 @@ IN_SOURCES = ("core", "bags", "ros", "bringup", "evaluation", "benchmarks", "cli
 PLACES = {
     "configs/": "fulmar_core/configs/",
     "ros2_ws/src/fulmar_bringup/launch/": "fulmar_bringup/launch/",
-    "ros2_ws/src/fulmar_bringup/layouts/": "fulmar_bringup/layouts/",
     **{f"{SOURCES}fulmar_{name}/fulmar_{name}/": f"fulmar_{name}/" for name in IN_SOURCES},
     **{f"{name}/": f"{name}/" for name in ("sim_nodes", "policy_server", "hardware_drivers", "training")},
 }
