@@ -174,8 +174,8 @@ check: dev ## Check format, lint, types, import contracts, spelling and containe
 	$(BIN)/lint-imports --no-logo
 	$(BIN)/codespell
 	$(BIN)/hadolint docker/*Dockerfile
-	@for profile in sim hardware split train; do \
-		$(BIN)/podman-compose --dry-run --file docker/compose.yaml --profile $$profile config > /dev/null; done
+	$(BIN)/podman-compose --dry-run --file docker/compose.yaml --profile sim --profile hardware --profile split \
+		--profile train config > /dev/null
 	@echo "All checks passed."
 
 .PHONY: images
