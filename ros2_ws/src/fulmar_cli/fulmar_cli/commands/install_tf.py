@@ -9,7 +9,7 @@ from fulmar_cli.commands.arguments import JsonOption
 def install_tf(as_json: JsonOption = False) -> None:
     """Build tf2_msgs and install it beside ROS's wheels, so that /tf and /tf_static are published.
 
-    On a Jazzy machine ROS's own tf2_msgs is used, and this does nothing. Elsewhere it takes about half a minute, a C++
+    On a Jazzy machine ROS's own tf2_msgs is used, and this does nothing. Elsewhere it takes one to two minutes, a C++
     compiler and the headers of Python. Without it everything runs, but RViz and Foxglove get no frames.
 
     Try:
