@@ -151,8 +151,9 @@ def test_what_drifts_is_as_fast_as_before_when_its_actuators_have_rested(robot):
     steps = round(simulation.robot.timing.control_hz)
 
     def speed_after(seconds, wish):
+        command = hand_mapping(robot)(wish)[None]
         for _ in range(seconds * steps):
-            simulation.step(hand_mapping(robot)(wish)[None])
+            simulation.step(command)
         return float(simulation.truth.logged()["speed"][0])
 
     driven, left = speed_after(2, Wish(ahead=1.0)), speed_after(20, NOTHING)

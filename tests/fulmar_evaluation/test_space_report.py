@@ -229,6 +229,7 @@ def test_the_scale_of_distances_goes_as_low_as_they_do(flown, least, lowest):
     assert progress(near)[0].get_ylim()[0] == pytest.approx(lowest)
 
 
+@pytest.mark.slow
 def test_a_body_in_space_is_identified_from_its_bag(flown, tmp_path):
     out = tmp_path / "calibration.yaml"
     done = CliRunner().invoke(

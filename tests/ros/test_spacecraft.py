@@ -57,6 +57,7 @@ def wires_of(bag: Path) -> dict[str, list[bytes]]:
     return {topic: data for topic, data in found.items() if topic not in HEALTH}
 
 
+@pytest.mark.slow  # `test_lockstep_chain` does the same in the plane
 def test_two_runs_of_one_seed_have_the_same_bytes_come_near_the_goal_and_answer_the_same_again(
     ros_domain: RosDomain, folder: Path
 ) -> None:
@@ -187,7 +188,8 @@ def test_what_belongs_to_the_other_space_is_one_line_before_anything_starts(
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("controller", ["lqr", pytest.param("pd", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("controller", ["lqr", "pd"])
 def test_a_law_follows_a_target_that_moves_in_lock_step(
     controller: str, ros_domain: RosDomain, tmp_path: Path
 ) -> None:

@@ -171,6 +171,7 @@ def test_a_learner_sees_the_same_and_pays_what_effort_costs_now(environments, ne
         np.testing.assert_allclose(dearer, learned_in(plain, 3), atol=2e-3)
 
 
+@pytest.mark.slow
 def test_a_learner_goes_on_from_where_it_was_to_the_last_bit(environments):
     compiled = environments[1]
     compiled.reset()
