@@ -68,6 +68,7 @@ def own_system(folder: Path, **changes: str) -> None:
     (folder / "differences.py").write_text(code)
 
 
+@pytest.mark.slow
 def test_the_node_of_the_page_runs_in_lock_step_and_gives_the_same_bytes_again(
     ros_domain: RosDomain, tmp_path: Path
 ) -> None:
@@ -101,6 +102,7 @@ def test_the_node_of_the_page_runs_in_lock_step_and_gives_the_same_bytes_again(
     assert summary["final_position_error_m"] < 0.1
 
 
+@pytest.mark.slow
 def test_an_own_node_that_answers_nothing_ends_the_run_by_its_name(
     ros_domain: RosDomain, tmp_path: Path
 ) -> None:
