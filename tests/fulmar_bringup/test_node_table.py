@@ -170,6 +170,15 @@ def test_the_guards_of_a_system_reach_the_nodes_that_they_are_for():
     assert nodes["estop"].parameters == {"robot": "floating_platform"}
 
 
+def test_a_start_without_a_person_presses_the_e_stop_and_arms_nothing():
+    hardware = replace(PLAN, backend="hardware", hardware="zero_g_lab", guards=Guards(estop=True))
+    for unattended in (False, True):
+        rows = system_rows(replace(hardware, unattended=unattended))
+        assert rows["estop"].parameters.get("pressed", False) is unattended
+        assert rows["plant"].parameters.get("unattended", False) is unattended
+        assert rows["controller"].parameters.get("unattended", False) is unattended
+
+
 def test_a_system_without_guards_has_none_of_their_parameters():
     nodes = by_name(list_nodes(system="mujoco_lqr"))
     for name in ("estop", "estimated", "fallback", "trusted_keys", "area", "max_run_time_s"):

@@ -30,7 +30,7 @@ from fulmar_bringup.processes import ProcessGroup
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.system import default_hardware
 from fulmar_core.errors import DeviceError, FulmarError
-from fulmar_core.paths import config_names
+from fulmar_core.paths import config_names, config_path
 from fulmar_core.topics import AIR_BEARING, DEVICE_STATE
 from fulmar_ros.qos import subscriber_qos
 from hardware_drivers.devices import own_watchdog, when_the_driver_dies
@@ -294,9 +294,13 @@ def test_a_driver_whose_device_is_not_there_says_what_to_do(ros_domain: RosDomai
         group.stop_all()
 
 
-@pytest.mark.parametrize(("asked", "arms"), [("true", True), ("false", False)])
+@pytest.mark.parametrize(
+    ("asked", "arms"),
+    [({"arm": "true"}, True), ({"arm": "false"}, False), ({"unattended": "true"}, False)],
+    ids=["armed", "not armed", "in a service"],
+)
 def test_a_boat_s_driver_says_what_it_will_do_before_it_touches_the_autopilot(
-    ros_domain: RosDomain, monkeypatch, capfd, asked: str, arms: bool
+    ros_domain: RosDomain, monkeypatch, capfd, tmp_path, asked: dict[str, str], arms: bool
 ) -> None:
     """The autopilot is reached by `make_device` alone; by then the log has it, and the driver knows whether to arm."""
     seen: list[tuple[bool, str]] = []
@@ -306,7 +310,12 @@ def test_a_boat_s_driver_says_what_it_will_do_before_it_touches_the_autopilot(
         raise DeviceError("no autopilot here")
 
     monkeypatch.setattr("hardware_drivers.driver_node.make_device", reach)
-    parameters = {"robot": "kingfisher", "hardware": "kingfisher_ardupilot", "arm": asked}
+    hardware = "kingfisher_ardupilot"
+    if "unattended" in asked:  # a file that arms does not count
+        text = config_path("hardware", hardware).read_text().replace("arm: false", "arm: true")
+        (tmp_path / "armed.yaml").write_text(text)
+        hardware = str(tmp_path / "armed.yaml")
+    parameters = {"robot": "kingfisher", "hardware": hardware, **asked}
     arguments = [word for key, value in parameters.items() for word in ("-p", f"{key}:={value}")]
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     try:
