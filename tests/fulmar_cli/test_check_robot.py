@@ -267,7 +267,14 @@ def test_an_unknown_name_gets_the_nearest_one(fulmar):
     assert "Did you mean 'int_ball2'?" in complaint(fulmar("check", "robot", "int_ball"))
 
 
-@pytest.mark.parametrize("name", ["int_ball2", "floating_platform", "turtlebot2"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param("int_ball2", marks=pytest.mark.slow),
+        "floating_platform",
+        pytest.param("turtlebot2", marks=pytest.mark.slow),
+    ],
+)
 def test_the_figure_is_small_and_not_empty(fulmar, tmp_path, name):
     pytest.importorskip("matplotlib")
     from matplotlib.image import imread

@@ -124,7 +124,12 @@ def test_a_recorder_that_cannot_begin_is_the_failure(ros_domain: RosDomain, tmp_
 
 
 @pytest.mark.parametrize(
-    "number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow), signal.SIGKILL]
+    "number",
+    [
+        pytest.param(signal.SIGINT, marks=pytest.mark.slow),
+        pytest.param(signal.SIGTERM, marks=pytest.mark.slow),
+        signal.SIGKILL,
+    ],
 )
 def test_an_evaluation_that_is_reported_to_stop_leaves_nobody_behind(
     number: signal.Signals, ros_domain: RosDomain, tmp_path: Path

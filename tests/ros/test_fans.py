@@ -42,6 +42,7 @@ def test_it_meets_its_goal_in_lock_step_without_a_gains_file(
     assert summary["final_position_error_m"] < 0.01
 
 
+@pytest.mark.slow
 def test_it_is_excited_and_identify_says_that_there_is_no_model_of_fans(
     own: str, ros_domain: RosDomain, tmp_path: Path
 ) -> None:

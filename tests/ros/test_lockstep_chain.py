@@ -31,6 +31,7 @@ def wires_of(bag: Path) -> dict[str, list[bytes]]:
     return {topic: data for topic, data in found.items() if topic not in HEALTH}
 
 
+@pytest.mark.slow
 def test_two_runs_of_one_seed_have_the_same_bytes_and_a_rerun_the_same_actions(
     ros_domain: RosDomain, tmp_path: Path
 ) -> None:

@@ -95,7 +95,9 @@ def test_the_mock_backend_runs_without_mujoco(ros_domain: RosDomain, tmp_path: P
     ("robot", "task", "figure"),
     [
         ("turtlebot2", "go_through_positions", "goals_reached"),
-        ("kingfisher", "go_to_position_with_obstacles", "final_position_error_m"),
+        pytest.param(
+            "kingfisher", "go_to_position_with_obstacles", "final_position_error_m", marks=pytest.mark.slow
+        ),
         pytest.param("leatherback", "track_velocities", "velocity_error_m_s", marks=pytest.mark.slow),
         pytest.param("modular_freeflyer", "go_through_poses", "goals_reached", marks=pytest.mark.slow),
     ],

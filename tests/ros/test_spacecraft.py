@@ -57,7 +57,7 @@ def wires_of(bag: Path) -> dict[str, list[bytes]]:
     return {topic: data for topic, data in found.items() if topic not in HEALTH}
 
 
-@pytest.mark.slow  # `test_lockstep_chain` does the same in the plane
+@pytest.mark.slow
 def test_two_runs_of_one_seed_have_the_same_bytes_come_near_the_goal_and_answer_the_same_again(
     ros_domain: RosDomain, folder: Path
 ) -> None:

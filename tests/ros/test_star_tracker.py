@@ -87,6 +87,7 @@ def test_its_attitude_is_recorded_at_its_rate_within_its_noise_and_repeats_with_
     assert other.data != topic.data
 
 
+@pytest.mark.slow
 def test_bag_info_and_export_show_it_as_any_other_wire(env: dict[str, str], tmp_path: Path) -> None:
     run(env, tmp_path, 4, "bag")
     info = fulmar("bag", "info", "bag", env=env, cwd=tmp_path)

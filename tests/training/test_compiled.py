@@ -86,6 +86,7 @@ def test_one_trace_moves_worlds_of_every_pair_as_in_numpy(robot, task, traced):
     assert all(node.op != "placeholder" for node in made)
 
 
+@pytest.mark.slow
 def test_a_gravity_gradient_is_traced(traced):
     probe = new_robot("lopsided_probe")
     assert_moves_as_in_numpy(

@@ -108,6 +108,7 @@ def test_a_tumbling_body_is_followed_in_all_thirteen_numbers():
     assert spread[9:].max() < 2.0 * GYRO_STD  # [rad/s]
 
 
+@pytest.mark.slow
 def test_without_an_inertial_unit_the_turn_rate_follows_from_poses():
     errors, ratios = [], []
     for seed in range(20):
