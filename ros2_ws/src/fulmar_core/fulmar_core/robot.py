@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, ClassVar, TypeVar
 
 import numpy as np
 
@@ -102,28 +102,21 @@ class Uncertainty:
 class Performance:
     """What the robot can do at its best; tasks, scenarios and scores scale with it."""
 
-    force: float  # push in its strongest direction [N]
     torque: float  # largest yaw moment [N·m]
-    top_speed: float  # the fastest it goes in a straight line [m/s]
-    speed: float  # ahead, that tasks ask for [m/s]
-    reverse_speed: float  # astern, that tasks ask for [m/s]
-    lateral_speed: float  # to either side, that tasks ask for; 0: it cannot [m/s]
     yaw_rate: float  # that tasks ask for [rad/s]
-    turning_acceleration: float  # speed times turn rate that it can sustain [m/s²]
+    # The others are 0, and left out, of robots that only turn.
+    force: float = 0.0  # push in its strongest direction [N]
+    top_speed: float = 0.0  # the fastest it goes in a straight line [m/s]
+    speed: float = 0.0  # ahead, that tasks ask for [m/s]
+    reverse_speed: float = 0.0  # astern, that tasks ask for [m/s]
+    lateral_speed: float = 0.0  # to either side, that tasks ask for; 0: it cannot [m/s]
+    turning_acceleration: float = 0.0  # speed times turn rate that it can sustain [m/s²]
+
+    MOVING: ClassVar[tuple[str, ...]] = ("force", "top_speed", "speed", "turning_acceleration")
 
     def __post_init__(self) -> None:
-        needed = (
-            self.force,
-            self.torque,
-            self.top_speed,
-            self.speed,
-            self.yaw_rate,
-            self.turning_acceleration,
-        )
-        if min(needed) <= 0.0:
-            raise ValueError(
-                "force, torque, top_speed, speed, yaw_rate and turning_acceleration must be greater than 0."
-            )
+        if min(self.torque, self.yaw_rate) <= 0.0:
+            raise ValueError("torque and yaw_rate must be greater than 0.")
         if min(self.reverse_speed, self.lateral_speed) < 0.0:
             raise ValueError("reverse_speed and lateral_speed must not be negative.")
 
@@ -239,8 +232,9 @@ class Robot:
 
     @property
     def drifts(self) -> bool:
-        """Whether it keeps its speed when its actuators are at rest: neither the floor nor water slows it down."""
-        return self.hydrodynamics is None and isinstance(self.actuators, Pushing)
+        """Whether it keeps its motion when its actuators are at rest: neither the floor nor water slows it down."""
+        carried = isinstance(self.actuators, Pushing) or self.actuators.turns_only
+        return self.hydrodynamics is None and carried
 
     @property
     def hull_span(self) -> tuple[float, float]:
@@ -260,6 +254,14 @@ class Robot:
         return self.actuators.recipe if self.state_type is PlanarState else "free_flyer"
 
     def __post_init__(self) -> None:
+        moving = [getattr(self.performance, name) for name in Performance.MOVING]
+        if not self.actuators.turns_only and min(moving) <= 0.0:
+            raise ValueError(f"{', '.join(Performance.MOVING)} of 'performance' must be greater than 0.")
+        if self.actuators.turns_only and (self.body.planar or max(moving) > 0.0 or any(self.body.com)):
+            raise ValueError(
+                f"{self.actuators.kind} only turn a body: it needs 'planar: false', its centre of mass at its origin, "
+                "and in 'performance' no more than torque and yaw_rate."
+            )
         if self.state_type is PlanarState and (len(self.body.inertia), len(self.body.center_of_mass)) != (
             3,
             2,

@@ -7,6 +7,7 @@ from fulmar_core.actuators.differential_drive import DifferentialDrive
 from fulmar_core.actuators.family import Actuators
 from fulmar_core.actuators.fans import Fans
 from fulmar_core.actuators.propellers import Propellers
+from fulmar_core.actuators.reaction_wheels import ReactionWheels
 from fulmar_core.actuators.thrusters import Thrusters
 
 FAMILIES: dict[str, type[Actuators]] = {
@@ -15,4 +16,5 @@ FAMILIES: dict[str, type[Actuators]] = {
     "differential_drive": DifferentialDrive,
     "ackermann": Ackermann,
     "fans": Fans,
+    "reaction_wheels": ReactionWheels,
 }

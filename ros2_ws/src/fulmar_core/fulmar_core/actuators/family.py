@@ -30,6 +30,7 @@ class Actuators(ABC):
         excitation: Random commands that identify it; None: the controller `excite` rejects the family.
         one_way: Commands go from 0 to `scale`; else from -scale to scale.
         opens_late: Actuators may take longer to begin than to end, as valves do.
+        turns_only: Commands turn the body and push it nowhere.
         takes_velocity: A command is (speed, turn rate) of the body, which ROS has a message of its own for.
         plausible: Ranges of the family's own keys, beside those of `plausible_ranges.ROBOT`.
     """
@@ -42,6 +43,7 @@ class Actuators(ABC):
     excitation: ClassVar[Excitation | None] = None
     one_way: ClassVar[bool] = False
     opens_late: ClassVar[bool] = False
+    turns_only: ClassVar[bool] = False
     takes_velocity: ClassVar[bool] = False
     plausible: ClassVar[tuple[Plausible, ...]] = ()
 

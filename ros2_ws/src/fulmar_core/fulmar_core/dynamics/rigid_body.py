@@ -104,17 +104,48 @@ def rigid_body_step(
     sixth, third = dt / 6.0, dt / 3.0
     x, y, z = (w[i] + sixth * (k1[i] + k4[i]) + third * (k2[i] + k3[i]) for i in range(3))
     after = x, y, z
+    end = turn_acceleration(after, torque, inertia)
+    return turned(state, after, k1, end, force, force_in_world, mass, dt)
+
+
+def turned(
+    state: SpatialState,
+    after: Vector,
+    begin: Vector,
+    end: Vector,
+    force: Vector | None,
+    force_in_world: Vector | None,
+    mass: Array,
+    dt: float,
+) -> SpatialState:
+    """State after a step whose change of the turn rate is known.
+
+    Args:
+        state: Before it.
+        after: Turn rate after it [rad/s].
+        begin: Turn acceleration at its begin [rad/s²].
+        end: Same at its end.
+        force: As of `rigid_body_step`; None: nothing.
+        force_in_world: Same.
+        mass: Same.
+        dt: Same.
+    """
+    w, half, sixth = state.rate, 0.5 * dt, dt / 6.0
     # Hermite's midpoint of the rate, then the fourth-order Magnus expansion in the body's frame (Hairer, Lubich and
     # Wanner, Geometric Numerical Integration, 2006, §IV.7).
-    bend = scaled(0.125 * dt, minus(k1, turn_acceleration(after, torque, inertia)))
+    bend = scaled(0.125 * dt, minus(begin, end))
     swing = scaled(dt * dt / 12.0, cross(w, after))
     x, y, z = (half * (w[i] + after[i]) + (4.0 * sixth) * bend[i] + swing[i] for i in range(3))
     rotation = x, y, z
     quat = normalised(product(state.quat, exponential(rotation)))
-    # Half of the rotation stands for the attitude in the middle of the step.
-    push = turn(product(state.quat, exponential(scaled(0.5, rotation))), force)
-    if force_in_world is not None:
-        push = plus(push, force_in_world)
+    push = force_in_world
+    if force is not None:
+        # Half of the rotation stands for the attitude in the middle of the step.
+        push = turn(product(state.quat, exponential(scaled(0.5, rotation))), force)
+        if force_in_world is not None:
+            push = plus(push, force_in_world)
+    if push is None:
+        return SpatialState(*_moved(state.position, dt, state.velocity), *quat, *state.velocity, *after)
     gain = scaled(dt / mass, push)
     position = _moved(state.position, dt, _moved(state.velocity, 0.5, gain))
     return SpatialState(*position, *quat, *plus(state.velocity, gain), *after)

@@ -22,17 +22,30 @@ UNKNOWN = -1.0  # REP-145: first covariance entry of a field that is absent
 
 
 @dataclass(frozen=True)
+class Gyroscope(Channel):
+    """How a measured turn rate differs from the true one."""
+
+    walk: float = 0.0  # of the bias: its spread after a second, growing with the root of time [rad/s/√s]
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.walk < 0.0:
+            raise ValueError("'walk' must not be negative.")
+
+
+@dataclass(frozen=True)
 class ImuSpec:
     """What an inertial unit reports, and when."""
 
     accelerometer: Channel = Channel()  # each axis [m/s²]
-    gyroscope: Channel = Channel()  # each axis [rad/s]
+    gyroscope: Gyroscope = Gyroscope()  # each axis [rad/s]
     rate_hz: float = 0.0  # new readings; 0: with every one asked for [Hz]
     delay_s: float = 0.0  # from motion to reading [s]
+    dies_s: float = math.inf  # time in an episode from which on it reports nothing [s]
 
     def __post_init__(self) -> None:
-        if min(self.rate_hz, self.delay_s) < 0.0:
-            raise ValueError("rate_hz and delay_s must not be negative.")
+        if min(self.rate_hz, self.delay_s, self.dies_s) < 0.0:
+            raise ValueError("rate_hz, delay_s and dies_s must not be negative.")
 
     @property
     def gyroscope_range(self) -> float:
@@ -68,7 +81,7 @@ class InertialUnit:
         self._bias = self._spec.part("bias_std") * self._rng.standard_normal(6)
         self._scale = 1.0 + self._spec.part("scale_std") * self._rng.standard_normal(6)
         self._readings: deque[tuple[float, np.ndarray]] = deque()  # when, and what; oldest first
-        self._next_s = 0.0
+        self._next_s = self._walked_s = 0.0
 
     def measure(self, truth: ImuSample, time_s: float) -> ImuSample:
         """What the unit reports.
@@ -82,6 +95,7 @@ class InertialUnit:
         """
         tiny = 1e-9
         if time_s > self._next_s - tiny or not self._readings:
+            self._walk(time_s)
             self._readings.append((time_s, self._read(truth)))
             if self._spec.rate_hz:
                 self._next_s = (np.floor(time_s * self._spec.rate_hz + tiny) + 1.0) / self._spec.rate_hz
@@ -89,6 +103,14 @@ class InertialUnit:
             self._readings.popleft()
         reading = self._readings[0][1]
         return ImuSample(reading[:3].copy(), reading[3:].copy())
+
+    def _walk(self, time_s: float) -> None:
+        """Let the gyroscope's bias walk until a time [s]."""
+        walk = self._spec.gyroscope.walk
+        if walk and time_s > self._walked_s:
+            spread = walk * math.sqrt(time_s - self._walked_s)
+            self._bias[3:] += spread * self._rng.standard_normal(3)
+        self._walked_s = time_s
 
     def _read(self, truth: ImuSample) -> np.ndarray:
         reading = np.concatenate((truth.specific_force, truth.angular_velocity))
@@ -103,6 +125,7 @@ class SimulatedImu:
     def __init__(self, spec: ImuSpec, noisy: bool) -> None:
         """Prepare; without noise every reading is the truth."""
         self._unit = InertialUnit(spec) if noisy else None
+        self._dies_s = spec.dies_s
 
     def reset(self, seed: int, number: int) -> None:
         """Begin an episode; see `SimulatedSensor`."""
@@ -110,8 +133,8 @@ class SimulatedImu:
             self._unit.reset(seed, number)
 
     def measure(self, truth: Truth, time_s: float) -> Reading | None:
-        """An `ImuSample`, repeated until there is a newer one; None where the simulator knows no specific force."""
-        if truth.specific_force is None:
+        """An `ImuSample`, repeated until there is a newer one; None from a dead unit, or without a specific force."""
+        if truth.specific_force is None or time_s >= self._dies_s:
             return None
         sample = ImuSample(truth.specific_force, truth.state.angular_velocity_in_body)
         return Reading(sample if self._unit is None else self._unit.measure(sample, time_s))

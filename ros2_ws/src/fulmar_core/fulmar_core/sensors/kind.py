@@ -22,6 +22,7 @@ class Truth:
     specific_force: np.ndarray | None = (
         None  # (3,) acceleration minus gravity, in the body; None: not computed [m/s²]
     )
+    wheels: Any = None  # `sensors.wheels.WheelSpeeds` of a robot with reaction wheels
 
 
 class SimulatedSensor(Protocol):
