@@ -6,6 +6,7 @@ import numpy as np
 
 from fulmar_core.backend import Sample
 from fulmar_core.episode import Episode
+from fulmar_core.motion import wheel_speeds_of
 from fulmar_core.robot import Robot
 from fulmar_core.sensors.kind import Truth
 from fulmar_core.sensors.reading import Reading
@@ -66,6 +67,9 @@ class MockBackend:
     def _sample(self, ticks: int = 0) -> Sample:
         self._ticks += ticks
         truth = self._state[0].to_rigid()
-        others = self._sensors.measure(Truth(truth), self._ticks * self.robot.timing.physics_dt)
+        wheels = wheel_speeds_of(self.robot, self._world.actuation)
+        others = self._sensors.measure(
+            Truth(truth, wheels=wheels), self._ticks * self.robot.timing.physics_dt
+        )
         things = {name: pose[0] for name, pose in self._poses.items()}
         return Sample({"odometry": Reading(truth), **others}, truth, things)

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import mujoco
 import numpy as np
 
 from fulmar_core.backend import Sample
-from fulmar_core.disturbances.scenario import Scenario
+from fulmar_core.disturbances.scenario import Scenario, sensors_in
 from fulmar_core.episode import Episode
 from fulmar_core.errors import SafetyError
 from fulmar_core.robot import Robot
@@ -26,17 +29,26 @@ READ_OUT = (("position", 3), ("attitude", 4), ("velocity", 3), ("gyroscope", 3),
 class MujocoBackend:
     """One robot in MuJoCo."""
 
-    def __init__(self, robot: Robot, *, sensor_noise: bool = True, things: tuple[Thing, ...] = ()) -> None:
+    def __init__(
+        self,
+        robot: Robot,
+        *,
+        sensor_noise: bool = True,
+        things: tuple[Thing, ...] = (),
+        sensors: Mapping[str, Any] | None = None,
+    ) -> None:
+        """Build it; `sensors` by name in the place of those of the robot's file."""
         self.robot = robot
         self._things = things
-        self._sensors = SimulatedSensors(robot.sensors.specs, noisy=sensor_noise)
+        self._sensors = SimulatedSensors(sensors or robot.sensors.specs, noisy=sensor_noise)
         self._world = OneWorld(robot, noisy=sensor_noise)
         self._use(Scene(robot, things=things))
 
     @classmethod
     def of(cls, robot: Robot, task: Task, scenario: Scenario) -> MujocoBackend:
         """The simulator that a task and a scenario ask for."""
-        return cls(robot, sensor_noise=scenario.sensor_noise, things=task.things)
+        sensors = sensors_in(robot, scenario)
+        return cls(robot, sensor_noise=scenario.sensor_noise, things=task.things, sensors=sensors)
 
     @property
     def model(self) -> mujoco.MjModel:
@@ -118,7 +130,7 @@ class MujocoBackend:
         position[2] -= self._scene.robot_model.rest_height
         w, x, y, z = read["attitude"]
         state = RigidBodyState(position, np.array([x, y, z, w]), read["velocity"], read["gyroscope"])
-        return Truth(state, read["accelerometer"])
+        return Truth(state, read["accelerometer"], self._scene.robot_model.wheel_speeds(self.data))
 
     def _sample(self, truth: Truth, odometry: RigidBodyState) -> Sample:
         self._truth = truth.state

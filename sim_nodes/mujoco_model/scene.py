@@ -9,9 +9,11 @@ import mujoco
 import numpy as np
 
 from fulmar_core.actuators.pushing import Pushing
+from fulmar_core.actuators.reaction_wheels import ReactionWheels
 from fulmar_core.episode import Episode
 from fulmar_core.errors import ConfigError
 from fulmar_core.robot import Robot
+from fulmar_core.sensors.wheels import WheelSpeeds
 from fulmar_core.spatial import SpatialState
 from fulmar_core.things import Thing
 from sim_nodes.mujoco_model.car import Car
@@ -25,6 +27,7 @@ from sim_nodes.mujoco_model.objects import (
     place_block,
     place_obstacles,
 )
+from sim_nodes.mujoco_model.satellite import Satellite
 from sim_nodes.mujoco_model.scenery import add_scenery, add_sensors
 
 # Families on wheels each have a chassis of their own; all that push share `Floater`.
@@ -165,6 +168,10 @@ class RobotModel(Protocol):
         """
         ...
 
+    def wheel_speeds(self, data: mujoco.MjData) -> WheelSpeeds | None:
+        """True speeds of reaction wheels; None of robots that have none."""
+        ...
+
     @property
     def rest_height(self) -> float:
         """Height of the body's origin at rest above z = 0 [m]."""
@@ -177,6 +184,8 @@ def robot_model_of(robot: Robot) -> RobotModel:
     Raises:
         ConfigError: The family has none.
     """
+    if isinstance(robot.actuators, ReactionWheels):
+        return Satellite(robot)
     if isinstance(robot.actuators, Pushing):
         return FreeFlyer(robot) if robot.state_type is SpatialState else Floater(robot)
     kind = robot.actuators.kind

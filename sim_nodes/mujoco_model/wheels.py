@@ -169,6 +169,9 @@ class Chassis:
         model.body_ipos[self._body] = place
         model.body_inertia[self._body] = inertia
 
+    def wheel_speeds(self, data: mujoco.MjData) -> None:
+        """None: see `RobotModel.wheel_speeds`."""
+
     def place(self, model: mujoco.MjModel, data: mujoco.MjData, start: PlanarState) -> None:
         """Put the robot where it starts, as it stands at rest, with its wheels turning as it rolls."""
         data.qpos[:] = self._settled

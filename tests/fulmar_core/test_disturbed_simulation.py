@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from fulmar_core.counter_rng import START
-from fulmar_core.disturbances.scenario import Actuation, Kick, Push, Sensing, Wave, load_scenario
+from fulmar_core.disturbances.parts import Actuation, Kick, Push, Sensing, Wave
+from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.planar import PlanarState
 from fulmar_core.sensors.odometer import Channel
 from fulmar_core.simulation import ACTUATOR_NOISE

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fulmar_core.disturbances.scenario import Actuation, Push, Scenario, Wave, load_scenario
+from fulmar_core.disturbances.parts import Actuation, Push, Wave
+from fulmar_core.disturbances.scenario import Scenario, load_scenario
 from fulmar_core.errors import ConfigError
 from fulmar_core.health.filters import HealthSettings
 from fulmar_core.health.thruster_health import ThrusterHealth, can_estimate_health

@@ -8,7 +8,8 @@ import numpy as np
 
 from fulmar_core.control_loop import ControlLoop
 from fulmar_core.controllers.classical import load_classical
-from fulmar_core.disturbances.scenario import Push, Scenario
+from fulmar_core.disturbances.parts import Push
+from fulmar_core.disturbances.scenario import Scenario
 from fulmar_core.goal import goal_in_float64
 from fulmar_core.health.actuator_estimator import LONGEST_S, OPENINGS_S, ValveTrials
 from fulmar_core.robot import load_robot

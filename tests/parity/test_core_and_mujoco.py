@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from fulmar_core.actuators.rolling import Rolling
-from fulmar_core.disturbances.scenario import Actuation, load_scenario
+from fulmar_core.disturbances.parts import Actuation
+from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import Episode, draw_episode
 from fulmar_core.goal import goal_at
 from fulmar_core.observation import slewed

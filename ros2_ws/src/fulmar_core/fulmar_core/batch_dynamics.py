@@ -7,21 +7,29 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any, Generic, TypeVar
 
 from fulmar_core.actuators.actuation import ActuationState
 from fulmar_core.actuators.pushing import Pushing
-from fulmar_core.attitude import Vector, cross, minus, plus, scaled
+from fulmar_core.actuators.reaction_wheels import ReactionWheels
+from fulmar_core.actuators.wheel_actuation import WheelActuation
+from fulmar_core.arrays import array_namespace
+from fulmar_core.attitude import Vector, cross, minus, plus, scaled, turn_back
 from fulmar_core.counter_rng import Draws
 from fulmar_core.disturbances.scenario import Scenario, draw_world
 from fulmar_core.disturbances.spatial_world import (
     SpatialWorld,
     draw_spatial_world,
+    grown,
+    magnetic_field,
     orbit_torque,
     push_in_world,
+    solar_torque,
 )
 from fulmar_core.disturbances.world import Drawn, World, outside_wrench, push_is_constant
 from fulmar_core.dynamics.free_body import Wrench
+from fulmar_core.dynamics.gyrostat import Flywheels, gyrostat_step
 from fulmar_core.dynamics.rigid_body import inertia_of, rigid_body_step, shifted
 from fulmar_core.motion import move
 from fulmar_core.planar import PlanarState
@@ -189,9 +197,7 @@ class SpatialDynamics(Dynamics[SpatialWorld, SpatialState]):
     def __init__(self, robot: Robot, *, orbits: bool = True) -> None:
         """Prepare; `orbits`: some world may have the gravity gradient of an orbit."""
         super().__init__(robot)
-        assert isinstance(robot.actuators, Pushing)  # as of `Robot.state_type`
         self._orbits = orbits
-        self._actuators = robot.actuators
         self._full = any(robot.body.tensor[3:])  # whether the inertia has more than its diagonal
 
     def draw_world(self, scenario: Scenario, draws: Draws) -> SpatialWorld:
@@ -210,7 +216,7 @@ class SpatialDynamics(Dynamics[SpatialWorld, SpatialState]):
         The torque is that of an orbit, and left out where no world has one; the constant one of a world is not in it.
         """
         force = push_in_world(world, time_s, control_dt)
-        return (*force, *orbit_torque(state, world)) if self._orbits else force
+        return (*force, *orbit_torque(state, world, time_s)) if self._orbits else force
 
     def push_is_constant(self, world: SpatialWorld) -> bool:
         """See `Dynamics.push_is_constant`."""
@@ -232,7 +238,8 @@ class SpatialDynamics(Dynamics[SpatialWorld, SpatialState]):
         off_centre: bool,
     ) -> SpatialState:
         """See `Dynamics.move`."""
-        dt = self.robot.timing.physics_dt
+        dt, actuators = self.robot.timing.physics_dt, self.robot.actuators
+        assert isinstance(actuators, Pushing)  # as of `dynamics_of`
         inertia = inertia_of(tuple(world.inertia)[: 6 if self._full else 3])
         com: Vector = (world.com[0], world.com[1], world.com[2])
         if off_centre:
@@ -246,7 +253,7 @@ class SpatialDynamics(Dynamics[SpatialWorld, SpatialState]):
             applied = actuation.advance(dt, latest_s=latest_s)
             if applied is not doing:
                 doing = applied
-                force, torque = self._actuators.spatial_wrench(applied, actuation.gain)
+                force, torque = actuators.spatial_wrench(applied, actuation.gain)
                 if off_centre:
                     torque = minus(torque, cross(com, force))
                 torque = plus(torque, steady)
@@ -258,8 +265,92 @@ class SpatialDynamics(Dynamics[SpatialWorld, SpatialState]):
         return measured.to_rigid()
 
 
+class GyrostatDynamics(SpatialDynamics):
+    """Satellites that reaction wheels turn, whose inertia may change, under sunlight and in a magnetic field."""
+
+    def __init__(self, robot: Robot) -> None:
+        """Prepare; every world may have an orbit."""
+        super().__init__(robot)
+        assert isinstance(robot.actuators, ReactionWheels)  # as of `dynamics_of`
+        self._wheels = robot.actuators
+        self._flywheels = Flywheels(self._wheels.axes, self._wheels.spin_inertia)
+        unloading = self._wheels.unloading
+        self._magnetic = unloading is not None and unloading.kind == "magnetic"
+
+    def outside(
+        self, state: SpatialState, world: SpatialWorld, time_s: Array, control_dt: float
+    ) -> tuple[Array, ...]:
+        """Ten numbers, held over a control step; see `Dynamics.outside`.
+
+        Force along the world's axes [N], torque about the body's [N·m] with the constant one, direction of the magnetic
+        field in the world, and factor on the inertia.
+        """
+        growth = grown(world, time_s)
+        steady: Vector = (world.torque[0], world.torque[1], world.torque[2])
+        torque = plus(
+            plus(steady, solar_torque(state, world)), scaled(growth, orbit_torque(state, world, time_s))
+        )
+        force = push_in_world(world, time_s, control_dt)
+        return (*force, *torque, *magnetic_field(world.orbit_rate, time_s), growth)
+
+    def push_is_constant(self, world: SpatialWorld) -> bool:
+        """See `Dynamics.push_is_constant`."""
+        return False
+
+    def move(
+        self,
+        state: SpatialState,
+        actuation: ActuationState,
+        world: SpatialWorld,
+        outside: tuple[Array, ...],
+        *,
+        substeps: int,
+        latest_s: float,
+        off_centre: bool,
+    ) -> SpatialState:
+        """See `Dynamics.move`; of `outside` what is left out is nothing."""
+        assert isinstance(actuation, WheelActuation)  # as of `actuation_of`
+        dt, wheels = self.robot.timing.physics_dt, self._wheels
+        force: Vector = (outside[0], outside[1], outside[2])
+        tensor = tuple(world.inertia)[: 6 if self._full else 3]
+        steady, field = scaled(0.0, force), None
+        if len(outside) > 3:
+            steady, growth = (outside[3], outside[4], outside[5]), outside[9]
+            tensor = tuple(growth * entry for entry in tensor)
+            field = (outside[6], outside[7], outside[8]) if self._magnetic else None
+        for _ in range(substeps):
+            applied = actuation.advance(dt, latest_s=latest_s) * actuation.gain
+            motors = wheels.motor_torque(applied[: wheels.count], actuation.speeds, dt)
+            torque, here = steady, None if field is None else turn_back(state.quat, field)
+            unloading = wheels.unloading_torque(applied, here)
+            state, speeds = gyrostat_step(
+                state,
+                tuple(actuation.speeds),
+                torque if unloading is None else plus(torque, unloading),
+                force,
+                partial(_on_wheels, wheels, tuple(motors)),
+                self._flywheels,
+                world.mass,
+                tensor,
+                dt,
+            )
+            actuation.speeds = array_namespace(applied).stack(speeds)
+        return state
+
+
+def _on_wheels(
+    wheels: ReactionWheels, motors: tuple[Array, ...], speeds: tuple[Array, ...]
+) -> tuple[Array, ...]:
+    """Torque on each wheel: of its motor and of its bearing [N·m]."""
+    if not wheels.has_friction:
+        return motors
+    return tuple(motor + wheels.friction_torque(speed) for motor, speed in zip(motors, speeds, strict=True))
+
+
 def dynamics_of(robot: Robot, *, orbits: bool = True) -> Dynamics[Any, Any]:
     """The dynamics of a robot's kind; `orbits`: whether some world may have an `orbit_rate`."""
+    if robot.actuators.turns_only:
+        return GyrostatDynamics(robot)
     return (
         SpatialDynamics(robot, orbits=orbits) if robot.state_type is SpatialState else PlanarDynamics(robot)
     )

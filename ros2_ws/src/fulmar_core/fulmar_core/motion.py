@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
+
+import numpy as np
 
 from fulmar_core.actuators.actuation import ActuationState
 from fulmar_core.actuators.pushing import Pushing
+from fulmar_core.actuators.reaction_wheels import ReactionWheels
 from fulmar_core.actuators.rolling import Rolling
+from fulmar_core.actuators.wheel_actuation import WheelActuation
 from fulmar_core.arrays import array_namespace
 from fulmar_core.disturbances.scenario import Scenario
 from fulmar_core.disturbances.world import World, outside_wrench
@@ -15,6 +20,7 @@ from fulmar_core.dynamics.rolling import rolling_step
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
+from fulmar_core.sensors.wheels import WheelSpeeds
 
 
 def actuation_of(robot: Robot, safe: Array, *, opens_late: bool = True) -> ActuationState:
@@ -28,13 +34,23 @@ def actuation_of(robot: Robot, safe: Array, *, opens_late: bool = True) -> Actua
     response = robot.actuators.response
     if isinstance(robot.actuators, Rolling):
         response = dataclasses.replace(response, lag_s=0.0)  # the wheels' own servos bring it in
-    return ActuationState(
-        response,
-        binary=robot.actuators.binary,
-        scale=robot.actuators.scale,
-        safe=safe,
-        opens_late=opens_late,
-    )
+    usual: dict[str, Any] = {
+        "binary": robot.actuators.binary,
+        "scale": robot.actuators.scale,
+        "safe": safe,
+        "opens_late": opens_late,
+    }
+    if isinstance(robot.actuators, ReactionWheels):
+        return WheelActuation(response, count=robot.actuators.count, **usual)
+    return ActuationState(response, **usual)
+
+
+def wheel_speeds_of(robot: Robot, actuation: ActuationState) -> WheelSpeeds | None:
+    """True speeds of the reaction wheels of a batch of one; None of robots that have none."""
+    if not isinstance(actuation, WheelActuation):
+        return None
+    assert isinstance(robot.actuators, ReactionWheels)  # as of `actuation_of`
+    return WheelSpeeds(robot.actuators.wheel_names, np.asarray(actuation.speeds[:, 0], dtype=float))
 
 
 def may_open_late(robot: Robot, scenario: Scenario) -> bool:

@@ -98,7 +98,12 @@ class ReactionWheels(Actuators):
     def names(self) -> tuple[str, ...]:
         """Names of the wheels, and of the unloading torques about the body's axes where there is unloading."""
         outside = tuple(f"unload_{axis}" for axis in AXES) if self.unloading is not None else ()
-        return (*(wheel.name for wheel in self.wheels), *outside)
+        return (*self.wheel_names, *outside)
+
+    @property
+    def wheel_names(self) -> tuple[str, ...]:
+        """Names of the wheels."""
+        return tuple(wheel.name for wheel in self.wheels)
 
     @property
     def count(self) -> int:

@@ -4,15 +4,27 @@ from __future__ import annotations
 
 import logging
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from fulmar_core.arrays import array_namespace
 from fulmar_core.config import load_config
 from fulmar_core.counter_rng import Draws
+from fulmar_core.disturbances.parts import (
+    Actuation,
+    InertiaChange,
+    Kick,
+    Push,
+    Range,
+    Sensing,
+    Slope,
+    Solar,
+    Tether,
+    Wave,
+)
 from fulmar_core.disturbances.world import World
 from fulmar_core.dynamics.hydrodynamics import GRAVITY
 from fulmar_core.errors import ConfigError
@@ -23,146 +35,11 @@ from fulmar_core.plausible_ranges import SCENARIO
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
 
-Range = tuple[float, float]
-
 RENAMED = {"drift_stranded": "drift_uncontrollable"}  # word: old name of a scenario
 logger = logging.getLogger(__name__)
 logger.addHandler(logging.NullHandler())
 
 BEARING = 4  # stream of random numbers, beside those of `counter_rng` and of the simulation
-
-
-@dataclass(frozen=True)
-class Push:
-    """A force and a torque, as shares of what the robot itself can bring up (`performance` of its YAML)."""
-
-    force: float = 0.0  # largest [-]
-    torque: float = 0.0  # largest, of either sign [-]
-    least: float = 0.0  # smallest, as a share of the largest [-]
-
-    def __post_init__(self) -> None:
-        if min(self.force, self.torque) < 0.0 or not 0.0 <= self.least <= 1.0:
-            raise ValueError("force and torque must not be negative, and 'least' must lie in [0, 1].")
-
-
-@dataclass(frozen=True)
-class Wave:
-    """A push that is sinusoidal in the place: an uneven floor (RANS `cfg/task/disturbances`)."""
-
-    force: float = 0.0  # largest amplitude, share of the robot's own [-]
-    torque: float = 0.0  # same [-]
-    least: float = 0.0  # smallest, as a share of the largest [-]
-    wave_number: Range = (0.25, 3.0)  # [rad/m]
-
-    def __post_init__(self) -> None:
-        if min(self.force, self.torque, self.wave_number[0]) < 0.0 or not 0.0 <= self.least <= 1.0:
-            raise ValueError(
-                "force, torque and wave_number must not be negative, 'least' must lie in [0, 1]."
-            )
-        if self.wave_number[0] > self.wave_number[1]:
-            raise ValueError("'wave_number' must be [low, high] with low <= high.")
-
-
-@dataclass(frozen=True)
-class Kick:
-    """A push for one control step, again and again (RoboRAN `domain_randomization`)."""
-
-    force: float = 0.0  # largest, share of the robot's own [-]
-    every_s: Range = (4.0, 6.0)  # [s]
-
-    def __post_init__(self) -> None:
-        if self.force < 0.0:
-            raise ValueError("'force' must not be negative.")
-        if not 0.0 < self.every_s[0] <= self.every_s[1]:
-            raise ValueError("'every_s' must be [low, high] with low <= high, and greater than 0.")
-
-
-@dataclass(frozen=True)
-class Tether:
-    """An air line that hangs from somewhere above: a pendulum's pull, and with it a moment."""
-
-    stiffness: Range = (0.0, 0.0)  # pull per metre aside of the anchor [N/m]
-    reach: float = 0.0  # farthest that the anchor is from the world's origin [m]
-    lever: float = 0.0  # farthest that the line is fastened from the body's origin [m]
-
-    def __post_init__(self) -> None:
-        low, high = self.stiffness
-        if min(low, self.reach, self.lever) < 0.0 or low > high:
-            raise ValueError(
-                "'stiffness' must be [low, high] with 0 <= low <= high; reach and lever must not be negative."
-            )
-
-
-@dataclass(frozen=True)
-class Slope:
-    """A floor that is not level: weight pulls the same way everywhere."""
-
-    milliradians: Range = (0.0, 0.0)
-    direction_deg: float = 0.0  # in which it falls, in the world [deg]
-
-    def __post_init__(self) -> None:
-        if not 0.0 <= self.milliradians[0] <= self.milliradians[1] <= 100.0:
-            raise ValueError("'milliradians' must be [low, high] with 0 <= low <= high <= 100.")
-
-
-@dataclass(frozen=True)
-class Actuation:
-    """What may be wrong with the actuators."""
-
-    noise: float = 0.0  # largest error at each control step, uniform, as a share of full command [-]
-    least_noise: float = 0.0  # smallest of these, as a share of the largest [-]
-    gain: Range = (1.0, 1.0)  # each actuator's own factor, for a whole episode [-]
-    delay_s: float = 0.0  # largest delay of commands; with that of opening at most one control step [s]
-    opening_delay_s: Range = (0.0, 0.0)  # by which closed valves open late; closing does not wait [s]
-    failures: int = 0  # most actuators that stay closed or still for a whole episode
-    failure_chance: float = 0.0  # of each of these [-]
-    # Only failures, all at once, after which no pose can be held, where a robot has thrusters that can fail so.
-    stranding: bool = False  # word: key of scenario files
-
-    def __post_init__(self) -> None:
-        if min(self.noise, self.delay_s, self.failures, self.gain[0], self.failure_chance) < 0.0:
-            raise ValueError("noise, delay, gain and failures must not be negative.")
-        if self.gain[0] > self.gain[1] or self.failure_chance > 1.0:
-            raise ValueError("'gain' must be [low, high] with low <= high, 'failure_chance' at most 1.")
-        if not 0.0 <= self.opening_delay_s[0] <= self.opening_delay_s[1]:
-            raise ValueError("'opening_delay_s' must be [low, high] with 0 <= low <= high.")
-        if (self.failures > 0) != (self.failure_chance > 0.0):
-            raise ValueError(
-                "'failures' and 'failure_chance' need one another: how many may fail, and how often."
-            )
-        if self.stranding and not self.failures:  # word: key of scenario files
-            needs = "'stranding' needs 'failures'"  # word: key of scenario files
-            raise ValueError(f"{needs}, the number of those that are lost together.")
-        if not 0.0 <= self.least_noise <= 1.0:
-            raise ValueError("'least_noise' must lie in [0, 1].")
-
-
-@dataclass(frozen=True)
-class Sensing:
-    """What may be wrong with the odometry, beyond what the robot's YAML says; an inertial unit is as it says."""
-
-    noise: float = 1.0  # factor on the robot's own noise [-]
-    bias: float = 1.0  # factor on the robot's own biases and errors of scale [-]
-    # Largest delay beyond the robot's own. It counts in whole readings: in training half a control step is none [s].
-    delay_s: float = 0.0
-    dropout: float = 0.0  # largest chance that a measurement is lost [-]
-    # Beside the noise of the robot's own sensors, and where these are perfect too; uniform, anew each time.
-    velocity_noise: Range = (0.0, 0.0)  # largest error of each measured velocity, for a whole episode [m/s]
-    yaw_rate_noise: Range = (0.0, 0.0)  # same for the turn rate [rad/s]
-
-    def __post_init__(self) -> None:
-        if min(self.noise, self.bias, self.delay_s, self.dropout) < 0.0 or self.dropout > 1.0:
-            raise ValueError("noise, bias, delay and dropout must not be negative, 'dropout' at most 1.")
-        for low, high in (self.velocity_noise, self.yaw_rate_noise):
-            if not 0.0 <= low <= high:
-                raise ValueError(
-                    "velocity_noise and yaw_rate_noise must be [low, high] with 0 <= low <= high."
-                )
-
-    @property
-    def blurred(self) -> bool:
-        """Whether measured velocities err beyond the robot's own sensors."""
-        return max(*self.velocity_noise, *self.yaw_rate_noise) > 0.0
 
 
 @dataclass(frozen=True)
@@ -179,6 +56,8 @@ class Scenario:
     slope: Slope = Slope()
     # Mean motion √(μ/r³) of a circular orbit whose gravity gradient turns bodies in space; 0: none [rad/s].
     orbit_rate: float = 0.0
+    solar: Solar = Solar()
+    inertia: InertiaChange = InertiaChange()
     actuation: Actuation = Actuation()
     sensing: Sensing = Sensing()
     # Of robots with an air bearing, in simulated plants and emulated devices; batches know neither.
@@ -200,6 +79,21 @@ class Scenario:
                 "noise, bias, delay_s and dropout of 'sensing' do nothing where 'sensor_noise' is false. "
                 "Set it to true, or leave them out."
             )
+
+
+def sensors_in(robot: Robot, scenario: Scenario) -> dict[str, Any]:
+    """What a robot's sensors are in a scenario, by name: its own, with an inertial unit that is worse, or dies."""
+    specs, sensing = robot.sensors.specs, scenario.sensing
+    imu = specs["imu"]
+    gyroscope = replace(
+        imu.gyroscope,
+        std=sensing.gyroscope * imu.gyroscope.std,
+        walk=sensing.gyroscope * imu.gyroscope.walk,
+    )
+    return {
+        **specs,
+        "imu": replace(imu, gyroscope=gyroscope, dies_s=min(imu.dies_s, sensing.gyroscope_dies_s)),
+    }
 
 
 def bearing_late_s(scenario: Scenario, *, seed: int, number: int) -> float:

@@ -5,10 +5,11 @@ Of a scenario's parts a wave, a tether and a slope belong to robots on the floor
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from fulmar_core.arrays import array_namespace
-from fulmar_core.attitude import Vector, uniform_direction
+from fulmar_core.attitude import Vector, cross, length, scaled, turn_back, uniform_direction
 from fulmar_core.counter_rng import Draws
 from fulmar_core.disturbances.scenario import Scenario, around, check_delays, survivors
 from fulmar_core.disturbances.world import Drawn
@@ -17,6 +18,11 @@ from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
 from fulmar_core.spatial import SpatialState
 
+DIPOLE = (
+    0.0,
+    0.5,
+    -(0.75**0.5),
+)  # axis of the magnetic field in the world: 30° out of the orbit's plane, our value
 SENSED = 12  # errors of the odometry: three each of place, attitude, velocity and turn rate
 
 
@@ -40,6 +46,9 @@ class SpatialWorld(Drawn):
     kick: Array  # (3, ...) force of a kick that lasts one control step, in the world [N]
     kick_period: Array  # from kick to kick [s]
     orbit_rate: Array  # mean motion of the orbit whose gravity gradient turns the body; 0: none [rad/s]
+    solar_force: Array  # of the pressure of sunlight, along the world's −x [N]
+    solar_arm: Array  # of its centre from that of mass, along the body's z [m]
+    growth: Array  # (5, ...) of the inertia; see `grown`
     noise: Array  # factor on the sensors' noise [-]
     velocity_noise: Array  # largest error of each measured velocity, anew with each measurement [m/s]
     rate_noise: Array  # same for each turn rate [rad/s]
@@ -65,19 +74,61 @@ def push_in_world(world: SpatialWorld, time_s: Array, control_dt: float) -> Vect
     return x, y, z
 
 
-def orbit_torque(state: SpatialState, world: SpatialWorld) -> Vector:
+def orbit_torque(state: SpatialState, world: SpatialWorld, time_s: Array) -> Vector:
     """Torque of the gravity gradient, held over a control step, about the body's axes [N·m].
 
-    The planet lies along the world's −z, which is the orbit's local vertical: how that turns in an orbit, and how the
-    body turns in a control step, are left aside. It is 3 n² u × J u, with n = √(μ/r³) the mean motion, u the vertical
-    and J the inertia; see `gravity_gradient_torque`.
+    It is 3 n² u × J u, with n = √(μ/r³) the mean motion, u the way from the planet and J the inertia; see
+    `gravity_gradient_torque`. How the body turns in a control step is left aside.
 
     Args:
         state: Of the body, shapes (...,).
         world: Inertia and orbit.
+        time_s: Time in each episode, shape (...,) [s].
     """
     tensor = tuple(world.inertia[i] for i in range(6))
-    return gravity_gradient_torque(state, tensor, world.orbit_rate)
+    return gravity_gradient_torque(state, tensor, world.orbit_rate, zenith(world.orbit_rate, time_s))
+
+
+def zenith(orbit_rate: Array, time_s: Array) -> Vector:
+    """Way from the planet, a unit vector in the world: along z when an episode begins, turning about the world's y.
+
+    Args:
+        orbit_rate: Mean motion of the orbit, shape (...,) [rad/s].
+        time_s: Time in each episode, same shape [s].
+    """
+    xp, angle = array_namespace(orbit_rate), orbit_rate * time_s
+    return xp.sin(angle), 0.0 * angle, xp.cos(angle)
+
+
+def magnetic_field(orbit_rate: Array, time_s: Array) -> Vector:
+    """Direction of the planet's magnetic field in the world, a unit vector; arguments as of `zenith`.
+
+    That of a dipole whose axis is inclined to the orbit's plane (Wertz, Spacecraft Attitude Determination and Control,
+    1978, app. H): 3 (m·u) u − m.
+    """
+    x, y, z = zenith(orbit_rate, time_s)
+    m = DIPOLE
+    along = 3.0 * (m[0] * x + m[1] * y + m[2] * z)
+    field = along * x - m[0], along * y - m[1], along * z - m[2]
+    return scaled(1.0 / length(field), field)
+
+
+def solar_torque(state: SpatialState, world: SpatialWorld) -> Vector:
+    """Torque of the pressure of sunlight about the body's axes [N·m]."""
+    zero = 0.0 * world.solar_force
+    force = turn_back(state.quat, (-world.solar_force, zero, zero))
+    return cross((zero, zero, world.solar_arm), force)
+
+
+def grown(world: SpatialWorld, time_s: Array) -> Array:
+    """Factor on the inertia at a time in each episode, shape (...,) [-].
+
+    1 + a step from a time on + a drift per second + a swing of an amplitude and a frequency (arXiv 2510.16738). The
+    turn rate goes on through a step, as if what comes or goes turned with the body.
+    """
+    xp, (step, at_s, drift, swing, hz) = array_namespace(world.mass), world.growth
+    stepped = xp.where(time_s >= at_s, step, xp.zeros_like(step))
+    return 1.0 + stepped + drift * time_s + swing * xp.sin(2.0 * math.pi * hz * time_s)
 
 
 def draw_spatial_world(robot: Robot, scenario: Scenario, draws: Draws) -> SpatialWorld:
@@ -134,6 +185,9 @@ def draw_spatial_world(robot: Robot, scenario: Scenario, draws: Draws) -> Spatia
         kick=xp.stack([kick_size * part for part in kick_towards]),
         kick_period=kick_period,
         orbit_rate=zero + scenario.orbit_rate,
+        solar_force=zero + scenario.solar.force,
+        solar_arm=zero + scenario.solar.arm,
+        growth=xp.stack([zero + number for number in scenario.inertia.numbers]),
         noise=zero + own * sensing.noise,
         velocity_noise=velocity_noise,
         rate_noise=rate_noise,

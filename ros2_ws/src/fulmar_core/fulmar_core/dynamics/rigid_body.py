@@ -178,17 +178,20 @@ def angular_momentum_in_world(state: SpatialState, inertia: Inertia) -> Vector:
     return turn(state.quat, times(inertia.tensor, state.rate))
 
 
-def gravity_gradient_torque(state: SpatialState, tensor: Tensor, orbit_rate: Array | float) -> Vector:
-    """Torque of a planet's gravity along the world's −z, in the body's frame [N·m].
+def gravity_gradient_torque(
+    state: SpatialState, tensor: Tensor, orbit_rate: Array | float, zenith: Vector | None = None
+) -> Vector:
+    """Torque of a planet's gravity, in the body's frame [N·m].
 
-    3 n² e × J e with e the unit vector to the planet (Wertz, Spacecraft Attitude Determination and Control, 1978,
+    3 n² e × J e with e the unit vector from the planet (Wertz, Spacecraft Attitude Determination and Control, 1978,
     eq. 17-34, circular orbit).
 
     Args:
-        state: Of the centre of mass; the world's z points away from the planet.
+        state: Of the centre of mass.
         tensor: Inertia of the body about the centre of mass [kg·m²].
         orbit_rate: n = √(μ/r³) [rad/s].
+        zenith: e in the world; along its z by default.
     """
     zero = 0.0 * state.x
-    e = turn_back(state.quat, (zero, zero, zero - 1.0))
+    e = turn_back(state.quat, zenith or (zero, zero, zero + 1.0))
     return scaled(3.0 * orbit_rate**2, cross(e, times(tensor, e)))

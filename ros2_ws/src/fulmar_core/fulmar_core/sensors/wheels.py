@@ -77,7 +77,7 @@ def _read(values: Sequence[Any]) -> Reading:
 KIND = SensorKind(
     spec=WheelsSpec,
     wire=Wire(
-        "wheels/state", "sensor_msgs/msg/JointState", "plant", "stream", "`rate_hz` of the tachometers, else every tick",
+        "wheels/state", "sensor_msgs/msg/JointState", "plant", "stream", "`rate_hz` of the tachometers, else each tick",
         "speed of each reaction wheel relative to the body; `velocity` by wheel name", unit="rad/s",
     ),
     frame="base_link",
