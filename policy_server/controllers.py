@@ -109,7 +109,8 @@ CONTROLLERS = {
         "a learned policy bundle", _load_policy, _any_pair, ("onnxruntime",), runs_bundle=True
     ),
     "lqr": _law("linear-quadratic regulator with valve allocation", "lqr"),
-    "pd": _law("proportional-derivative control of bodies in space", "pd"),
+    "pd": _law("proportional-derivative control of bodies in space and satellites", "pd"),
+    "adaptive": _law("control of a satellite's attitude with its estimated inertia", "adaptive"),
     "mpc": _law("predictive control that tries combinations of valves", "mpc"),
     "lqr_drift": _law("the published LQR of DRIFT, to compare with", "lqr_drift"),
     "classical": _law(f"the law of the robot's family: {_LAWS}", None),

@@ -123,7 +123,11 @@ class Satellite:
         data.xfrc_applied[self._body, :3] = outside[:3]
         w, x, y, z = data.qpos[3:7]
         torque = np.array(outside[3:6]) if len(outside) > 3 else np.zeros(3)
-        here = turn_back((x, y, z, w), outside[6:9]) if self._magnetic and len(outside) > 3 else None
+        here = (
+            turn_back((x, y, z, w), (outside[6], outside[7], outside[8]))
+            if self._magnetic and len(outside) > 3
+            else None
+        )
         unloading = wheels.unloading_torque(doing, here)
         if unloading is not None:
             torque = torque + np.array(unloading)

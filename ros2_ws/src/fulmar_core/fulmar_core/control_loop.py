@@ -38,6 +38,8 @@ class ControlLoop:
         previous: Command of the step before, after every limit, shape (n, m).
         answered_ns: Stamp of the measurement that this was the answer to; -1 before the first [ns].
         estimate: Of the controller's actuator estimator at the newest step; None without one.
+        wheels: Newest speeds of reaction wheels, shape (n, count); None where they are not measured [rad/s].
+        inertia: Newest estimate of one robot's inertia, shape (3, 3); None without one [kg·m²].
     """
 
     def __init__(
@@ -73,6 +75,8 @@ class ControlLoop:
         self.estimate: ActuatorEstimate | None = None
         self._estimated_ns = -1
         self._controller = controller
+        self.wheels: np.ndarray | None = None
+        self.inertia: np.ndarray | None = None
 
     @property
     def controller(self) -> Controller:
@@ -116,7 +120,17 @@ class ControlLoop:
         goal = self._advanced(state, stamp_ns)
         self._estimate(state, stamp_ns)
         observation = np.asarray(self.observer(state, goal, self.previous), dtype=float)
-        return Inputs(state, goal, observation, self.previous, self.estimate, stamp_ns, self.dt)
+        return Inputs(
+            state,
+            goal,
+            observation,
+            self.previous,
+            self.estimate,
+            stamp_ns,
+            self.dt,
+            self.wheels,
+            self.inertia,
+        )
 
     def act(self, inputs: Inputs) -> Step:
         """Ask the controller, and limit and gate its command, which is the previous one from then on.

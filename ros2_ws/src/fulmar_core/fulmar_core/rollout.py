@@ -163,6 +163,11 @@ class _Worlds(Protocol):
         """Where the task's things are, each (worlds, 3)."""
         ...
 
+    @property
+    def wheels(self) -> np.ndarray | None:
+        """Measured speeds of reaction wheels, shape (worlds, count) [rad/s]; None of robots without any."""
+        ...
+
     def move(self, command: Array) -> None:
         """Apply commands within every limit for one control step, shape (worlds, n)."""
         ...
@@ -179,6 +184,7 @@ def _roll_out(
     for number in range(episode_steps(task, loop.dt)):
         assert loop.goal is not None
         loop.goal = goal_in_float64(loop.goal.among(worlds.things))
+        loop.wheels = worlds.wheels
         step = loop.step(worlds.measured, round(1e9 * number * loop.dt))
         worlds.move(step.command)
         log.add(worlds.truth, counter.update(worlds.truth, worlds.things), step.command)
@@ -205,3 +211,5 @@ class _Backends:
         self.measured = form.stack([form.from_rigid(sample.measured) for sample in samples])
         self.truth = form.stack([form.from_rigid(each.truth) for each in samples if each.truth is not None])
         self.things = {name: np.stack([each.things[name] for each in samples]) for name in samples[0].things}
+        speeds = [each.readings["wheels"].value.speeds for each in samples if "wheels" in each.readings]
+        self.wheels = np.stack(speeds) if speeds else None

@@ -9,6 +9,7 @@ from typing import Any, Generic
 import numpy as np
 from array_api_compat import is_numpy_namespace
 
+from fulmar_core.actuators.wheel_actuation import WheelActuation
 from fulmar_core.arrays import array_namespace
 from fulmar_core.batch_dynamics import Dynamics, dynamics_of
 from fulmar_core.counter_rng import Keys, keys_at, uniform_from, words, world_keys, write_keys
@@ -158,6 +159,13 @@ class BatchSimulation(MutableState, Generic[S]):
     def things(self) -> Poses:
         """Where the task's things are, each (worlds, 3)."""
         return {thing.name: self.goal.things[thing.name] for thing in self.task.things}
+
+    @property
+    def wheels(self) -> np.ndarray | None:
+        """True speeds of reaction wheels, shape (worlds, count) [rad/s]; None of robots without any."""
+        if not isinstance(self._actuation, WheelActuation):
+            return None
+        return np.asarray(self._actuation.speeds, dtype=float).T
 
     def step(self, command: Array) -> None:
         """Do one control step of a learner: limit and apply its command, and advance the goals by what is measured.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import numpy as np
 from array_api_compat import device
 
@@ -15,7 +17,15 @@ from fulmar_core.rotation import Array
 class ActuationState(MutableState):
     """What the actuators of a batch of worlds do now; actuators first, worlds last."""
 
-    MUTABLE = ("_before", "_wanted", "applied", "gain", "_since_s", "_late", "_open_late")
+    MUTABLE: ClassVar[tuple[str, ...]] = (
+        "_before",
+        "_wanted",
+        "applied",
+        "gain",
+        "_since_s",
+        "_late",
+        "_open_late",
+    )
 
     def __init__(
         self,

@@ -14,6 +14,13 @@ from fulmar_core.actuators.families import FAMILIES
 from fulmar_core.actuators.pushing import WRENCH, Pushing
 from fulmar_core.config import load_config
 from fulmar_core.controllers.allocation import check_allocation
+from fulmar_core.controllers.attitude_lqr import AttitudeLqr, AttitudeLqrWeights, attitude_lqr_weights
+from fulmar_core.controllers.attitude_pd import (
+    AdaptiveAttitude,
+    AttitudePd,
+    AttitudePdGains,
+    attitude_pd_gains,
+)
 from fulmar_core.controllers.default_gains import (
     line_of_sight_gains,
     lqr_weights,
@@ -76,20 +83,35 @@ SPACE_LAWS = {
     "lqr": Entry(SpaceLqr, SpaceLqrWeights, IN_SPACE, space_lqr_weights),
     "pd": Entry(SpacePd, SpacePdGains, IN_SPACE, space_pd_gains),
 }
+# Laws of satellites that reaction wheels turn; the first one is that of the family.
+ATTITUDE_LAWS = {
+    "lqr": Entry(AttitudeLqr, AttitudeLqrWeights, ("point",), attitude_lqr_weights),
+    "pd": Entry(AttitudePd, AttitudePdGains, ("point",), attitude_pd_gains),
+    "adaptive": Entry(AdaptiveAttitude, AttitudePdGains, ("point",), attitude_pd_gains),
+}
+TURNING_FAMILIES = tuple(kind for kind, each in FAMILIES.items() if each.turns_only)
 SPACE_FAMILIES = tuple(kind for kind, each in FAMILIES.items() if issubclass(each, Pushing) and each.one_way)
 
 
+BEYOND_PLANE = {**SPACE_LAWS, **ATTITUDE_LAWS}  # names of laws for bodies in space
+
+
 def is_in_space(robot: Robot) -> bool:
-    """Whether a robot's laws are those of `SPACE_LAWS`."""
+    """Whether a robot's laws are those of `laws_in_space`."""
     return robot.state_type is SpatialState
+
+
+def laws_in_space(robot: Robot) -> dict[str, Entry]:
+    """Laws of a body in space: those that push it, or those that only turn it."""
+    return ATTITUDE_LAWS if robot.actuators.turns_only else SPACE_LAWS
 
 
 def families_of(law: str | None) -> tuple[str, ...]:
     """Families of actuators that a law is for; with None those that any law is for."""
     if law in OTHERS:
         return (OTHERS[law][0],)
-    if law in SPACE_LAWS and law not in LAWS:
-        return SPACE_FAMILIES
+    if law in BEYOND_PLANE and law not in LAWS:
+        return (*(SPACE_FAMILIES if law in SPACE_LAWS else ()), *TURNING_FAMILIES)
     return tuple(kind for kind, each in FAMILIES.items() if each.law and law in (None, each.law))
 
 
@@ -100,11 +122,12 @@ def entry_of(robot: Robot, law: str | None) -> Entry:
         ConfigError: No law is for actuators of this kind.
     """
     if is_in_space(robot):
-        return SPACE_LAWS.get(law or "", SPACE_LAWS["lqr"])
+        laws = laws_in_space(robot)
+        return laws.get(law or "", laws["lqr"])
     if law in OTHERS:
         return OTHERS[law][1]
-    if law in SPACE_LAWS and law not in LAWS:
-        return SPACE_LAWS[law]
+    if law in BEYOND_PLANE and law not in LAWS:
+        return BEYOND_PLANE[law]
     if robot.actuators.law not in LAWS:
         raise ConfigError(
             f"no classical law is for '{robot.name}' ({robot.actuators.kind}); there is one for: "
@@ -155,19 +178,21 @@ def _check_space(robot: Robot, law: str | None) -> None:
         ConfigError: With what would be allowed.
     """
     in_plane, space = (*LAWS, *OTHERS), is_in_space(robot)
-    if law in (SPACE_LAWS if space else in_plane) or law not in (*in_plane, *SPACE_LAWS):
+    fitting = laws_in_space(robot) if space else in_plane
+    if law in fitting or law not in (*in_plane, *BEYOND_PLANE):
         return
     here, there = ("floats in space", "in the plane") if space else ("moves in the plane", "in space")
     raise ConfigError(
         f"controller '{law}' is for robots with {' or '.join(families_of(law))} {there}; '{robot.name}' {here}. "
-        f"Use --controller {' or '.join(SPACE_LAWS) if space else 'classical'}."
+        f"Use --controller {' or '.join(fitting) if space else 'classical'}."
     )
 
 
 def has_law(robot: Robot, task: Task) -> bool:
     """Whether there is a classical law for a pair."""
     if is_in_space(robot):
-        return task.kind in IN_SPACE and robot.actuators.kind in SPACE_FAMILIES
+        families = TURNING_FAMILIES if robot.actuators.turns_only else SPACE_FAMILIES
+        return task.kind in laws_in_space(robot)["lqr"].tasks and robot.actuators.kind in families
     entry = LAWS.get(robot.actuators.law)
     return entry is not None and task.kind in entry.tasks
 

@@ -27,6 +27,10 @@ class Inputs(Generic[S]):
     estimates: ActuatorEstimate | None  # of an estimator that the controller asks for; None without one
     stamp_ns: int  # when the state was measured, on the plant's clock [ns]
     dt: float  # time of one control step [s]
+    wheels: np.ndarray | None = (
+        None  # speeds of reaction wheels, shape (n, count); None: not measured [rad/s]
+    )
+    inertia: np.ndarray | None = None  # estimated tensor of one robot, shape (3, 3); None: none [kg·m²]
 
 
 class Controller(Protocol):

@@ -20,6 +20,7 @@ from fulmar_core.tasks.go_to_position import GoToPosition
 from fulmar_core.tasks.go_to_position_3d import GoToPosition3d
 from fulmar_core.tasks.go_to_position_with_obstacles import GoToPositionWithObstacles
 from fulmar_core.tasks.own_task import load_own_task
+from fulmar_core.tasks.point import Point
 from fulmar_core.tasks.push_block import PushBlock
 from fulmar_core.tasks.race_gates import RaceGates
 from fulmar_core.tasks.task import Task
@@ -46,6 +47,7 @@ ShippedTask = (  # what a file of `configs/tasks` can be
     | TrackVelocities3d
     | GoThroughPositions3d
     | GoThroughPoses3d
+    | Point
 )
 _asked_for: set[str] = set()  # dotted paths that this process was given, in the place of what a bag names
 

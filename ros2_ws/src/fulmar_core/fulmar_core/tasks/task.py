@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING, Generic, Self
+from typing import TYPE_CHECKING, ClassVar, Generic, Self
 
 from fulmar_core.counter_rng import Draws
 from fulmar_core.errors import ConfigError
@@ -30,6 +30,7 @@ class Task(ABC, Generic[S]):
         tolerance: What counts as success.
         required: Targets that make an episode a success; None where a closing window does.
         state_type: Form of the states that its methods take.
+        turns_only: It is for robots that turn and push nowhere; all others are for robots that move.
     """
 
     kind: str
@@ -39,6 +40,7 @@ class Task(ABC, Generic[S]):
     tolerance: Tolerance
     required: int | None = None
     state_type: type[State] = PlanarState
+    turns_only: ClassVar[bool] = False
 
     # A class, a property or a field has these two: dataclasses would take a property of this class for a default.
     if TYPE_CHECKING:
@@ -85,7 +87,7 @@ class Task(ABC, Generic[S]):
         """Refuse a task that does not work with a robot, before anything moves.
 
         Raises:
-            ConfigError: The task is of the other space.
+            ConfigError: The task is of the other space, or moves a robot that only turns, or the other way round.
             TaskError: A member of a user's own task raises, or returns what no task returns.
         """
         if robot.state_type is not self.state_type:
@@ -98,7 +100,14 @@ class Task(ABC, Generic[S]):
             )
             raise ConfigError(
                 f"task '{self.name}' is about motion in {self.state_type.WORLD}, and robot '{robot.name}' moves in "
-                f"{robot.state_type.WORLD}. {hint} Names of tasks in space end in {mine or its}."
+                f"{robot.state_type.WORLD}. {hint} Names of tasks that move a body in space end in {mine or its}."
+            )
+        if robot.actuators.turns_only is not self.turns_only:
+            what = "only turns" if self.turns_only else "moves"
+            able = "only turn it" if robot.actuators.turns_only else "also push it"
+            raise ConfigError(
+                f"task '{self.name}' is for a robot that {what}, and {robot.actuators.kind} of '{robot.name}' {able}. "
+                "`fulmar list tasks` shows others; point, point_inertial and slew are for satellites."
             )
 
     def goal_of(self, targets: Array) -> Goal:
