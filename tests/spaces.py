@@ -15,6 +15,7 @@ from fulmar_core.tasks import Task, load_task
 from fulmar_core.teleop import OUT_OF_PLANE
 
 SPACECRAFT = load_robot("spacecraft_16")
+SATELLITE = load_robot("cubesat_wheels")
 
 
 def shared_space(robots: Mapping[str, Any], tasks: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -29,16 +30,21 @@ def shared_space(robots: Mapping[str, Any], tasks: Mapping[str, Any]) -> list[tu
         for robot in robots
         for task in tasks
         if robots[robot].state_type is tasks[task].state_type
+        and robots[robot].actuators.turns_only is tasks[task].turns_only
     ]
 
 
 def robot_for(task: Task, in_plane: Robot, in_space: Robot = SPACECRAFT) -> Robot:
-    """The one of two robots that moves in the space of a task."""
+    """The one of two robots that moves in the space of a task, or a satellite for one that turns it."""
+    if task.turns_only:
+        return SATELLITE
     return in_plane if task.state_type is PlanarState else in_space
 
 
 def task_for(robot: Robot, name: str) -> Task:
-    """The task of a name in the space of a robot: those in space end in _3d."""
+    """The task of a name in the space of a robot: those in space end in _3d, and satellites hold an attitude."""
+    if robot.actuators.turns_only:
+        return load_task("point_inertial")
     return load_task(name if robot.state_type is PlanarState else f"{name}_3d")
 
 
@@ -52,7 +58,8 @@ def at_target(task: Task, target: Any) -> State:
 
 def pushes_within_its_plane(robot: Robot) -> bool:
     """Whether a body in space has actuators that move it in the plane of its x and y axes and turn it there."""
-    assert isinstance(robot.actuators, Pushing)
+    if not isinstance(robot.actuators, Pushing):
+        return False
     wrenches = robot.actuators.wrench_per_newton
     within = wrenches[~wrenches[:, OUT_OF_PLANE].any(axis=1)]
     return bool(np.linalg.matrix_rank(within[:, PLANAR]) == len(PLANAR))

@@ -82,7 +82,8 @@ class Satellite:
         """Take mass and inertia."""
         xx, yy, zz, xy, xz, yz = np.asarray(world.inertia, dtype=float)
         self._inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-        model.body_mass[self._body] = float(world.mass) * (1.0 - WHEEL_MASS * self._wheels.count)
+        rest = sum(model.body_mass) - model.body_mass[self._body]
+        model.body_mass[self._body] = float(world.mass) - rest
         self._set_inertia(model, 1.0)
 
     def _set_inertia(self, model: mujoco.MjModel, growth: float) -> None:

@@ -82,11 +82,17 @@ def test_a_person_drives_it_ahead_and_round(robot):
 
 
 def test_a_body_in_space_whose_actuators_push_out_of_its_plane_is_not_driven():
-    others = {name: robot for name, robot in ROBOTS.items() if name not in DRIVEN}
+    others = {name: robot for name, robot in PUSHED.items() if name not in DRIVEN}
     assert set(others) == {"int_ball2"}
     for robot in others.values():
         with pytest.raises(ConfigError, match=r"its actuators push out of it\. Send it goals: fulmar goals"):
             hand_mapping(robot)
+
+
+def test_a_satellite_is_not_driven_by_hand():
+    for name in ("cubesat_wheels", "microsat", "smallsat"):
+        with pytest.raises(ConfigError, match=r"robots with reaction_wheels are not driven by hand"):
+            hand_mapping(ROBOTS[name])
 
 
 MIRRORED = ("fan_disc", "jetbot", "kingfisher", "leatherback", "turtlebot2")

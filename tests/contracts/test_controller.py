@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import json
+from collections.abc import Mapping
 from dataclasses import fields, is_dataclass, replace
 
 import numpy as np
@@ -85,9 +86,11 @@ def measured(robot, task, controller, simulation, *, steps=0):
     loop.reset()
     rng, size = np.random.default_rng(1), loop.previous.shape
     for number in range(steps):
+        loop.wheels = simulation.wheels
         inputs = loop.inputs(simulation.measured, round(1e9 * number * loop.dt))
         simulation.move(loop.take(inputs, robot.actuators.scale * rng.uniform(-1.0, 1.0, size)).command)
         loop.goal = goal_in_float64(loop.goal.among(simulation.things))
+    loop.wheels = simulation.wheels
     return loop.inputs(simulation.measured, round(1e9 * steps * loop.dt))
 
 
@@ -182,6 +185,8 @@ def numbers_of(value, name=""):
     if is_dataclass(value):
         parts = [numbers_of(getattr(value, each.name), f"{name}.{each.name}") for each in fields(value)]
         return {key: array for part in parts for key, array in part.items()}
+    if isinstance(value, Mapping):
+        return {f"{name}.{key}": array for key, array in value.items()}
     return {name: value}
 
 
@@ -199,13 +204,14 @@ def test_pairs_without_a_law_are_refused_with_what_to_use_instead(name):
     assert lacking
     for robot, task in lacking:
         if name == "lqr" and robot.actuators.kind not in families_of("lqr"):
-            expected = (
-                rf"'lqr' is for robots with thrusters or fans; '{robot.name}' .*Use --controller classical"
-            )
+            families = "thrusters or fans or reaction_wheels"
+            expected = rf"'lqr' is for robots with {families}; '{robot.name}' .*Use --controller classical"
         elif task.state_type is robot.state_type:
-            expected = rf"on '{robot.name}' .*there is one for: go_to_.*Use --controller policy"
+            expected = rf"on '{robot.name}' .*there is one for: (go_to_|point).*Use --controller policy"
         else:
-            expected = rf"'{robot.name}' moves in .*'{task.name}' is a task in .*Choose one of: go_to_"
+            expected = (
+                rf"'{robot.name}' moves in .*'{task.name}' is a task in .*Choose one of: (go_to_|point)"
+            )
         with pytest.raises(ConfigError, match=expected):
             load_controller(name, robot, task, Choice(robot.timing.control_hz))
 

@@ -9,29 +9,32 @@ import numpy as np
 import pytest
 
 from fulmar_core.actuators.ackermann import Ackermann
+from fulmar_core.actuators.pushing import Pushing
+from fulmar_core.actuators.reaction_wheels import ReactionWheels
 from fulmar_core.actuators.rolling import Rolling
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.dynamics.contact import outline_of
 from fulmar_core.episode import draw_episode
 from fulmar_core.safety.watchdog import default_timeout
 from fulmar_core.simulation import BatchSimulation
-from fulmar_core.spatial import SpatialState
-from fulmar_core.tasks import load_task
 from sim_nodes.mock_backend import MockBackend
 from tests.new_robots import robots_of_every_family
+from tests.spaces import task_for
 
 ROBOTS = robots_of_every_family()
 WHEELED = {name: robot for name, robot in ROBOTS.items() if isinstance(robot.actuators, Rolling)}
-FLOATING = {name: robot for name, robot in ROBOTS.items() if name not in WHEELED}
+FLOATING = {name: robot for name, robot in ROBOTS.items() if isinstance(robot.actuators, Pushing)}
+SATELLITES = {name: robot for name, robot in ROBOTS.items() if isinstance(robot.actuators, ReactionWheels)}
 EACH = pytest.mark.parametrize("robot", ROBOTS.values(), ids=ROBOTS)
 EACH_THAT_ROLLS = pytest.mark.parametrize("robot", WHEELED.values(), ids=WHEELED)
+EACH_SATELLITE = pytest.mark.parametrize("robot", SATELLITES.values(), ids=SATELLITES)
 EACH_THAT_FLOATS = pytest.mark.parametrize("robot", FLOATING.values(), ids=FLOATING)
 IDEAL = load_scenario("ideal")
 
 
 def pose_of(robot):
     """The task of going to a pose, in the robot's own space."""
-    return load_task("go_to_pose_3d" if robot.state_type is SpatialState else "go_to_pose")
+    return task_for(robot, "go_to_pose")
 
 
 def wrench(robot, command):
@@ -115,6 +118,17 @@ def test_its_nozzles_propellers_and_fans_sit_on_the_body(robot):
         assert outline_of(robot).gap(np.asarray(x), np.asarray(y)) <= 0.03
 
 
+@EACH_SATELLITE
+def test_its_wheels_turn_it_about_every_axis_as_its_performance_says(robot):
+    wheels = robot.actuators
+    torques = wheels.scale[: wheels.count, None] * wheels.torque_per_command[: wheels.count]
+    assert np.linalg.matrix_rank(torques) == 3
+    assert np.abs(torques).sum(axis=0)[2] == pytest.approx(robot.performance.torque)
+    slew = robot.performance.yaw_rate * max(robot.body.inertia)
+    assert slew < wheels.top_momentum
+    assert max(robot.body.inertia) * 1e-5 < wheels.spin_inertia < min(robot.body.inertia)
+
+
 @EACH_THAT_ROLLS
 def test_its_wheels_sit_within_its_outline_and_reach_its_speeds(robot):
     wheels, can = robot.actuators, robot.performance
@@ -145,7 +159,7 @@ def test_the_boat_can_hold_every_velocity_that_tasks_ask_of_it():
 @EACH
 def test_what_tasks_ask_for_lies_within_what_gates_believe(robot):
     can, limits = robot.performance, robot.limits
-    assert max(can.speed, can.reverse_speed) <= can.top_speed < limits.speed
+    assert max(can.speed, can.reverse_speed) <= can.top_speed < limits.speed or robot.actuators.turns_only
     assert can.yaw_rate < limits.yaw_rate
 
 
@@ -171,7 +185,8 @@ def test_it_moves_in_the_mock(robot):
     backend.reset(draw_episode(robot, pose_of(robot), IDEAL, seed=1, number=0), seed=1)
     full = robot.actuators.limited(robot.actuators.scale * np.eye(len(robot.actuators.names))[0])
     sample = backend.step(full, 20)
-    assert np.linalg.norm(sample.truth.velocity_in_world) > 0.0
+    moved = np.append(sample.truth.velocity_in_world, sample.truth.angular_velocity_in_body)
+    assert np.linalg.norm(moved) > 0.0
 
 
 @EACH
@@ -179,7 +194,8 @@ def test_it_compiles_in_mujoco(robot):
     pytest.importorskip("mujoco")
     from sim_nodes.mujoco_model import build_model
 
-    assert build_model(robot).nu >= len(robot.actuators.names)
+    wheels = robot.actuators.wheel_names if robot.name in SATELLITES else robot.actuators.names
+    assert build_model(robot).nu >= len(wheels)
 
 
 @EACH

@@ -26,6 +26,7 @@ from fulmar_core.tasks import load_task
 from fulmar_core.teleop import hand_mapping
 from tests.inputs import inputs_at
 from tests.pairs import covering
+from tests.spaces import task_for
 
 ROBOTS = {name: load_robot(name) for name in config_names("robots")}
 TASKS = {name: load_task(name) for name in config_names("tasks")}
@@ -188,9 +189,8 @@ def test_the_metadata_hash_changes_with_every_gain(robot, name):
 
 @pytest.mark.parametrize("robot", ROBOTS.values(), ids=ROBOTS)
 def test_a_rate_that_the_physics_cannot_keep_is_refused(robot):
-    task = "go_to_position" if robot.state_type is PlanarState else "go_to_position_3d"
     with pytest.raises(ConfigError, match=rf"'{robot.name}' at 7 Hz: control_hz = 7 must divide"):
-        load_classical(robot, TASKS[task], control_hz=7.0)
+        load_classical(robot, task_for(robot, "go_to_position"), control_hz=7.0)
 
 
 def test_a_heading_gain_that_would_not_be_stable_is_refused():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fulmar_core.sensors.imu import ImuSample, ImuSpec, InertialUnit
+from fulmar_core.sensors.imu import Gyroscope, ImuSample, ImuSpec, InertialUnit
 from fulmar_core.sensors.odometer import Channel
 
 TRUTH = ImuSample(np.array([0.0, 3.0, 9.81]), np.array([0.0, 0.0, 0.1]))
@@ -22,7 +22,7 @@ def force(unit, times, truth=TRUTH):
 
 
 def test_it_adds_its_two_noises_to_the_truth():
-    unit = begun(ImuSpec(Channel(std=0.02), Channel(std=0.003)))
+    unit = begun(ImuSpec(Channel(std=0.02), Gyroscope(std=0.003)))
     samples = [unit.measure(TRUTH, 0.01 * k) for k in range(4000)]
     forces = np.array([s.specific_force for s in samples]) - TRUTH.specific_force
     turns = np.array([s.angular_velocity for s in samples]) - TRUTH.angular_velocity

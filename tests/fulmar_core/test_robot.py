@@ -87,7 +87,9 @@ def test_limits_and_noises_have_to_mean_something():
 
 def test_a_machine_that_cannot_move_is_refused():
     with pytest.raises(ValueError, match="must be greater than 0"):
-        replace(ROBOT.performance, speed=0.0)
+        replace(ROBOT, performance=replace(ROBOT.performance, speed=0.0))
+    with pytest.raises(ValueError, match="must be greater than 0"):
+        replace(ROBOT.performance, torque=0.0)
     with pytest.raises(ValueError, match="must not be negative"):
         replace(ROBOT.performance, lateral_speed=-0.1)
 

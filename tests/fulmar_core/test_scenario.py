@@ -9,15 +9,19 @@ import numpy as np
 import pytest
 
 from fulmar_core.counter_rng import WORLD, Draws
-from fulmar_core.disturbances.scenario import (
+from fulmar_core.disturbances.parts import (
     Actuation,
+    InertiaChange,
     Kick,
     Push,
-    Scenario,
     Sensing,
     Slope,
+    Solar,
     Tether,
     Wave,
+)
+from fulmar_core.disturbances.scenario import (
+    Scenario,
     bearing_late_s,
     draw_world,
     load_scenario,
@@ -107,7 +111,15 @@ ENTRIES = {
     "sensing.yaw_rate_noise": (STILL, {"sensing": Sensing(yaw_rate_noise=(0.0, 0.1))}, {"yaw_rate_noise"}),
     "bearing_late_s": (STILL, {"bearing_late_s": (1.0, 2.0)}, set()),  # of simulated plants, not of worlds
     "held_s": (STILL, {"held_s": (1.0, 2.0)}, set()),
+    "sensing.gyroscope": (SEEING, {"sensing": Sensing(gyroscope=2.0)}, set()),  # of simulated sensors
+    "sensing.gyroscope_dies_s": (SEEING, {"sensing": Sensing(gyroscope_dies_s=2.0)}, set()),
     "orbit_rate": (STILL, {"orbit_rate": 0.001}, set()),  # of worlds in space
+    "solar.force": (STILL, {"solar": Solar(force=1e-6)}, set()),
+    "solar.arm": (replace(STILL, solar=Solar(1e-6)), {"solar": Solar(1e-6, 0.01)}, set()),
+    **{
+        f"inertia.{field.name}": (STILL, {"inertia": InertiaChange(**{field.name: 0.1})}, set())
+        for field in fields(InertiaChange)
+    },
 }  # fmt: skip
 PARTS = {
     "push": Push,
@@ -115,6 +127,8 @@ PARTS = {
     "kick": Kick,
     "tether": Tether,
     "slope": Slope,
+    "solar": Solar,
+    "inertia": InertiaChange,
     "actuation": Actuation,
     "sensing": Sensing,
 }

@@ -11,12 +11,13 @@ import yaml
 from fulmar_core.errors import ConfigError
 from fulmar_core.paths import config_path
 from fulmar_core.robot import load_robot
-from fulmar_core.sensors.imu import ImuSpec
+from fulmar_core.sensors.imu import Gyroscope, ImuSpec
 from fulmar_core.sensors.kind import Truth
 from fulmar_core.sensors.odometer import Channel
 from fulmar_core.sensors.simulated import SimulatedSensors
 from fulmar_core.sensors.star_tracker import StarTrackerSpec
 from fulmar_core.sensors.table import RANGES, SENSORS
+from fulmar_core.sensors.wheels import WheelSpeeds
 from fulmar_core.state import RigidBodyState
 from fulmar_core.topics import WIRES
 
@@ -24,6 +25,7 @@ EACH = pytest.mark.parametrize("name", SENSORS)
 TRUTH = Truth(
     RigidBodyState(np.zeros(3), np.array([0.0, 0.6, 0.0, 0.8]), np.zeros(3), np.array([0.1, 0.2, 0.3])),
     np.array([1.0, 2.0, 9.0]),
+    WheelSpeeds(("wheel_x", "wheel_y"), np.array([10.0, -20.0])),
 )
 
 
@@ -103,7 +105,7 @@ def test_a_mistake_in_a_sensor_is_one_line_with_its_place(own, sensors, says):
 
 def test_sensors_draw_from_streams_of_their_own():
     """What one sensor draws changes nothing of another."""
-    specs = {"imu": ImuSpec(Channel(std=0.1), Channel(std=0.1)), "star_tracker": StarTrackerSpec(std=0.01)}
+    specs = {"imu": ImuSpec(Channel(std=0.1), Gyroscope(std=0.1)), "star_tracker": StarTrackerSpec(std=0.01)}
 
     def readings_of(**more):
         sensors = SimulatedSensors({**specs, **more}, noisy=True)

@@ -78,11 +78,16 @@ def test_the_first_64_of_4096_worlds_are_64_worlds(robot):
         np.testing.assert_allclose(values, other, rtol=0, atol=2e-5, err_msg=name)
 
 
+def begun_with(simulation):
+    """A number that differs from world to world: the place, or the attitude of a satellite."""
+    return simulation.truth.qx if simulation.robot.actuators.turns_only else simulation.truth.x
+
+
 @EACH_ROBOT
 def test_the_same_seed_gives_the_same_worlds_and_another_seed_others(robot):
     one, two, other = (run(build(RANDOMISED, robot, seed=seed), 10) for seed in (3, 3, 4))
     assert_equal(everything(one), everything(two))
-    assert not np.any(one.truth.x == other.truth.x)
+    assert not np.any(begun_with(one) == begun_with(other))
 
 
 @EACH_ROBOT
@@ -95,7 +100,7 @@ def test_a_reset_begins_anew_in_the_asked_worlds_and_leaves_the_others_bitwise_a
         disturbed.step(command)
         alone.step(command)
     assert_equal(everything(disturbed, rest), everything(alone, rest))
-    assert not np.any(disturbed.truth.x[[1, 4, 8]] == alone.truth.x[[1, 4, 8]])
+    assert not np.any(begun_with(disturbed)[[1, 4, 8]] == begun_with(alone)[[1, 4, 8]])
 
 
 def test_after_a_reset_a_world_is_at_rest_with_safe_actuators_and_a_goal_of_its_own():

@@ -194,7 +194,12 @@ def test_gains_that_cannot_be_are_refused():
 @pytest.mark.parametrize(
     ("robot", "task", "law", "said"),
     [
-        ("floating_platform", "go_to_pose", "pd", "'pd' is for robots with thrusters or fans in space"),
+        (
+            "floating_platform",
+            "go_to_pose",
+            "pd",
+            "'pd' is for robots with thrusters or fans or reaction_wheels in space",
+        ),
         ("turtlebot2", "go_to_pose", "pd", "'turtlebot2' moves in the plane. Use --controller classical"),
         (
             "spacecraft_16",

@@ -13,7 +13,8 @@ from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
 
 TASK = load_task("track_velocities")
-ROBOTS = {name: load_robot(name) for name in config_names("robots")}
+EVERY = (load_robot(name) for name in config_names("robots"))
+ROBOTS = {robot.name: robot for robot in EVERY if not robot.actuators.turns_only}
 MANY = 1000
 
 

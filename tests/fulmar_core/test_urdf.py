@@ -10,6 +10,7 @@ import pytest
 import yourdfpy
 
 from fulmar_core.actuators.pushing import Pushing
+from fulmar_core.actuators.reaction_wheels import ReactionWheels
 from fulmar_core.actuators.rolling import Rolling
 from fulmar_core.paths import config_names
 from fulmar_core.robot import load_robot
@@ -46,6 +47,11 @@ def test_each_actuator_has_a_frame_at_its_place_along_its_force(name):
             place = model.get_transform(f"{push.name}_link", "base_link")
             np.testing.assert_allclose(place[:3, 3], push.position, atol=1e-12)
             np.testing.assert_allclose(place[:3, 0], push.direction, atol=1e-12)
+    elif isinstance(robot.actuators, ReactionWheels):
+        for wheel in robot.actuators.wheels:
+            place = model.get_transform(f"{wheel.name}_link", "base_link")
+            np.testing.assert_allclose(place[:3, 3], np.zeros(3), atol=1e-12)
+            np.testing.assert_allclose(place[:3, 0], wheel.direction, atol=1e-12)
     else:
         assert isinstance(robot.actuators, Rolling)
         for wheel, (x, y) in robot.actuators.wheels.items():

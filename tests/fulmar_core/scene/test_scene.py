@@ -12,6 +12,7 @@ from fulmar_core.robot import load_robot
 from fulmar_core.scene.scene import Scene
 from fulmar_core.scene.shape import Shape
 from fulmar_core.tasks import load_task
+from tests.spaces import task_for
 
 POSE = np.array([[1.0, 2.0, 0.0, 0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5)]])  # it looks along y
 PATH = np.array([[float(x), 0.0, 0.0, 0.0, 0.0, 0.0, 1.0] for x in range(4)])
@@ -34,8 +35,7 @@ def groups(shapes: dict[tuple[str, int], Shape]) -> set[str]:
 
 @pytest.mark.parametrize("robot", config_names("robots"))
 def test_every_robot_shows_its_body_at_once_and_nothing_that_was_not_received(robot):
-    suffix = load_robot(robot).state_type.SUFFIX
-    shapes = drawn(scene_of(robot, f"go_to_pose{suffix}"))
+    shapes = drawn(scene_of(robot, task_for(load_robot(robot), "go_to_pose").name))
     assert [*shapes] == [("body", 0)]
     body = load_robot(robot).body
     assert shapes["body", 0].in_body

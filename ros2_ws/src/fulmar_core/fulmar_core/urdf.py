@@ -10,6 +10,7 @@ from xml.etree import ElementTree
 from scipy.spatial.transform import Rotation
 
 from fulmar_core.actuators.pushing import Pushing
+from fulmar_core.actuators.reaction_wheels import ReactionWheels
 from fulmar_core.actuators.rolling import CASTER_RADIUS, WHEEL_WIDTH, Rolling
 from fulmar_core.robot import Robot
 from fulmar_core.robot_name import PLAIN, Frames
@@ -41,13 +42,19 @@ def body_frames(robot: Robot) -> tuple[BodyFrame, ...]:
 
     Returns:
         `imu_link`, then `<name>_link` of each actuator that pushes, its x axis along the force of a positive command,
-        or of each wheel, its y axis along the axle, and of each caster.
+        of each reaction wheel, its x axis along the axis, or of each wheel on the floor, its y axis along the axle, and
+        of each caster.
     """
     parts = [BodyFrame(IMU, (0.0, 0.0, 0.0))]
     if isinstance(robot.actuators, Pushing):
         parts += [
             BodyFrame(f"{push.name}_link", push.position, _x_axis_along(push.direction))
             for push in robot.actuators.pushes
+        ]
+    elif isinstance(robot.actuators, ReactionWheels):
+        parts += [
+            BodyFrame(f"{wheel.name}_link", (0.0, 0.0, 0.0), _x_axis_along(wheel.direction.tolist()))
+            for wheel in robot.actuators.wheels
         ]
     elif isinstance(robot.actuators, Rolling):
         parts += [BodyFrame(f"{name}_link", (x, y, 0.0)) for name, (x, y) in robot.actuators.wheels.items()]

@@ -104,7 +104,7 @@ class AttitudeLaw(Law):
         if self._unloads is None or self._unloads.shape != share.shape:
             self._unloads = np.zeros(share.shape, dtype=bool)
         self._unloads = (share > UNLOAD_FROM) | self._unloads & (share > UNLOAD_TO)
-        return np.clip(-self.gains.unloading * momentum * self._unloads, -most, most)
+        return np.asarray(np.clip(-self.gains.unloading * momentum * self._unloads, -most, most))
 
     def _limited(self, turn: np.ndarray) -> np.ndarray:
         length = np.maximum(np.linalg.norm(turn, axis=-1, keepdims=True), 1e-12)

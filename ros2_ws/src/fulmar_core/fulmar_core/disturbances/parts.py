@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 Range = tuple[float, float]
@@ -160,12 +159,13 @@ class Sensing:
     velocity_noise: Range = (0.0, 0.0)  # largest error of each measured velocity, for a whole episode [m/s]
     yaw_rate_noise: Range = (0.0, 0.0)  # same for the turn rate [rad/s]
     gyroscope: float = 1.0  # factor on noise and walk of the inertial unit's gyroscope [-]
-    gyroscope_dies_s: float = math.inf  # time in an episode from which on the unit reports nothing [s]
+    # Time in an episode from which on the unit reports nothing; None: it lives on [s].
+    gyroscope_dies_s: float | None = None
 
     def __post_init__(self) -> None:
         if min(self.noise, self.bias, self.delay_s, self.dropout) < 0.0 or self.dropout > 1.0:
             raise ValueError("noise, bias, delay and dropout must not be negative, 'dropout' at most 1.")
-        if min(self.gyroscope, self.gyroscope_dies_s) < 0.0:
+        if min(self.gyroscope, self.gyroscope_dies_s or 0.0) < 0.0:
             raise ValueError("gyroscope and gyroscope_dies_s must not be negative.")
         for low, high in (self.velocity_noise, self.yaw_rate_noise):
             if not 0.0 <= low <= high:

@@ -90,10 +90,8 @@ def sensors_in(robot: Robot, scenario: Scenario) -> dict[str, Any]:
         std=sensing.gyroscope * imu.gyroscope.std,
         walk=sensing.gyroscope * imu.gyroscope.walk,
     )
-    return {
-        **specs,
-        "imu": replace(imu, gyroscope=gyroscope, dies_s=min(imu.dies_s, sensing.gyroscope_dies_s)),
-    }
+    dies_s = imu.dies_s if sensing.gyroscope_dies_s is None else sensing.gyroscope_dies_s
+    return {**specs, "imu": replace(imu, gyroscope=gyroscope, dies_s=dies_s)}
 
 
 def bearing_late_s(scenario: Scenario, *, seed: int, number: int) -> float:

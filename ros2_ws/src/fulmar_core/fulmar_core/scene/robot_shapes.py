@@ -9,6 +9,7 @@ import numpy as np
 
 from fulmar_core.actuators.ackermann import Ackermann
 from fulmar_core.actuators.pushing import Pushing
+from fulmar_core.actuators.reaction_wheels import ReactionWheels
 from fulmar_core.robot import Robot
 from fulmar_core.scene.shape import Color, Kind, Shape, arrow, circle, line
 
@@ -34,7 +35,7 @@ def body_shapes(robot: Robot) -> list[Shape]:
 
 
 def applied_shapes(robot: Robot, effort: Sequence[float]) -> list[Shape]:
-    """What the actuators do: a plume for each that pushes, or where wheels drive to.
+    """What the actuators do: a plume for each that pushes, the torque of reaction wheels, or where wheels drive to.
 
     Args:
         robot: The robot.
@@ -42,6 +43,8 @@ def applied_shapes(robot: Robot, effort: Sequence[float]) -> list[Shape]:
     """
     if isinstance(robot.actuators, Pushing):
         return _plumes(robot, robot.actuators, np.asarray(effort, dtype=float))
+    if isinstance(robot.actuators, ReactionWheels):
+        return _torques(robot, robot.actuators, np.asarray(effort, dtype=float))
     speed, turn = effort
     if isinstance(robot.actuators, Ackermann):
         turn = speed * math.tan(turn) / robot.actuators.wheelbase
@@ -60,6 +63,17 @@ def _plumes(robot: Robot, actuators: Pushing, effort: np.ndarray) -> list[Shape]
         tip = [p - reach * d for p, d in zip(push.position, push.direction, strict=True)]
         shapes.append(arrow(THRUST, number, push.position, tip, color, in_body=True))
     return shapes
+
+
+def _torques(robot: Robot, wheels: ReactionWheels, effort: np.ndarray) -> list[Shape]:
+    """Torque of each actuator on the body, along its axis: at full torque as long as the body's radius."""
+    tips = robot.body.radius * (effort / wheels.scale)[:, None] * wheels.torque_per_command
+    origin = (0.0, 0.0, 0.0)
+    return [
+        arrow(THRUST, number, origin, tip.tolist(), YELLOW, in_body=True)
+        for number, tip in enumerate(tips)
+        if np.linalg.norm(tip) >= LEAST * robot.body.radius
+    ]
 
 
 def velocity_shapes(group: str, twist: Sequence[float], robot: Robot, color: Color) -> list[Shape]:

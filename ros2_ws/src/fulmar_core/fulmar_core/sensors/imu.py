@@ -41,10 +41,10 @@ class ImuSpec:
     gyroscope: Gyroscope = Gyroscope()  # each axis [rad/s]
     rate_hz: float = 0.0  # new readings; 0: with every one asked for [Hz]
     delay_s: float = 0.0  # from motion to reading [s]
-    dies_s: float = math.inf  # time in an episode from which on it reports nothing [s]
+    dies_s: float | None = None  # time in an episode from which on it reports nothing; None: it lives on [s]
 
     def __post_init__(self) -> None:
-        if min(self.rate_hz, self.delay_s, self.dies_s) < 0.0:
+        if min(self.rate_hz, self.delay_s, self.dies_s or 0.0) < 0.0:
             raise ValueError("rate_hz, delay_s and dies_s must not be negative.")
 
     @property
@@ -125,7 +125,7 @@ class SimulatedImu:
     def __init__(self, spec: ImuSpec, noisy: bool) -> None:
         """Prepare; without noise every reading is the truth."""
         self._unit = InertialUnit(spec) if noisy else None
-        self._dies_s = spec.dies_s
+        self._dies_s = math.inf if spec.dies_s is None else spec.dies_s
 
     def reset(self, seed: int, number: int) -> None:
         """Begin an episode; see `SimulatedSensor`."""
