@@ -75,6 +75,7 @@ def test_the_list_is_one_json_object(fulmar):
         "policy",
         "lqr",
         "pd",
+        "adaptive",
         "mpc",
         "lqr_drift",
         "classical",

@@ -46,11 +46,13 @@ def broken_configs(tmp_path, monkeypatch):
         (["run", "leatherback", "--controller", "lqr"], "controller 'lqr' is for robots with thrusters"),
         (
             [*RUN, "--controller", "fuzzy"],
-            "unknown controller 'fuzzy'. Known: classical, excite, external, lqr, lqr_drift, mpc, pd, policy.",
+            "unknown controller 'fuzzy'. Known: adaptive, classical, excite, external, lqr, lqr_drift, mpc, pd, "
+            "policy.",
         ),
         (
             ["evaluate", "floating_platform", "go_to_pose", "--controller", "pd"],
-            "'pd' is for robots with thrusters or fans in space; 'floating_platform' moves in the plane",
+            "'pd' is for robots with thrusters or fans or reaction_wheels in space; 'floating_platform' moves in "
+            "the plane",
         ),
         (
             ["evaluate", "spacecraft_16", "go_to_pose", "--controller", "pd"],

@@ -102,15 +102,14 @@ class Uncertainty:
 class Performance:
     """What the robot can do at its best; tasks, scenarios and scores scale with it."""
 
+    force: float  # push in its strongest direction; 0: it only turns, and the speeds are 0 too [N]
     torque: float  # largest yaw moment [N·m]
+    top_speed: float  # the fastest it goes in a straight line [m/s]
+    speed: float  # ahead, that tasks ask for [m/s]
+    reverse_speed: float  # astern, that tasks ask for [m/s]
+    lateral_speed: float  # to either side, that tasks ask for; 0: it cannot [m/s]
     yaw_rate: float  # that tasks ask for [rad/s]
-    # The others are 0, and left out, of robots that only turn.
-    force: float = 0.0  # push in its strongest direction [N]
-    top_speed: float = 0.0  # the fastest it goes in a straight line [m/s]
-    speed: float = 0.0  # ahead, that tasks ask for [m/s]
-    reverse_speed: float = 0.0  # astern, that tasks ask for [m/s]
-    lateral_speed: float = 0.0  # to either side, that tasks ask for; 0: it cannot [m/s]
-    turning_acceleration: float = 0.0  # speed times turn rate that it can sustain [m/s²]
+    turning_acceleration: float  # speed times turn rate that it can sustain [m/s²]
 
     MOVING: ClassVar[tuple[str, ...]] = ("force", "top_speed", "speed", "turning_acceleration")
 
@@ -260,7 +259,7 @@ class Robot:
         if self.actuators.turns_only and (self.body.planar or max(moving) > 0.0 or any(self.body.com)):
             raise ValueError(
                 f"{self.actuators.kind} only turn a body: it needs 'planar: false', its centre of mass at its origin, "
-                "and in 'performance' no more than torque and yaw_rate."
+                "and in 'performance' 0 for all but torque and yaw_rate."
             )
         if self.state_type is PlanarState and (len(self.body.inertia), len(self.body.center_of_mass)) != (
             3,

@@ -48,6 +48,36 @@ CLOCK = Wire(
     "/clock", "rosgraph_msgs/msg/Clock", "plant", "best_effort", "every plant tick, at most 200 Hz",
     "simulated time", unit="s, ns",
 )  # fmt: skip
+INERTIA = Wire(
+    "inertia", "geometry_msgs/msg/InertiaStamped", "estimator", "stream", "1 Hz, where an inertia estimator runs",
+    "estimated mass properties of a satellite about its centre of mass, as far as a body can have them",
+    unit="kg·m²", frame="`base_link`",
+)  # fmt: skip
+INERTIA_COVARIANCE = Wire(
+    "inertia/covariance", "std_msgs/msg/Float64MultiArray", "estimator", "stream", "with each `inertia`",
+    "its covariance, 6 × 6 by rows, of xx, yy, zz, xy, xz, yz", unit="kg²·m⁴",
+)  # fmt: skip
+INERTIA_STATUS = Wire(
+    "inertia/status", "diagnostic_msgs/msg/DiagnosticArray", "estimator", "stream", "1 Hz",
+    "excitation of each axis, what cannot be observed yet, and why there is no estimate",
+)  # fmt: skip
+EVENTS, EVENTS_2 = (
+    Wire(
+        topic, "sensor_msgs/msg/PointCloud2", "camera", "stream", "packets, where an event camera runs",
+        f"events of the {which} camera: `x`, `y` uint16, `t` uint64, `p` uint8 (1: brighter)", unit="px, ns",
+        frame=f"`{frame}`",
+    )
+    for topic, which, frame in (("events", "first", "event_camera"), ("events_2", "second", "event_camera_2"))
+)  # fmt: skip
+RATE = Wire(
+    "rate", "geometry_msgs/msg/TwistWithCovarianceStamped", "estimator", "stream",
+    "each window of events, where a rate estimator runs",
+    "turn rate from events, `twist.angular`, with its covariance", unit="rad/s", frame="`base_link`",
+)  # fmt: skip
+RATE_STATUS = Wire(
+    "rate/status", "diagnostic_msgs/msg/DiagnosticArray", "estimator", "stream", "1 Hz",
+    "stars in view, what is not observable, an upper bound at rest, and why there is no rate",
+)  # fmt: skip
 COMMAND = Wire(
     "actuators/command", "sensor_msgs/msg/JointState", "controller", "stream", "control rate",
     "`effort` by actuator name, stamped as the observation it answers", unit=EFFORT_UNIT,
@@ -189,7 +219,8 @@ WIRES: tuple[Wire, ...] = (
     *SENSOR_WIRES.values(), MOCAP, TRUTH, ACTUATORS_STATE, ACTUATORS_HEALTH, CLOCK, COMMAND, VELOCITY_COMMAND,
     OBSERVATION, ACTION, METADATA, STATUS, DIAGNOSTICS, GOAL_POSE, GOAL_POINT, GOAL_PATH, GOAL_POSES,
     GOAL_VELOCITY, OBSTACLES, MARKERS, BLOCK, AIR_BEARING, DEVICE_STATE, ESTOP, ESTOP_RELEASED, TELEOP, JOY, SWAP,
-    TRANSFORMS, STATIC_TRANSFORMS, DESCRIPTION, PERIOD, ANSWER,
+    TRANSFORMS, STATIC_TRANSFORMS, DESCRIPTION, INERTIA, INERTIA_COVARIANCE, INERTIA_STATUS, EVENTS, EVENTS_2, RATE,
+    RATE_STATUS, PERIOD, ANSWER,
 )  # fmt: skip
 
 GOAL_WIRES: dict[str, Wire] = {wire.name: wire for wire in (GOAL_POSE, GOAL_POINT, GOAL_PATH, GOAL_VELOCITY)}

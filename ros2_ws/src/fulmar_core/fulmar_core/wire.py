@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-Source = Literal["plant", "estimator", "controller", "operator", "every node", "display"]
+Source = Literal["plant", "estimator", "controller", "operator", "every node", "display", "camera"]
 Delivery = Literal["stream", "latched", "best_effort"]
 
 

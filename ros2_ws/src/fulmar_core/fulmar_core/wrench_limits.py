@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fulmar_core.actuators.pushing import PLANAR, Pushing
+from fulmar_core.actuators.reaction_wheels import ReactionWheels
 from fulmar_core.actuators.rolling import Rolling
 from fulmar_core.errors import ConfigError
 from fulmar_core.robot import Robot
@@ -194,6 +195,10 @@ def wrench_set_of(robot: Robot) -> WrenchSet:
         else:
             columns = np.array([[actuators.pull], [0.0], [0.0]])
         return WrenchSet(tuple(AXES[i] for i in PLANAR), columns, -np.ones(columns.shape[1]), shared=False)
+    if isinstance(actuators, ReactionWheels):
+        wheels = slice(actuators.count)  # unloading comes from outside, and is weak
+        columns = (actuators.scale[wheels, None] * actuators.torque_per_command[wheels]).T
+        return WrenchSet(AXES[3:], columns, -np.ones(actuators.count), shared=False)
     if not isinstance(actuators, Pushing):
         raise ConfigError(
             f"'{robot.name}' has {actuators.kind}, whose forces are not those of single actuators."

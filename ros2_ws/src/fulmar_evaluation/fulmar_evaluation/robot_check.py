@@ -287,11 +287,13 @@ def _gaps(robot: Robot, wrenches: WrenchSet) -> Iterator[tuple[float, str]]:
     """How many times numbers of `performance` differ from what the actuators give, with a line."""
     angles = np.arange(32) * 2.0 * np.pi / 32
     forces = [i for i, axis in enumerate(wrenches.axes) if axis in ("force_x", "force_y")]
-    directions = np.zeros((len(angles), len(wrenches.axes)))
-    directions[:, forces] = np.stack((np.cos(angles), np.sin(angles)), axis=-1) * wrenches.scale[0]
-    free = [i for i in range(len(wrenches.axes)) if i not in forces]
-    most = max(wrenches.most_along(way, free=free) for way in directions) * wrenches.scale[0]
-    given = [("force", "N", robot.performance.force, float(most))]
+    given = []
+    if forces:
+        directions = np.zeros((len(angles), len(wrenches.axes)))
+        directions[:, forces] = np.stack((np.cos(angles), np.sin(angles)), axis=-1) * wrenches.scale[0]
+        free = [i for i in range(len(wrenches.axes)) if i not in forces]
+        most = max(wrenches.most_along(way, free=free) for way in directions) * wrenches.scale[0]
+        given.append(("force", "N", robot.performance.force, float(most)))
     yaw = wrenches.axes.index("torque_z")
     if wrenches.columns[yaw].any():
         way = np.zeros(len(wrenches.axes))

@@ -40,6 +40,7 @@ from fulmar_ros.node_identity import identity_of
 from fulmar_ros.parameters import own_frames, read_parameters
 from fulmar_ros.qos import SAFE_REPEATS
 from fulmar_ros.runtime import RequestExit, settle_memory
+from fulmar_ros.satellite_inputs import SatelliteInputs
 
 DONE, REFUSED = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
 
@@ -137,6 +138,7 @@ class ControllerNode(LifecycleNode):
             on_bearing=self._on_bearing if self.settings.has_bearing(self.robot) else None,
             lockstep=self.settings.lockstep,
         )
+        self._satellite = SatelliteInputs(self, self.robot, self._go_on, lockstep=self.settings.lockstep)
         self.wires.publish_metadata(switch.current.metadata)
         self._wire_watch = WireWatch(self, self.wires.subscribed)
         # Lock step has no beat of its own; a wall-clock timer keeps the status alive between messages.
@@ -200,6 +202,7 @@ class ControllerNode(LifecycleNode):
             self._fall_silent()
             self.guard = None
             self.destroy_timer(self._status_timer)
+            self._satellite.destroy(self)
             self.wires.destroy(self)
 
     def _on_estop(self, message: Bool) -> None:
@@ -286,6 +289,8 @@ class ControllerNode(LifecycleNode):
         guard, answered_ns = self._guarded, self._guarded.loop.answered_ns
         if guard.mission.lacks_something_of(stamp) or not guard.bearing_known:
             return True
+        if not again and self._satellite.lacks_something_of(stamp):
+            return True
         if again or guard.loop.controller.estimator is None or not 0 < stamp - answered_ns <= self._pause_ns:
             return False
         return self._applied.newest_ns < answered_ns and self.wires.state_published()
@@ -305,6 +310,7 @@ class ControllerNode(LifecycleNode):
             self._swap.took_over()
             self._announce()
         stamp = measurement.stamp_ns if measurement else 0
+        self._satellite.fill(guard.loop, stamp)
         command, step = self.robot.actuators.safe_command, None
         try:
             decision, inputs = guard.begin_step(measurement, time.monotonic_ns())
