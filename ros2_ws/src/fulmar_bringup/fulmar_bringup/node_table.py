@@ -141,6 +141,12 @@ def estimates_odometry(plan: RunPlan) -> bool:
     return any(ODOMETRY.name in node.outputs for node in plan.nodes)
 
 
+def takes_poses(plan: RunPlan) -> bool:
+    """Whether what estimates the odometry takes poses of motion capture; a satellite's takes a star tracker."""
+    estimator = plan.guards.estimator
+    return not estimator or MOCAP in estimator_kind(estimator).readings.values()
+
+
 def chain_of(plan: RunPlan) -> tuple[str, ...]:
     """Nodes between plant and controller that answer each period of lock step; none by the clock."""
     if not plan.lockstep:
@@ -158,6 +164,8 @@ def paced_wire(plan: RunPlan) -> Wire:
     if chain_of(plan):
         return PERIOD
     if plan.hardware and (estimated or not load_hardware(plan.hardware).measures_odometry):
+        return ACTUATORS_STATE
+    if estimated and not takes_poses(plan):
         return ACTUATORS_STATE
     return MOCAP if estimated else ODOMETRY
 
@@ -185,8 +193,13 @@ def plant_spec(plan: RunPlan, *, port: str = "") -> NodeSpec:
     if plan.guards.estop:
         parameters["estop"] = True
     estimated, chain = estimates_odometry(plan), chain_of(plan)
+    captured = estimated and takes_poses(plan)
     if estimated:
         parameters["estimated"] = True
+        if not captured:
+            parameters["captured"] = False
+    if any(TRUTH.name in node.inputs for node in plan.nodes):
+        parameters["truth_in_period"] = True
     if chain:
         parameters["chain"] = list(chain)
     if plan.backend == "hardware":
@@ -209,7 +222,7 @@ def plant_spec(plan: RunPlan, *, port: str = "") -> NodeSpec:
         )
     parameters |= _motion_capture(plan)
     things = tuple(thing.wire.name for thing in load_task(plan.task).things)
-    poses = (MOCAP.name,) if estimated or plan.mocap_hz else ()
+    poses = (MOCAP.name,) if captured or plan.mocap_hz else ()
     odometry = () if estimated else (ODOMETRY.name,)
     period = (PERIOD.name,) if chain else ()
     return robot_row(

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from geometry_msgs.msg import PoseStamped
+from geometry_msgs.msg import PoseStamped, TwistWithCovarianceStamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu
 
@@ -19,7 +19,7 @@ from fulmar_core.sensors.imu import UNKNOWN
 from fulmar_core.sensors.kind import SensorKind
 from fulmar_core.sensors.reading import Reading
 from fulmar_core.sensors.table import SENSORS
-from fulmar_core.topics import IMU, MOCAP, ODOMETRY, Wire
+from fulmar_core.topics import IMU, MOCAP, ODOMETRY, RATE, Wire
 from fulmar_ros.convert import OdometryWriter
 from fulmar_ros.message_class import message_class
 
@@ -46,6 +46,16 @@ def _imu(message: Imu, _frames: Frames) -> Reading | None:
     return reading_of(message, SENSORS["imu"])
 
 
+def _rate(message: TwistWithCovarianceStamped, _frames: Frames) -> Reading | str:
+    turning = message.twist.twist.angular
+    covariance = np.array(message.twist.covariance).reshape(6, 6)[3:, 3:]
+    if not (np.isfinite(covariance).all() and np.diag(covariance).min() > 0.0):
+        return "rate has a covariance that is not positive"
+    return Reading(
+        np.array([turning.x, turning.y, turning.z]), stamp_ns(message.header.stamp), covariance=covariance
+    )
+
+
 def _odometry_writer(frames: Frames) -> Write:
     """Writes a `RigidBodyState` with its covariance of shape (12, 12)."""
     writer = OdometryWriter(None, frame=frames.odom, child_frame=frames.base)
@@ -69,6 +79,7 @@ READERS: dict[Wire, tuple[type, Read]] = {
     },
     MOCAP: (PoseStamped, _pose),
     IMU: (Imu, _imu),
+    RATE: (TwistWithCovarianceStamped, _rate),
 }
 WRITERS: dict[Wire, tuple[type, Callable[[Frames], Write]]] = {
     ODOMETRY: (Odometry, _odometry_writer),

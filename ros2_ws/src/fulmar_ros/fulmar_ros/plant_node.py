@@ -129,6 +129,7 @@ class PlantNode(LifecycleNode):
             simulated_time=self.clock if isinstance(self.clock, SimulatedTime) else None,
             chain=self.settings.between,
             transforms=self.settings.transforms,
+            truth_in_period=self.settings.truth_in_period,
         )
         if isinstance(self._backend, AirBearing):
             self._air = AirBearingWires(self, self._backend, watched=not self.settings.between)
@@ -214,7 +215,7 @@ class PlantNode(LifecycleNode):
     def _motion_capture(self) -> MakeCapture | None:
         """Source of poses: in the place of the odometry for an estimator, or beside it at a rate of its own."""
         settings = self.settings
-        if not settings.estimated and not settings.mocap_hz:
+        if not (settings.estimated and settings.captured) and not settings.mocap_hz:
             return None
         return capture_maker(
             self.robot,

@@ -59,10 +59,15 @@ class PlantPeriod:
         self.answers = node.create_subscription(JointState, ANSWER.name, self._on_answer, every)
 
     def distinguish(
-        self, *, odometry: Publisher | None, truth: Publisher | None, clock: Publisher | None
+        self,
+        *,
+        odometry: Publisher | None,
+        truth: Publisher | None,
+        clock: Publisher | None,
+        counts_truth: bool = False,
     ) -> None:
-        """Note which publishers carry no readings of every physics step."""
-        self._truth, self._clock = truth, clock
+        """Note which publishers carry no readings of every physics step, and whether the truth counts as a reading."""
+        self._truth, self._clock = None if counts_truth else truth, clock
         self._at_end_only = {publisher for publisher in (odometry, truth) if publisher is not None}
 
     def publish(self, publisher: Publisher, message: Any) -> None:
@@ -72,7 +77,7 @@ class PlantPeriod:
         data = message if isinstance(message, bytes) else canonical_bytes(message)
         publish_patiently(publisher, data)
         if publisher is self._truth:
-            return  # no node may read it
+            return  # only simulated sensors may read it
         self._kept.append((publisher, data))
         topic = publisher.topic_name
         seconds, nanoseconds = STAMP.unpack_from(data, STAMP_AT)

@@ -35,6 +35,10 @@ class PlantSettings:
     answer_timeout_s: float = 5.0  # longest wait for a controller in lock step [s]
     wait_for_subscribers: int = 0  # of odom, an estimator's inputs or periods, before the first step
     estimated: bool = False  # publish mocap/pose in the place of odom: an estimator makes odom of it
+    captured: bool = True  # where `estimated`: poses of motion capture take the odometry's place
+    truth_in_period: bool = (
+        False  # in lock step: simulated cameras between plant and controller wait for the truth
+    )
     mocap_hz: float = 0.0  # publish mocap/pose so often, also beside odom; 0: at every tick in its place [Hz]
     mocap_late_s: float = 0.0  # by which a pose is stamped and sent after its capture [s]
     chain: tuple[str, ...] = ("",)  # nodes between plant and controller that answer each period of lock step

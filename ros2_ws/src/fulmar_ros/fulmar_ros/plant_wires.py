@@ -78,6 +78,7 @@ class PlantWires:
         simulated_time: SimulatedTime | None = None,
         chain: Sequence[str] = (),
         transforms: bool = True,
+        truth_in_period: bool = False,
     ) -> None:
         """Create every endpoint.
 
@@ -94,6 +95,7 @@ class PlantWires:
             simulated_time: Clock of a simulated plant, by which actuators follow commands.
             chain: Nodes between plant and controller that take part in lock step.
             transforms: Whether frames are published, where tf2_msgs is installed.
+            truth_in_period: Whether nodes of the chain wait for the truth, as simulated cameras do.
         """
         self._mocap = mocap(self._publish_pose) if mocap is not None else None
         self._prior = lockstep  # whether the threads that commands pass have what priority they need
@@ -130,7 +132,12 @@ class PlantWires:
         self._truth = node.create_publisher(Odometry, TRUTH.name, qos(TRUTH)) if simulated else None
         self._clock = node.create_publisher(Clock, CLOCK.name, qos(CLOCK)) if clock else None
         if self._period is not None:
-            self._period.distinguish(odometry=self._sensors.odometry, truth=self._truth, clock=self._clock)
+            self._period.distinguish(
+                odometry=self._sensors.odometry,
+                truth=self._truth,
+                clock=self._clock,
+                counts_truth=truth_in_period,
+            )
         self._write_pose = PoseWriter(frames)
         self._write_truth = OdometryWriter(None, frame="map", child_frame=frames.base)
         self._write_state = VectorWriter(robot.actuators.names)

@@ -10,13 +10,18 @@ from typing import Any
 from fulmar_core.config import line_of, load_config
 from fulmar_core.errors import ConfigError, did_you_mean
 from fulmar_core.estimation.estimator import Estimator
-from fulmar_core.estimation.settings import EstimatorSettings, PlanarMotionSettings, SpatialMotionSettings
+from fulmar_core.estimation.settings import (
+    AttitudeSettings,
+    EstimatorSettings,
+    PlanarMotionSettings,
+    SpatialMotionSettings,
+)
 from fulmar_core.paths import config_path
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
 from fulmar_core.spatial import SpatialState
 from fulmar_core.state import State
-from fulmar_core.topics import IMU, MOCAP, ODOMETRY, SENSOR_WIRES, Wire
+from fulmar_core.topics import IMU, MOCAP, ODOMETRY, RATE, SENSOR_WIRES, Wire
 
 DEFAULT_KIND = "planar_motion"  # of a file that names none
 # Files of configs/estimators that make odometry of motion capture and inertial readings.
@@ -34,6 +39,7 @@ class EstimatorKind:
     takes_if_there: Mapping[str, Wire] = field(default_factory=dict)  # readings that improve the estimate
     needs: tuple[str, ...] = ()  # modules of extras
     form: type[State] = PlanarState  # state type of the robots whose motion it estimates
+    turns_only: bool = False  # of robots that reaction wheels turn, whose place it does not estimate
 
     @property
     def readings(self) -> dict[str, Wire]:
@@ -51,6 +57,12 @@ def _spatial_motion(settings: SpatialMotionSettings, robot: Robot) -> Estimator:
     from fulmar_core.estimation.spatial_motion import SpatialMotionEstimator
 
     return SpatialMotionEstimator(settings, robot.limits, gyroscope_range=robot.sensors.imu.gyroscope_range)
+
+
+def _attitude(settings: AttitudeSettings, robot: Robot) -> Estimator:
+    from fulmar_core.estimation.attitude import AttitudeEstimator
+
+    return AttitudeEstimator(settings, robot)
 
 
 KINDS: dict[str, EstimatorKind] = {
@@ -71,11 +83,22 @@ KINDS: dict[str, EstimatorKind] = {
         form=SpatialState,
         needs=("filterpy",),
     ),
+    "attitude": EstimatorKind(
+        AttitudeSettings,
+        _attitude,
+        takes={"star_tracker": SENSOR_WIRES["star_tracker"]},
+        publishes=(ODOMETRY,),
+        takes_if_there={"imu": IMU, "wheels": SENSOR_WIRES["wheels"], "rate": RATE},
+        form=SpatialState,
+        turns_only=True,
+    ),
 }
 
 
 def default_estimator(robot: Robot) -> str:
-    """Name of the file of a robot that names no estimator, by its state type."""
+    """Name of the file of a robot that names no estimator, by what moves it and its state type."""
+    if robot.actuators.turns_only:
+        return "attitude"
     return DEFAULT_FILES[robot.state_type]
 
 
@@ -116,7 +139,14 @@ def check_estimator(name: str, robot: Robot) -> None:
         ConfigError: As of `load_estimator`, or the robot is of the other space.
     """
     load_estimator(name)
-    form = estimator_kind(name).form
+    kind = estimator_kind(name)
+    form = kind.form
+    if kind.turns_only is not robot.actuators.turns_only:
+        what = "the attitude of a satellite" if kind.turns_only else "the place of a robot that moves"
+        raise ConfigError(
+            f"estimator '{name}' is of {what}, and '{robot.name}' has {robot.actuators.kind}. "
+            f"Use '{default_estimator(robot)}' of configs/estimators, or leave it out."
+        )
     if robot.state_type is not form:
         raise ConfigError(
             f"estimator '{name}' is of motion in {form.WORLD}, and robot '{robot.name}' moves in "

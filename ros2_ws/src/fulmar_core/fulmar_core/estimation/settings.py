@@ -74,3 +74,31 @@ class SpatialMotionSettings(MotionSettings):
     gyroscope_noise: float  # density of a gyroscope's reading [rad/s/√Hz]
 
     POSITIVE = (*MotionSettings.POSITIVE, "attitude_std", "gyroscope_noise")
+
+
+@dataclass(frozen=True, kw_only=True)
+class AttitudeSettings(EstimatorSettings):
+    """Settings of `AttitudeEstimator`. Densities are those of white noise."""
+
+    kind: str = "attitude"
+    star_tracker_std: float  # about each axis, of an attitude whose reading states no covariance [rad]
+    gyroscope_std: float  # of a reading [rad/s]
+    gyroscope_drift: float  # of its bias [rad/s/√s]
+    wheel_std: float  # of a measured speed [rad/s]
+    inertia_share: float  # standard deviation of the inertia in the robot's file, as a share of it [-]
+    rate_spread: float  # of the turn rate by what its model leaves out, wheels measured [rad/s/√s]
+    rate_spread_blind: float  # same without measured wheels [rad/s/√s]
+    attitude_limit_deg: float  # standard deviation beyond which there is no estimate [deg]
+    rate_limit_deg: float  # same of the turn rate [deg/s]
+
+    POSITIVE: ClassVar[tuple[str, ...]] = (
+        "star_tracker_std", "gyroscope_std", "rate_spread", "rate_spread_blind", "attitude_limit_deg", "rate_limit_deg",
+    )  # fmt: skip
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in self.POSITIVE:
+            if not getattr(self, name) > 0.0:
+                raise ValueError(f"'{name}' = {getattr(self, name):g} must be greater than 0.")
+        if min(self.gyroscope_drift, self.wheel_std, self.inertia_share) < 0.0:
+            raise ValueError("gyroscope_drift, wheel_std and inertia_share must not be negative.")

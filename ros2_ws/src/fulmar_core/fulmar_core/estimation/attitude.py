@@ -1,0 +1,259 @@
+"""Attitude and turn rate of a satellite, from star tracker, gyroscope, wheels and the rate of an event camera.
+
+Readings: `star_tracker` is the attitude of the body in the world, a quaternion x, y, z, w, with its covariance about
+the body's axes, shape (3, 3) [rad²]; `imu` an `ImuSample`; `wheels` a `WheelSpeeds`; `rate` a turn rate in the body,
+shape (3,) [rad/s], with its covariance (3, 3). The estimate is a `RigidBodyState` that stays at the origin; its
+covariance, shape (12, 12), is as of `SpatialMotionEstimator`, of which place and velocity are known.
+
+A multiplicative extended Kalman filter (Markley and Crassidis, Fundamentals of Spacecraft Attitude Determination and
+Control, 2014, §6.2) whose turn rate is a state of its own: Euler's equation with the measured speeds of the wheels
+moves it, and a gyroscope measures it, as long as it lives. So the filter goes on without one.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import Any
+
+import numpy as np
+
+from fulmar_core.actuators.reaction_wheels import ReactionWheels
+from fulmar_core.attitude import exponential, normalised, product, rotation_error
+from fulmar_core.estimation.estimator import Estimate
+from fulmar_core.estimation.settings import AttitudeSettings
+from fulmar_core.robot import Robot
+from fulmar_core.rotation import rotate
+from fulmar_core.safety.input_gate import BACK_NS, FORWARD_NS
+from fulmar_core.sensors.reading import Reading
+from fulmar_core.state import RigidBodyState
+
+TURN, RATE, BIAS = slice(0, 3), slice(3, 6), slice(6, 9)  # of the errors
+ERRORS = 9
+KEPT_NS = 2_000_000_000  # how late a reading may come
+TO_BEGIN_ANEW = 10  # attitudes in a row that are no match: then it is the estimate that is wrong
+GATE = 16.3  # 1 good reading of 1,000 lies beyond it: chi-squared, 3 degrees of freedom
+RATE_STD = 0.05  # of the turn rate when the filter begins [rad/s]
+BIAS_STD = 1e-4  # of the gyroscope's bias when the filter begins [rad/s]
+NO_ATTITUDE = "no attitude yet. Does the star tracker see stars?"
+
+
+class AttitudeEstimator:
+    """See `estimation.estimator.Estimator`."""
+
+    def __init__(self, settings: AttitudeSettings, robot: Robot) -> None:
+        """Begin without an estimate."""
+        assert isinstance(robot.actuators, ReactionWheels)  # as of `kinds.check_estimator`
+        self._settings, self._wheels, self._limits = settings, robot.actuators, robot.limits
+        self._inertia = robot.body.inertia_matrix
+        self._lightness = np.linalg.inv(self._inertia)
+        self._names = robot.actuators.wheel_names
+        self._gyroscope_range = robot.sensors.imu.gyroscope_range
+        self.reset()
+
+    def reset(self) -> None:
+        """See `Estimator.reset`."""
+        self.outliers, self.epoch = 0, 0
+        self._forget()
+
+    def _forget(self) -> None:
+        self.problem = NO_ATTITUDE
+        self._begun = False
+        self._stamp_ns = 0
+        self._newest_ns: dict[str, int] = {}
+        self._momentum: np.ndarray | None = None  # of the wheels, in the body [N·m·s]
+        self._past: deque[tuple[int, np.ndarray]] = deque()  # stamps [ns] and attitudes, oldest first
+        self._strangers = 0
+        self._gyroscope_ns = self._rate_ns = self._attitude_ns = 0
+
+    def take(self, name: str, reading: Reading) -> str | None:
+        """See `Estimator.take`."""
+        takers = {
+            "star_tracker": self._attitude,
+            "imu": self._gyroscope,
+            "wheels": self._spin,
+            "rate": self._rate,
+        }
+        if name not in takers:
+            return f"reading '{name}' is not known here, only {', '.join(takers)}"
+        stamp_ns = reading.stamp_ns
+        if stamp_ns is None:
+            return f"reading of '{name}' has no stamp"
+        last_ns = self._newest_ns.get(name)
+        if last_ns is not None:
+            ahead = stamp_ns - last_ns
+            if not -BACK_NS <= ahead <= FORWARD_NS:
+                self._forget()
+                self.epoch += 1
+                return f"time of '{name}' jumped by {ahead / 1e9:+.1f} s: a new epoch begins"
+            if ahead <= 0:
+                return f"stamp of '{name}' did not advance"
+        self._newest_ns[name] = stamp_ns
+        return takers[name](reading, stamp_ns) or None
+
+    def estimate(self, stamp_ns: int | None = None) -> Estimate | None:
+        """See `Estimator.estimate`."""
+        if not self._begun:
+            self.problem = NO_ATTITUDE
+            return None
+        now_ns = self._stamp_ns if stamp_ns is None else max(stamp_ns, self._stamp_ns)
+        self._move_to(now_ns)
+        self.problem = self._staleness(now_ns)
+        if self.problem:
+            return None
+        state = RigidBodyState(np.zeros(3), self._quat.copy(), np.zeros(3), self._turning.copy())
+        axes = rotate(self._quat, np.eye(3)).T  # body to world
+        covariance = np.zeros((12, 12))
+        covariance[3:6, 3:6] = axes @ self._P[TURN, TURN] @ axes.T
+        covariance[9:, 9:] = self._P[RATE, RATE]
+        return Estimate(state, covariance, now_ns)
+
+    @property
+    def rate_source(self) -> str:
+        """What the turn rate comes from now: `gyroscope`, `events` or `wheels`."""
+        for name, newest_ns in (("gyroscope", self._gyroscope_ns), ("events", self._rate_ns)):
+            if newest_ns and self._stamp_ns - newest_ns <= 1e9 * self._settings.bridge_s:
+                return name
+        return "wheels"
+
+    def _staleness(self, now_ns: int) -> str:
+        std = np.degrees(np.sqrt(np.diag(self._P)[:6].reshape(2, 3).max(axis=1)))
+        if std[0] > self._settings.attitude_limit_deg:
+            since_s = (now_ns - self._attitude_ns) / 1e9
+            return f"the attitude is known to {std[0]:.2f}° only: no star tracker for {since_s:.0f} s"
+        if std[1] > self._settings.rate_limit_deg:
+            return f"the turn rate is known to {std[1]:.3f} °/s only: no gyroscope and no stars"
+        return ""
+
+    def _attitude(self, reading: Reading, stamp_ns: int) -> str:
+        quat = np.asarray(reading.value, dtype=float)
+        if not np.isfinite(quat).all() or abs(float(np.linalg.norm(quat)) - 1.0) > 0.01:
+            return "the attitude is no unit quaternion of finite numbers"
+        quat = quat / np.linalg.norm(quat)
+        noise = self._settings.star_tracker_std**2 * np.eye(3)
+        if reading.covariance is not None and np.asarray(reading.covariance).any():
+            noise = np.asarray(reading.covariance)
+        if not self._begun:
+            self._begin(quat, noise, stamp_ns)
+            return ""
+        self._move_to(stamp_ns)
+        residual = np.array(rotation_error(tuple(self._quat_at(stamp_ns)), tuple(quat)))
+        if not self._correct(residual, TURN, noise, gated=True):
+            self._strangers += 1
+            if self._strangers >= TO_BEGIN_ANEW:
+                self._begin(quat, noise, stamp_ns)
+                self.epoch += 1
+                return ""
+            return f"the attitude lies beyond the gate: {self.outliers} outliers so far"
+        self._strangers, self._attitude_ns = 0, stamp_ns
+        return ""
+
+    def _begin(self, quat: np.ndarray, noise: np.ndarray, stamp_ns: int) -> None:
+        self._quat, self._turning, self._bias = quat, np.zeros(3), np.zeros(3)
+        self._P = np.zeros((ERRORS, ERRORS))
+        self._P[TURN, TURN] = noise
+        self._P[RATE, RATE], self._P[BIAS, BIAS] = RATE_STD**2 * np.eye(3), BIAS_STD**2 * np.eye(3)
+        self._stamp_ns = self._attitude_ns = stamp_ns
+        self._begun, self._strangers = True, 0
+        self._past.clear()
+
+    def _gyroscope(self, reading: Reading, stamp_ns: int) -> str:
+        rate = np.asarray(reading.value.angular_velocity, dtype=float)
+        if not np.isfinite(rate).all():
+            return "the gyroscope reports a value that is not finite"
+        largest = float(np.abs(rate).max())
+        if largest >= self._gyroscope_range or largest > 2.0 * self._limits.yaw_rate:
+            return f"the gyroscope reads {largest:.2f} rad/s, beyond what is possible"
+        if not self._begun:
+            return ""
+        self._move_to(stamp_ns)
+        noise = self._settings.gyroscope_std**2 * np.eye(3)
+        self._correct(rate - self._turning - self._bias, (RATE, BIAS), noise, gated=False)
+        self._gyroscope_ns = stamp_ns
+        return ""
+
+    def _rate(self, reading: Reading, stamp_ns: int) -> str:
+        rate = np.asarray(reading.value, dtype=float)
+        if not np.isfinite(rate).all() or reading.covariance is None:
+            return "the rate is not finite, or has no covariance"
+        if not self._begun:
+            return ""
+        self._move_to(stamp_ns)
+        late_s = max(0.0, (self._stamp_ns - stamp_ns) / 1e9)
+        noise = np.asarray(reading.covariance) + self._settings.rate_spread**2 * late_s * np.eye(3)
+        if not self._correct(rate - self._turning, RATE, noise, gated=True):
+            return f"the rate lies beyond the gate: {self.outliers} outliers so far"
+        self._rate_ns = stamp_ns
+        return ""
+
+    def _spin(self, reading: Reading, stamp_ns: int) -> str:
+        speeds = dict(zip(reading.value.names, np.asarray(reading.value.speeds, dtype=float), strict=False))
+        if not set(self._names) <= set(speeds):
+            return f"wheels {', '.join(sorted(set(self._names) - set(speeds)))} are missing"
+        momentum = self._wheels.to_body(
+            self._wheels.spin_inertia * np.array([speeds[n] for n in self._names])
+        )
+        if not np.isfinite(momentum).all():
+            return "a wheel reports a speed that is not finite"
+        before, self._momentum = self._momentum, momentum
+        if self._begun and before is not None:
+            self._move_to(stamp_ns)
+            # What the wheels took, the body lost, as far as its inertia is known; their noise comes with it.
+            lost = self._lightness @ (momentum - before)
+            self._turning = self._turning - lost
+            spread = self._settings.wheel_std * self._wheels.spin_inertia
+            noise = 2.0 * spread**2 * self._lightness @ self._lightness.T
+            self._P = self._P.copy()
+            self._P[RATE, RATE] += noise + self._settings.inertia_share**2 * np.outer(lost, lost)
+        return ""
+
+    def _move_to(self, stamp_ns: int) -> None:
+        """Predict to a time; one before the newest moves nothing [ns]."""
+        t = (stamp_ns - self._stamp_ns) / 1e9
+        if t <= 0.0:
+            return
+        momentum = np.zeros(3) if self._momentum is None else self._momentum
+        rate = self._turning
+        gyroscopic = -self._lightness @ np.cross(rate, self._inertia @ rate + momentum)
+        after = rate + t * gyroscopic
+        turned = exponential(tuple(0.5 * t * (rate + after)))
+        self._quat = np.asarray(normalised(product(tuple(self._quat), turned)))
+        self._turning = after
+        F = np.eye(ERRORS)
+        F[TURN, TURN] = rotate(np.asarray(turned), np.eye(3))  # of the inverse rotation: rows are turned axes
+        F[TURN, RATE] = t * np.eye(3)
+        Q, one, s = np.zeros((ERRORS, ERRORS)), np.eye(3), self._settings
+        spin = (s.rate_spread if self._momentum is not None else s.rate_spread_blind) ** 2
+        Q[TURN, TURN], Q[RATE, RATE] = spin * t**3 / 3.0 * one, spin * t * one
+        Q[TURN, RATE] = Q[RATE, TURN] = spin * t * t / 2.0 * one
+        Q[BIAS, BIAS] = s.gyroscope_drift**2 * t * one
+        self._P = F @ self._P @ F.T + Q
+        self._stamp_ns = stamp_ns
+        self._past.append((stamp_ns, self._quat))
+        while self._past[0][0] < stamp_ns - KEPT_NS:
+            self._past.popleft()
+
+    def _quat_at(self, stamp_ns: int) -> np.ndarray:
+        """Attitude that was believed at a time not long ago [ns]."""
+        if not self._past or stamp_ns >= self._stamp_ns:
+            return self._quat
+        _, quat = min(self._past, key=lambda one: abs(one[0] - stamp_ns))
+        return quat
+
+    def _correct(self, residual: np.ndarray, part: Any, noise: np.ndarray, *, gated: bool) -> bool:
+        """Correct by a residual of one part of the errors, or of the sum of several; whether it passed the gate."""
+        parts = part if isinstance(part, tuple) else (part,)
+        H = np.zeros((3, ERRORS))
+        for each in parts:
+            H[:, each] = np.eye(3)
+        spread = H @ self._P @ H.T + noise
+        if gated and float(residual @ np.linalg.solve(spread, residual)) > GATE:
+            self.outliers += 1
+            return False
+        gain = np.linalg.solve(spread, H @ self._P).T
+        error = gain @ residual
+        left = np.eye(ERRORS) - gain @ H
+        self._P = left @ self._P @ left.T + gain @ noise @ gain.T  # Joseph's form stays symmetric
+        turned = exponential(tuple(error[TURN]))
+        self._quat = np.asarray(normalised(product(tuple(self._quat), turned)))
+        self._turning, self._bias = self._turning + error[RATE], self._bias + error[BIAS]
+        return True
