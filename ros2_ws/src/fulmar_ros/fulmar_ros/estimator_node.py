@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
+from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
 from rclpy.node import Node
@@ -82,7 +83,11 @@ class EstimatorNode(Node):
             wanted=settings.transforms and ODOMETRY in kind.publishes,
             lockstep=settings.lockstep,
         )
-        self._health = Health(self, f"{name_of(self, robot)}: estimator")
+        self._every_ns = round(1e9 * kind.every_s)
+        more = []
+        if kind.status is not None:
+            more.append(self.create_publisher(DiagnosticArray, kind.status.name, publisher_qos(kind.status)))
+        self._health = Health(self, f"{name_of(self, robot)}: {self.get_name()}", *more)
         self._period: LockstepAnswer | None = None
         topics = {}
         for name, wire in kind.readings.items():
@@ -135,7 +140,7 @@ class EstimatorNode(Node):
     def _publish(self) -> None:
         """Publish the estimate, if it is newer than the last one."""
         estimate = self._estimate(None)
-        if estimate is None or 0 <= self._published_ns - estimate.stamp_ns <= NEW_EPOCH_NS:
+        if estimate is None or not self._is_new(estimate):
             return
         for publisher, write in self._outputs:
             publisher.publish(write(estimate))
@@ -147,10 +152,15 @@ class EstimatorNode(Node):
             if reading is not None:
                 self._take(name, reading)
         estimate = self._estimate(period_ns)
-        if estimate is None:
+        if estimate is None or (self._every_ns and not self._is_new(estimate)):
             return []
         self._note(estimate)
         return [(publisher, write(estimate)) for publisher, write in self._outputs]
+
+    def _is_new(self, estimate: Estimate) -> bool:
+        """Whether an estimate is newer than the last one by as much as its kind says, or of a new epoch."""
+        since_ns = estimate.stamp_ns - self._published_ns
+        return since_ns < -NEW_EPOCH_NS or since_ns >= max(1, self._every_ns)
 
     def _estimate(self, time_ns: int | None) -> Estimate | None:
         estimate = self._estimator.estimate(time_ns)
@@ -179,6 +189,7 @@ class EstimatorNode(Node):
             "epoch": str(self._estimator.epoch),
             "stale": str(bool(problem)).lower(),
         }
+        values |= self._estimator.status()
         self._health.publish("warn" if problem else "ok", problem or "estimating", values)
 
     def stop(self) -> None:

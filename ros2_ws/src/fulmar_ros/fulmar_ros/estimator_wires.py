@@ -6,9 +6,10 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from geometry_msgs.msg import PoseStamped, TwistWithCovarianceStamped
+from geometry_msgs.msg import InertiaStamped, PoseStamped, TwistWithCovarianceStamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu
+from std_msgs.msg import Float64MultiArray, MultiArrayDimension, MultiArrayLayout
 
 from fulmar_bags.message_reader import reading_of, stamp_ns
 from fulmar_core.errors import shortened
@@ -19,8 +20,8 @@ from fulmar_core.sensors.imu import UNKNOWN
 from fulmar_core.sensors.kind import SensorKind
 from fulmar_core.sensors.reading import Reading
 from fulmar_core.sensors.table import SENSORS
-from fulmar_core.topics import IMU, MOCAP, ODOMETRY, RATE, Wire
-from fulmar_ros.convert import OdometryWriter
+from fulmar_core.topics import IMU, INERTIA, INERTIA_COVARIANCE, MOCAP, ODOMETRY, RATE, Wire
+from fulmar_ros.convert import OdometryWriter, stamp_of
 from fulmar_ros.message_class import message_class
 
 FRAMES = ("odom", "map", "world")  # names of the room in motion captures; all with Z up
@@ -71,6 +72,37 @@ def _odometry_writer(frames: Frames) -> Write:
     return write
 
 
+def _inertia_writer(frames: Frames) -> Write:
+    """Writes an inertia tensor, shape (3, 3)."""
+
+    def write(estimate: Estimate) -> InertiaStamped:
+        message = InertiaStamped()
+        message.header.stamp, message.header.frame_id = stamp_of(estimate.stamp_ns), frames.base
+        its, tensor = message.inertia, estimate.value
+        its.ixx, its.iyy, its.izz = (float(tensor[i, i]) for i in range(3))
+        its.ixy, its.ixz, its.iyz = float(tensor[0, 1]), float(tensor[0, 2]), float(tensor[1, 2])
+        return message
+
+    return write
+
+
+def _covariance_writer(_frames: Frames) -> Write:
+    """Writes a square covariance by rows."""
+
+    def write(estimate: Estimate) -> Float64MultiArray:
+        covariance = np.asarray(estimate.covariance, dtype=float)
+        count = len(covariance)
+        layout = MultiArrayLayout(
+            dim=[
+                MultiArrayDimension(label="row", size=count, stride=count * count),
+                MultiArrayDimension(label="column", size=count, stride=count),
+            ]
+        )
+        return Float64MultiArray(layout=layout, data=covariance.ravel().tolist())
+
+    return write
+
+
 READERS: dict[Wire, tuple[type, Read]] = {
     **{
         kind.wire: (message_class(kind.wire), _sensor(kind))
@@ -83,4 +115,6 @@ READERS: dict[Wire, tuple[type, Read]] = {
 }
 WRITERS: dict[Wire, tuple[type, Callable[[Frames], Write]]] = {
     ODOMETRY: (Odometry, _odometry_writer),
+    INERTIA: (InertiaStamped, _inertia_writer),
+    INERTIA_COVARIANCE: (Float64MultiArray, _covariance_writer),
 }

@@ -115,6 +115,10 @@ class AttitudeEstimator:
                 return name
         return "wheels"
 
+    def status(self) -> dict[str, str]:
+        """See `Estimator.status`."""
+        return {"rate_from": self.rate_source}
+
     def _staleness(self, now_ns: int) -> str:
         std = np.degrees(np.sqrt(np.diag(self._P)[:6].reshape(2, 3).max(axis=1)))
         if std[0] > self._settings.attitude_limit_deg:

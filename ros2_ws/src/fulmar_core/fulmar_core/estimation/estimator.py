@@ -48,6 +48,10 @@ class Estimator(Protocol):
         """
         ...
 
+    def status(self) -> dict[str, str]:
+        """What else there is to say of the estimate, by name, for people."""
+        ...
+
     def estimate(self, stamp_ns: int | None = None) -> Estimate | None:
         """What is believed; None, with `problem`, without a usable estimate.
 

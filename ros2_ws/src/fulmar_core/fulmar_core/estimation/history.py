@@ -220,6 +220,10 @@ class HistoryEstimator(ABC, Generic[S]):
             f"the gyroscope reads {largest:.2f} rad/s, the end of its range: the body tumbles too fast for it"
         )
 
+    def status(self) -> dict[str, str]:
+        """Nothing; see `Estimator`."""
+        return {}
+
     def estimate(self, stamp_ns: int | None = None) -> Estimate | None:
         """See `Estimator`."""
         newest_ns = self._history[-1].stamp_ns if self._history else 0

@@ -13,6 +13,7 @@ from fulmar_core.estimation.estimator import Estimator
 from fulmar_core.estimation.settings import (
     AttitudeSettings,
     EstimatorSettings,
+    InertiaSettings,
     PlanarMotionSettings,
     SpatialMotionSettings,
 )
@@ -21,7 +22,17 @@ from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
 from fulmar_core.spatial import SpatialState
 from fulmar_core.state import State
-from fulmar_core.topics import IMU, MOCAP, ODOMETRY, RATE, SENSOR_WIRES, Wire
+from fulmar_core.topics import (
+    IMU,
+    INERTIA,
+    INERTIA_COVARIANCE,
+    INERTIA_STATUS,
+    MOCAP,
+    ODOMETRY,
+    RATE,
+    SENSOR_WIRES,
+    Wire,
+)
 
 DEFAULT_KIND = "planar_motion"  # of a file that names none
 # Files of configs/estimators that make odometry of motion capture and inertial readings.
@@ -40,6 +51,8 @@ class EstimatorKind:
     needs: tuple[str, ...] = ()  # modules of extras
     form: type[State] = PlanarState  # state type of the robots whose motion it estimates
     turns_only: bool = False  # of robots that reaction wheels turn, whose place it does not estimate
+    every_s: float = 0.0  # time between two estimates that are published, at least [s]
+    status: Wire | None = None  # where its `status()` is published
 
     @property
     def readings(self) -> dict[str, Wire]:
@@ -63,6 +76,12 @@ def _attitude(settings: AttitudeSettings, robot: Robot) -> Estimator:
     from fulmar_core.estimation.attitude import AttitudeEstimator
 
     return AttitudeEstimator(settings, robot)
+
+
+def _inertia(settings: InertiaSettings, robot: Robot) -> Estimator:
+    from fulmar_core.inertia_estimation.estimator import InertiaEstimator
+
+    return InertiaEstimator(settings, robot)
 
 
 KINDS: dict[str, EstimatorKind] = {
@@ -91,6 +110,16 @@ KINDS: dict[str, EstimatorKind] = {
         takes_if_there={"imu": IMU, "wheels": SENSOR_WIRES["wheels"], "rate": RATE},
         form=SpatialState,
         turns_only=True,
+    ),
+    "inertia": EstimatorKind(
+        InertiaSettings,
+        _inertia,
+        takes={"imu": IMU, "wheels": SENSOR_WIRES["wheels"]},
+        publishes=(INERTIA, INERTIA_COVARIANCE),
+        form=SpatialState,
+        turns_only=True,
+        every_s=1.0,
+        status=INERTIA_STATUS,
     ),
 }
 

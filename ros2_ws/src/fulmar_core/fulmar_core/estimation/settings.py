@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -102,3 +102,37 @@ class AttitudeSettings(EstimatorSettings):
                 raise ValueError(f"'{name}' = {getattr(self, name):g} must be greater than 0.")
         if min(self.gyroscope_drift, self.wheel_std, self.inertia_share) < 0.0:
             raise ValueError("gyroscope_drift, wheel_std and inertia_share must not be negative.")
+
+
+@dataclass(frozen=True, kw_only=True)
+class InertiaSettings(EstimatorSettings):
+    """Settings of `InertiaEstimator`."""
+
+    kind: str = "inertia"
+    method: Literal["batch", "rls", "ekf"]  # least squares over all, with forgetting, or a filter
+    tensor: Literal["diagonal", "full"] = "diagonal"
+    every_s: float = 0.1  # time between the readings that are used, at least [s]
+    gyroscope_std: float  # of a reading [rad/s]
+    wheel_std: float  # of a measured speed [rad/s]
+    guess: float = 1.0  # factor on the inertia of the robot's file, to begin with [-]
+    spread: float = 0.3  # standard deviation of that guess, as a share [-]
+    walk: float = 5e-3  # of the inertia in the filter, as a share [1/√s]
+    memory_s: float = 60.0  # after which a reading counts 1/e in the least squares with forgetting [s]
+    known_share: float = (
+        0.02  # standard deviation of a moment, as a share, beyond which it is not published [-]
+    )
+
+    POSITIVE: ClassVar[tuple[str, ...]] = (
+        "every_s", "gyroscope_std", "wheel_std", "guess", "spread", "walk", "memory_s", "known_share",
+    )  # fmt: skip
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in self.POSITIVE:
+            if not getattr(self, name) > 0.0:
+                raise ValueError(f"'{name}' = {getattr(self, name):g} must be greater than 0.")
+
+    @property
+    def count(self) -> int:
+        """Numbers of the inertia that are estimated."""
+        return 3 if self.tensor == "diagonal" else 6

@@ -1,0 +1,1 @@
+"""Torques of wheels that make the inertia of a satellite observable."""

@@ -1,0 +1,1 @@
+"""Estimators of the inertia of a satellite from its gyroscope and the speeds of its wheels."""
