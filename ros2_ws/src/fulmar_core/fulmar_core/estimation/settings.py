@@ -136,3 +136,19 @@ class InertiaSettings(EstimatorSettings):
     def count(self) -> int:
         """Numbers of the inertia that are estimated."""
         return 3 if self.tensor == "diagonal" else 6
+
+
+@dataclass(frozen=True, kw_only=True)
+class EventRateSettings(EstimatorSettings):
+    """Settings of `EventRateEstimator`."""
+
+    kind: str = "event_rate"
+    window_s: float = 0.2  # length of a window [s]
+    longest_s: float = 1.0  # of the window that is used where a short one shows too little [s]
+    least_stars: int = 2  # in a window
+    limit_deg: float = 0.5  # standard deviation about an axis beyond which it is not observable [deg/s]
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not 0.0 < self.window_s <= self.longest_s or self.least_stars < 1 or self.limit_deg <= 0.0:
+            raise ValueError("0 < window_s <= longest_s, least_stars >= 1 and limit_deg > 0 are needed.")

@@ -1,0 +1,1 @@
+"""Turn rate of a body from the events of a camera that looks at the stars."""

@@ -1,0 +1,180 @@
+"""Turn rate from the events of one or two cameras that look at the stars, window after window.
+
+Readings: `events` and `events_2` are packets of `Events`, stamped at their end. The estimate is the turn rate about the
+body's axes, shape (3,) [rad/s], with its covariance (3, 3), stamped at the middle of its window.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import replace
+
+import numpy as np
+
+from fulmar_core.estimation.estimator import Estimate
+from fulmar_core.estimation.settings import EventRateSettings
+from fulmar_core.rate_estimation.contrast import RateFit, fit_rate
+from fulmar_core.rate_estimation.star_tracks import Tracks, find_tracks
+from fulmar_core.safety.input_gate import BACK_NS, FORWARD_NS
+from fulmar_core.sensors.reading import Reading
+from fulmar_core.sky.events import Events, joined
+from fulmar_core.sky.star_camera import StarCamera
+
+AXES = "xyz"
+NO_EVENTS = "no events yet. Does the camera run?"
+BOUND_PX = 2.0  # a star that moves so far in a window makes events enough to be found
+UNKNOWN_STD = 1.0  # of an axis about which nothing is observable [rad/s]
+SILENT = 3  # windows without a camera's events, after which the other goes on alone
+
+
+class EventRateEstimator:
+    """See `estimation.estimator.Estimator`.
+
+    Attributes:
+        bound: Upper bound of the turn rate across the boresight where no star moves; None where one does [rad/s].
+        fit: Of the newest window; None where it has none.
+    """
+
+    def __init__(self, settings: EventRateSettings, cameras: tuple[StarCamera, ...]) -> None:
+        """Begin without an estimate; one or two cameras."""
+        self._settings = settings
+        self._cameras = dict(zip(("events", "events_2"), cameras, strict=False))
+        self.reset()
+
+    def reset(self) -> None:
+        """See `Estimator.reset`."""
+        self.outliers, self.epoch = 0, 0
+        self._forget()
+
+    def _forget(self) -> None:
+        self.problem = NO_EVENTS
+        self.fit: RateFit | None = None
+        self.bound: float | None = None
+        self._packets: dict[str, deque[tuple[int, Events]]] = {name: deque() for name in self._cameras}
+        self._until_ns: dict[str, int] = {}  # end of the newest packet, by camera
+        self._window_ns = -1  # where the next window begins
+        self._estimate: Estimate | None = None
+        self._noise_hz = 0.0
+        self._events_hz = 0.0
+
+    def take(self, name: str, reading: Reading) -> str | None:
+        """See `Estimator.take`."""
+        if name not in self._cameras:
+            return f"reading '{name}' is not known here, only {', '.join(self._cameras)}"
+        if reading.stamp_ns is None:
+            return f"packet of '{name}' has no stamp"
+        packet: Events = reading.value
+        camera = self._cameras[name]
+        if (packet.width, packet.height) != (camera.width, camera.height):
+            return (
+                f"packet of '{name}' comes from a camera of {packet.width} × {packet.height} pixels, and the robot's has "
+                f"{camera.width} × {camera.height}"
+            )
+        if problem := packet.problem():
+            return f"packet of '{name}': {problem}"
+        last_ns = self._until_ns.get(name)
+        if last_ns is not None:
+            ahead = reading.stamp_ns - last_ns
+            if not -BACK_NS <= ahead <= FORWARD_NS:
+                self._forget()
+                self.epoch += 1
+                return f"time of '{name}' jumped by {ahead / 1e9:+.1f} s: a new epoch begins"
+            if ahead <= 0:
+                return f"packet of '{name}' is out of order: it ends {-ahead / 1e9:g} s before one that came earlier"
+        self._until_ns[name] = reading.stamp_ns
+        self._packets[name].append((reading.stamp_ns, packet))
+        if self._window_ns < 0:
+            begin = int(packet.t[0]) if len(packet) else reading.stamp_ns
+            self._window_ns = begin
+        self._run()
+        return None
+
+    def estimate(self, stamp_ns: int | None = None) -> Estimate | None:
+        """See `Estimator.estimate`: that of the newest window, until it is `bridge_s` old; its stamp is its own."""
+        if self._estimate is not None:
+            age_s = (max(self._until_ns.values()) - self._estimate.stamp_ns) / 1e9
+            if age_s > self._settings.bridge_s:
+                self._estimate = None
+                self.problem = self.problem or f"no rate for {age_s:.1f} s"
+        return self._estimate
+
+    def status(self) -> dict[str, str]:
+        """See `Estimator.status`."""
+        found = {"noise_hz_per_pixel": f"{self._noise_hz:.3g}", "events_per_s": f"{self._events_hz:.0f}"}
+        found["stars"] = str(self.fit.stars if self.fit else 0)
+        found["not_observable"] = ", ".join(self._unobservable()) or "none"
+        if self.bound is not None:
+            found["rate_at_most_deg_s"] = f"{np.degrees(self.bound):.4f}"
+        return found
+
+    def _unobservable(self) -> list[str]:
+        if self.fit is None:
+            return list(AXES)
+        limit = np.radians(self._settings.limit_deg)
+        return [axis for axis, var in zip(AXES, np.diag(self.fit.covariance), strict=True) if var > limit**2]
+
+    def _run(self) -> None:
+        """Estimate every window that all cameras have seen to its end."""
+        length_ns = round(1e9 * self._settings.window_s)
+        while True:
+            end_ns = self._window_ns + length_ns
+            newest = max(self._until_ns.values())
+            waiting = [name for name in self._cameras if self._until_ns.get(name, -1) < end_ns]
+            if newest < end_ns or (waiting and newest < end_ns + SILENT * length_ns):
+                return
+            self._window(end_ns)
+            self._window_ns = end_ns
+
+    def _window(self, end_ns: int) -> None:
+        """Estimate the window that ends at a time; one that shows too little is looked at together with those before."""
+        s = self._settings
+        self.fit = None
+        for seconds in dict.fromkeys((s.window_s, s.longest_s)):
+            begin_ns = end_ns - round(1e9 * seconds)
+            tracks = self._tracks(begin_ns, end_ns)
+            if not tracks:
+                self.problem = "no events in this window"
+                return
+            start = self._estimate.value if self._estimate is not None and self._fresh(end_ns) else None
+            fit = fit_rate(list(tracks.values()), [self._cameras[name] for name in tracks], start=start)
+            if fit is not None and fit.stars >= s.least_stars and self._is_good(fit):
+                covariance = np.minimum(fit.covariance, UNKNOWN_STD**2)
+                self.fit, self.bound, self.problem = replace(fit, covariance=covariance), None, ""
+                self._estimate = Estimate(fit.rate, covariance, (begin_ns + end_ns) // 2)
+                return
+        focal = max(camera.focal_px for camera in self._cameras.values())
+        found = sum(each.count for each in tracks.values())
+        if found:
+            self.bound = None
+            self.problem = (
+                f"{found} stars move in this window: too few for a rate ({s.least_stars} are needed)"
+            )
+        else:
+            self.bound = BOUND_PX / (s.longest_s * focal)
+            self.problem = f"no star moves: the body turns across its cameras by less than {np.degrees(self.bound):.4f} °/s"
+
+    def _fresh(self, end_ns: int) -> bool:
+        """Whether the last estimate is a start for the window that ends at a time."""
+        assert self._estimate is not None
+        return end_ns - self._estimate.stamp_ns < 2.1e9 * self._settings.window_s
+
+    def _is_good(self, fit: RateFit) -> bool:
+        """Whether a fit tells about the two axes across a boresight at least."""
+        return bool(np.sqrt(np.linalg.eigvalsh(fit.covariance)[1]) < np.radians(self._settings.limit_deg))
+
+    def _tracks(self, begin_ns: int, end_ns: int) -> dict[str, Tracks]:
+        """Tracks of stars in each camera that has events in a window."""
+        found, events = {}, 0
+        for name, packets in self._packets.items():
+            while packets and packets[0][0] <= end_ns - round(1e9 * self._settings.longest_s) - 1:
+                packets.popleft()
+            inside = [packet for until_ns, packet in packets if until_ns > begin_ns and len(packet)]
+            if not inside:
+                continue
+            window = joined(inside).between(begin_ns, end_ns)
+            if len(window):
+                found[name] = find_tracks(window, begin_ns, end_ns)
+                events += len(window)
+                self._noise_hz = found[name].noise_hz
+        self._events_hz = events / max((end_ns - begin_ns) / 1e9, 1e-9)
+        return found

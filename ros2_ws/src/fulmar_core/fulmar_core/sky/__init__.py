@@ -1,0 +1,1 @@
+"""Stars, cameras that see them, and events of their motion."""
