@@ -67,6 +67,38 @@ def counted(index: int) -> Callable[[int], None]:
     return progress
 
 
+def mapped(
+    function: Callable[..., Any],
+    items: Sequence[tuple[Any, ...]],
+    *,
+    jobs: int,
+    progress: Callable[[float, float], None],
+) -> list[Any]:
+    """Results of a function, called with the arguments of each item in a process of a pool, in their order.
+
+    Args:
+        function: Of a module, so that other processes find it.
+        items: Arguments of each call.
+        jobs: Processes at once.
+        progress: Called with how many are done, and of how many.
+    """
+    spawn = multiprocessing.get_context("spawn")
+    counts = spawn.Array("q", 1, lock=False)
+    with (
+        one_thread_each(),
+        ended_with_us(ProcessPoolExecutor(jobs, spawn, begin_worker, (counts, os.getpid()))) as pool,
+    ):
+        futures = [pool.submit(function, *item) for item in items]
+        pending = set(futures)
+        while pending:
+            _, pending = wait(pending, timeout=0.5, return_when=FIRST_COMPLETED)
+            progress(float(len(futures) - len(pending)), float(len(futures)))
+        try:
+            return [future.result() for future in futures]
+        except BrokenProcessPool as error:
+            raise RunFailed("a process of the benchmark was ended from outside") from error
+
+
 Outcome = PairResult | str  # a sentence where a unit failed
 Done = Callable[[Unit, Outcome], None]
 

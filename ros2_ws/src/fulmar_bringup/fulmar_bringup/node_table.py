@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 from fulmar_bringup.emulation import Emulation
-from fulmar_bringup.run_plan import NodeSpec, Parameter, RunPlan, node_row
+from fulmar_bringup.estimator_rows import estimator_specs, robot_row
+from fulmar_bringup.run_plan import NodeSpec, Parameter, RunPlan
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.estimation.kinds import estimator_kind, load_estimator
 from fulmar_core.recording import Recording
@@ -47,13 +46,6 @@ MODEL = (
     TRANSFORMS.name,
     STATIC_TRANSFORMS.name,
 )  # of every plant; the last two need tf2_msgs
-
-
-def robot_row(
-    plan: RunPlan, name: str, module: str, parameters: Mapping[str, Parameter], **more: Any
-) -> NodeSpec:
-    """A row of a plan's robot, with its topics renamed; `more` as of `NodeSpec`."""
-    return node_row(plan.namespace, name, module, parameters, remappings=dict(plan.remappings), **more)
 
 
 def controller_spec(plan: RunPlan) -> NodeSpec:
@@ -152,7 +144,7 @@ def chain_of(plan: RunPlan) -> tuple[str, ...]:
     if not plan.lockstep:
         return ()
     own = (node.name for node in plan.nodes if PERIOD.name in node.inputs)
-    return (*(("estimator",) if plan.guards.estimator else ()), *own)
+    return (*(row.name for row in estimator_specs(plan)), *own)
 
 
 def paced_wire(plan: RunPlan) -> Wire:
@@ -198,7 +190,7 @@ def plant_spec(plan: RunPlan, *, port: str = "") -> NodeSpec:
         parameters["estimated"] = True
         if not captured:
             parameters["captured"] = False
-    if any(TRUTH.name in node.inputs for node in plan.nodes):
+    if any(TRUTH.name in node.inputs for node in (*plan.nodes, *estimator_specs(plan))):
         parameters["truth_in_period"] = True
     if chain:
         parameters["chain"] = list(chain)
@@ -320,27 +312,4 @@ def guard_specs(plan: RunPlan) -> tuple[NodeSpec, ...]:
                 outputs=(ESTOP.name,),
             )
         )
-    if plan.guards.estimator:
-        nodes.append(_estimator_spec(plan, plan.guards.estimator))
-    return tuple(nodes)
-
-
-def _estimator_spec(plan: RunPlan, estimator: str) -> NodeSpec:
-    """The node that estimates, by a file of `configs/estimators`."""
-    kind = estimator_kind(estimator)
-    parameters: dict[str, Parameter] = {"robot": plan.robot, "estimator": estimator}
-    inputs = tuple(wire.name for wire in kind.takes.values())
-    observed = tuple(wire.name for wire in kind.takes_if_there.values())
-    outputs = tuple(wire.name for wire in kind.publishes)
-    if plan.lockstep:
-        parameters["lockstep"] = True
-        upstream = [
-            node.name
-            for node in plan.nodes
-            if PERIOD.name in node.inputs and {*node.outputs} & {*inputs, *observed}
-        ]
-        if upstream:
-            parameters["upstream"] = upstream
-        inputs, outputs = (*inputs, PERIOD.name), (*outputs, ANSWER.name)
-    wires = {"inputs": inputs, "observed": observed, "outputs": outputs}
-    return robot_row(plan, "estimator", "fulmar_ros.estimator_node", parameters, **wires)
+    return (*nodes, *estimator_specs(plan))

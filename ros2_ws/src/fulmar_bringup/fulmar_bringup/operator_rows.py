@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from fulmar_bringup.estimator_rows import robot_row
 from fulmar_bringup.goal_plan import goal_rate, is_path_of_places
-from fulmar_bringup.node_table import robot_row
 from fulmar_bringup.run_plan import NodeSpec, Parameter, RunPlan, node_row
 from fulmar_core.robot_name import namespace_of
 from fulmar_core.safety.geofence import NO_AREA

@@ -19,8 +19,9 @@ from fulmar_bringup.system import (
 )
 from fulmar_core.bundle_signature import verify_bundle
 from fulmar_core.controllers.classical import has_law
+from fulmar_core.disturbances.scenario import Scenario
 from fulmar_core.errors import BundleError, ConfigError, UnknownNameError
-from fulmar_core.estimation.kinds import check_estimator
+from fulmar_core.estimation.kinds import check_estimator, default_estimator, estimator_kind
 from fulmar_core.goal import Goal, PoseTuple
 from fulmar_core.own_class import is_own
 from fulmar_core.paths import config_names
@@ -29,7 +30,7 @@ from fulmar_core.robot import Robot
 from fulmar_core.safety.geofence import NO_AREA, check_area_of
 from fulmar_core.safety.watchdog import default_timeout
 from fulmar_core.tasks import Task
-from fulmar_core.topics import COMMAND, MOCAP, SENSOR_WIRES, TRUTH, VELOCITY_COMMAND
+from fulmar_core.topics import COMMAND, MOCAP, ODOMETRY, SENSOR_WIRES, TRUTH, VELOCITY_COMMAND
 from hardware_drivers.own_driver import check_own_driver
 from hardware_drivers.settings import TOPIC_DRIVERS, UNARMED, MavlinkBoat, load_hardware
 from policy_server.controllers import EXTERNAL, FALLBACKS, controller_entry, shipped_policies, shipped_policy
@@ -37,6 +38,7 @@ from policy_server.controllers import EXTERNAL, FALLBACKS, controller_entry, shi
 # Topics between plant, controller and estimator. Goals, e-stop and status keep their names: the run itself and every
 # other command of `fulmar` use them.
 REMAPPABLE = tuple(wire.name for wire in (MOCAP, *SENSOR_WIRES.values(), TRUTH, COMMAND, VELOCITY_COMMAND))
+EVENT_RATE = "event_rate"  # file of configs/estimators that takes the place of a dead gyroscope
 TOPIC = re.compile(r"/?[A-Za-z][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*")
 
 
@@ -214,12 +216,41 @@ def checked_guards(usual: Guards, asked: Mapping[str, Any], robot: Robot, task: 
     fallback = asked.get("fallback")
     if fallback is not None and fallback not in FALLBACKS:
         raise UnknownNameError("fallback", fallback, FALLBACKS)
-    guards = replace(usual, **asked)
+    guards = replace(usual, **_split_estimators(asked))
     check_area_of(robot, guards.area)
     if guards.fallback:
         controller_entry(guards.fallback).check(robot, task)
-    if guards.estimator:
-        check_estimator(guards.estimator, robot)
+    for file in (*filter(None, (guards.estimator,)), *guards.estimators):
+        check_estimator(file, robot)
+    return guards
+
+
+def _split_estimators(asked: Mapping[str, Any]) -> dict[str, Any]:
+    """The same with several files of estimators, separated by commas, told apart: the one of odometry, and the rest."""
+    files = [file.strip() for file in str(asked.get("estimator") or "").split(",") if file.strip()]
+    rest = tuple(file for file in files if ODOMETRY not in estimator_kind(file).publishes)
+    first = [file for file in files if file not in rest]
+    if len(first) > 1:
+        raise ConfigError(
+            f"{' and '.join(first)} estimate the odometry, and a controller follows one. Leave one out."
+        )
+    found = {key: value for key, value in asked.items() if key != "estimator"}
+    return found | ({"estimator": first[0]} if first else {}) | ({"estimators": rest} if rest else {})
+
+
+def with_usual_estimators(guards: Guards, robot: Robot, scenario: Scenario, backend: str) -> Guards:
+    """The guards of a simulated satellite, whose attitude is estimated, and whose rate too where its gyroscope dies."""
+    if not robot.actuators.turns_only or backend == "hardware":
+        return guards
+    if guards.estimator is None:
+        guards = replace(guards, estimator=default_estimator(robot))
+    lost = scenario.sensing.gyroscope_dies_s is not None
+    if (
+        lost
+        and robot.event_cameras
+        and not any(estimator_kind(file).takes.get("events") for file in guards.estimators)
+    ):
+        guards = replace(guards, estimators=(*guards.estimators, EVENT_RATE))
     return guards
 
 

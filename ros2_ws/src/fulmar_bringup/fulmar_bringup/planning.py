@@ -34,6 +34,7 @@ from fulmar_bringup.plan_checks import (
     checked_rate,
     chosen_policy,
     read_remappings,
+    with_usual_estimators,
 )
 from fulmar_bringup.run_plan import NodeSpec, RunPlan
 from fulmar_bringup.system import (
@@ -163,6 +164,7 @@ def plan_run(
     if not lockstep:
         check_beat(hz, rate)
     watched = checked_guards(default_guards(controller, backend, hardware), guards, the_robot, the_task)
+    watched = with_usual_estimators(watched, the_robot, load_scenario(scenario), backend)
     check_external(controller, watched, adapter=adapter, topic=topic, lockstep=lockstep)
     check_node_options(controller, copies=copies, network=controller_network)
     policy = chosen_policy(controller, policy, the_robot, the_task, hz, fallback=watched.fallback)

@@ -29,6 +29,7 @@ class Guards:
     estimator: str | None = (
         None  # file of configs/estimators: odometry comes from poses and inertial readings
     )
+    estimators: tuple[str, ...] = ()  # more files of configs/estimators, of what is no odometry
     estop: bool = False  # an e-stop node runs, and nothing moves without it
     fallback: str | None = None  # classical controller that takes over from a policy that is refused
     trusted_keys: str | None = None  # file or folder of public keys: only bundles that one of them has signed
@@ -150,7 +151,8 @@ def modules_of(
     """Modules of extras that the nodes of a controller, a backend, its guards and a hardware file import."""
     simulated = ("mujoco",) if backend == "mujoco" or emulated else ()
     driven = load_hardware(hardware).needs if hardware else ()
-    estimated = estimator_kind(guards.estimator).needs if guards.estimator else ()
+    files = (*filter(None, (guards.estimator,)), *guards.estimators)
+    estimated = (module for file in files for module in estimator_kind(file).needs)
     return (*controller_entry(controller).needs, *simulated, *driven, *estimated)
 
 

@@ -27,7 +27,7 @@ from fulmar_core.errors import ConfigError, did_you_mean
 from fulmar_core.robot import load_robot
 from fulmar_core.robot_name import namespace_of
 from fulmar_core.tasks import load_task
-from fulmar_core.topics import ANSWER, CLOCK, ODOMETRY, PERIOD, WIRES, command_wire
+from fulmar_core.topics import ANSWER, CLOCK, EVENTS, EVENTS_2, ODOMETRY, PERIOD, RATE, WIRES, command_wire
 from hardware_drivers.settings import load_hardware
 from policy_server.controllers import controller_entry
 
@@ -157,12 +157,21 @@ def _with_listeners(rows: list[NodeSpec], plan: RunPlan) -> list[NodeSpec]:
     }
     if chained:
         awaited["estimator"] = _listeners(rows, ODOMETRY.name) + answers
+        # Every output of these has the same listeners: the recorder, and the one node that takes them.
+        awaited |= {
+            row.name: min(_listeners(rows, topic) for topic in _streams(row)) for row in rows if _streams(row)
+        }
     return [
         replace(row, parameters={**row.parameters, "wait_for_subscribers": awaited[row.name]})
         if row.name in awaited
         else row
         for row in rows
     ]
+
+
+def _streams(row: NodeSpec) -> tuple[str, ...]:
+    """Outputs of a camera or a rate estimator, whose loss would hold up lock step; of any other row none."""
+    return tuple(topic for topic in row.outputs if topic in (EVENTS.name, EVENTS_2.name, RATE.name))
 
 
 def _listeners(rows: Iterable[NodeSpec], topic: str) -> int:

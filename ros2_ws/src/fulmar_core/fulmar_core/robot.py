@@ -24,6 +24,7 @@ from fulmar_core.plausible_ranges import ROBOT
 from fulmar_core.sensors.imu import ImuSpec
 from fulmar_core.sensors.odometer import OdometrySpec
 from fulmar_core.sensors.table import RANGES, SENSORS
+from fulmar_core.sky.event_camera import EventCamera
 from fulmar_core.spatial import SpatialState
 from fulmar_core.state import State
 
@@ -222,6 +223,7 @@ class Robot:
     sensors: Sensors
     limits: Limits
     hydrodynamics: Hydrodynamics | None = None  # of a hull that swims
+    event_cameras: tuple[EventCamera, ...] = ()  # that look at the stars, at most two
     air_bearing: bool = False  # it floats on air that `air_bearing/enable` switches
 
     @property
@@ -276,6 +278,8 @@ class Robot:
             )
         if self.hydrodynamics is not None and isinstance(self.actuators, Rolling):
             raise ValueError("'hydrodynamics' and wheels exclude one another.")
+        if len(self.event_cameras) > 2:
+            raise ValueError("'event_cameras' has more than two; a rate is estimated from one or two.")
         if self.air_bearing and not self.drifts:
             raise ValueError("'air_bearing' is for robots on the floor with thrusters or fans; leave it out.")
         if self.limits.yaw_rate >= self.sensors.imu.gyroscope_range:

@@ -63,9 +63,10 @@ INERTIA_STATUS = Wire(
 )  # fmt: skip
 EVENTS, EVENTS_2 = (
     Wire(
-        topic, "sensor_msgs/msg/PointCloud2", "camera", "stream", "packets, where an event camera runs",
+        topic, "sensor_msgs/msg/PointCloud2", "camera", "stream",
+        "packets, where an event camera runs; 1 to 5 MB/s, not recorded",
         f"events of the {which} camera: `x`, `y` uint16, `t` uint64, `p` uint8 (1: brighter)", unit="px, ns",
-        frame=f"`{frame}`",
+        frame=f"`{frame}`", recorded=False,
     )
     for topic, which, frame in (("events", "first", "event_camera"), ("events_2", "second", "event_camera_2"))
 )  # fmt: skip

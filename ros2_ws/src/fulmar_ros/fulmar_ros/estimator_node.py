@@ -152,7 +152,7 @@ class EstimatorNode(Node):
             if reading is not None:
                 self._take(name, reading)
         estimate = self._estimate(period_ns)
-        if estimate is None or (self._every_ns and not self._is_new(estimate)):
+        if estimate is None or not self._is_new(estimate):
             return []
         self._note(estimate)
         return [(publisher, write(estimate)) for publisher, write in self._outputs]

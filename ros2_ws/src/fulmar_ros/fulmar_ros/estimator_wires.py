@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from geometry_msgs.msg import InertiaStamped, PoseStamped, TwistWithCovarianceStamped
 from nav_msgs.msg import Odometry
-from sensor_msgs.msg import Imu
+from sensor_msgs.msg import Imu, PointCloud2
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension, MultiArrayLayout
 
 from fulmar_bags.message_reader import reading_of, stamp_ns
@@ -20,8 +20,9 @@ from fulmar_core.sensors.imu import UNKNOWN
 from fulmar_core.sensors.kind import SensorKind
 from fulmar_core.sensors.reading import Reading
 from fulmar_core.sensors.table import SENSORS
-from fulmar_core.topics import IMU, INERTIA, INERTIA_COVARIANCE, MOCAP, ODOMETRY, RATE, Wire
+from fulmar_core.topics import EVENTS, EVENTS_2, IMU, INERTIA, INERTIA_COVARIANCE, MOCAP, ODOMETRY, RATE, Wire
 from fulmar_ros.convert import OdometryWriter, stamp_of
+from fulmar_ros.event_packets import events_of_cloud
 from fulmar_ros.message_class import message_class
 
 FRAMES = ("odom", "map", "world")  # names of the room in motion captures; all with Z up
@@ -55,6 +56,27 @@ def _rate(message: TwistWithCovarianceStamped, _frames: Frames) -> Reading | str
     return Reading(
         np.array([turning.x, turning.y, turning.z]), stamp_ns(message.header.stamp), covariance=covariance
     )
+
+
+def _events(message: PointCloud2, _frames: Frames) -> Reading | str:
+    events, problem = events_of_cloud(message)
+    return problem if events is None else Reading(events, stamp_ns(message.header.stamp))
+
+
+def _rate_writer(frames: Frames) -> Write:
+    """Writes a turn rate, shape (3,), with its covariance, shape (3, 3); the velocity is not known."""
+
+    def write(estimate: Estimate) -> TwistWithCovarianceStamped:
+        message = TwistWithCovarianceStamped()
+        message.header.stamp, message.header.frame_id = stamp_of(estimate.stamp_ns), frames.base
+        turning = message.twist.twist.angular
+        turning.x, turning.y, turning.z = (float(part) for part in estimate.value)
+        covariance = np.diag([-1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+        covariance[3:, 3:] = estimate.covariance
+        message.twist.covariance = covariance.ravel()
+        return message
+
+    return write
 
 
 def _odometry_writer(frames: Frames) -> Write:
@@ -112,9 +134,12 @@ READERS: dict[Wire, tuple[type, Read]] = {
     MOCAP: (PoseStamped, _pose),
     IMU: (Imu, _imu),
     RATE: (TwistWithCovarianceStamped, _rate),
+    EVENTS: (PointCloud2, _events),
+    EVENTS_2: (PointCloud2, _events),
 }
 WRITERS: dict[Wire, tuple[type, Callable[[Frames], Write]]] = {
     ODOMETRY: (Odometry, _odometry_writer),
     INERTIA: (InertiaStamped, _inertia_writer),
     INERTIA_COVARIANCE: (Float64MultiArray, _covariance_writer),
+    RATE: (TwistWithCovarianceStamped, _rate_writer),
 }

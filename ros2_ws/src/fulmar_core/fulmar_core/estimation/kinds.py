@@ -13,6 +13,7 @@ from fulmar_core.estimation.estimator import Estimator
 from fulmar_core.estimation.settings import (
     AttitudeSettings,
     EstimatorSettings,
+    EventRateSettings,
     InertiaSettings,
     PlanarMotionSettings,
     SpatialMotionSettings,
@@ -23,6 +24,8 @@ from fulmar_core.robot import Robot
 from fulmar_core.spatial import SpatialState
 from fulmar_core.state import State
 from fulmar_core.topics import (
+    EVENTS,
+    EVENTS_2,
     IMU,
     INERTIA,
     INERTIA_COVARIANCE,
@@ -30,6 +33,7 @@ from fulmar_core.topics import (
     MOCAP,
     ODOMETRY,
     RATE,
+    RATE_STATUS,
     SENSOR_WIRES,
     Wire,
 )
@@ -53,6 +57,7 @@ class EstimatorKind:
     turns_only: bool = False  # of robots that reaction wheels turn, whose place it does not estimate
     every_s: float = 0.0  # time between two estimates that are published, at least [s]
     status: Wire | None = None  # where its `status()` is published
+    node: str = "estimator"  # name of the node that runs it
 
     @property
     def readings(self) -> dict[str, Wire]:
@@ -82,6 +87,12 @@ def _inertia(settings: InertiaSettings, robot: Robot) -> Estimator:
     from fulmar_core.inertia_estimation.estimator import InertiaEstimator
 
     return InertiaEstimator(settings, robot)
+
+
+def _event_rate(settings: EventRateSettings, robot: Robot) -> Estimator:
+    from fulmar_core.rate_estimation.estimator import EventRateEstimator
+
+    return EventRateEstimator(settings, tuple(each.camera for each in robot.event_cameras))
 
 
 KINDS: dict[str, EstimatorKind] = {
@@ -120,6 +131,18 @@ KINDS: dict[str, EstimatorKind] = {
         turns_only=True,
         every_s=1.0,
         status=INERTIA_STATUS,
+        node="inertia_estimator",
+    ),
+    "event_rate": EstimatorKind(
+        EventRateSettings,
+        _event_rate,
+        takes={"events": EVENTS},
+        publishes=(RATE,),
+        takes_if_there={"events_2": EVENTS_2},
+        form=SpatialState,
+        turns_only=True,
+        status=RATE_STATUS,
+        node="rate_estimator",
     ),
 }
 
@@ -175,6 +198,11 @@ def check_estimator(name: str, robot: Robot) -> None:
         raise ConfigError(
             f"estimator '{name}' is of {what}, and '{robot.name}' has {robot.actuators.kind}. "
             f"Use '{default_estimator(robot)}' of configs/estimators, or leave it out."
+        )
+    if kind.takes.get("events") and not robot.event_cameras:
+        raise ConfigError(
+            f"estimator '{name}' takes the events of a camera, and '{robot.name}' has none: add 'event_cameras' to its "
+            "file."
         )
     if robot.state_type is not form:
         raise ConfigError(

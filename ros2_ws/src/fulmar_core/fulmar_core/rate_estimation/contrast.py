@@ -20,8 +20,8 @@ from fulmar_core.sky.star_camera import StarCamera
 
 SCALES_PX = (12.0, 6.0, 4.0, 3.0, 2.5, 2.5, 2.5)  # of the Gaussian, from coarse to fine
 WARM_PX = (3.0, 2.5, 2.5)  # where the rate of the last window is a start
-# Errors of stars have causes in common that their scores do not show, such as rows of pixels: measured over 200 windows,
-# the normalised error squared was 1.5 times what it should be (`fulmar benchmark events`).
+# Errors of stars have causes in common that their scores do not show, such as rows of pixels: without it the normalised
+# error squared is 1.5 times what it should be (`fulmar benchmark events`).
 INFLATION = 1.6
 
 

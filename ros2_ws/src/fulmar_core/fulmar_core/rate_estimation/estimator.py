@@ -65,11 +65,11 @@ class EventRateEstimator:
             return f"packet of '{name}' has no stamp"
         packet: Events = reading.value
         camera = self._cameras[name]
+        if not packet.width:  # a message does not say how large its camera is
+            packet = replace(packet, width=camera.width, height=camera.height)
         if (packet.width, packet.height) != (camera.width, camera.height):
-            return (
-                f"packet of '{name}' comes from a camera of {packet.width} × {packet.height} pixels, and the robot's has "
-                f"{camera.width} × {camera.height}"
-            )
+            its, ours = f"{packet.width} × {packet.height}", f"{camera.width} × {camera.height}"
+            return f"packet of '{name}' comes from a camera of {its} pixels, and the robot's has {ours}"
         if problem := packet.problem():
             return f"packet of '{name}': {problem}"
         last_ns = self._until_ns.get(name)
@@ -126,7 +126,7 @@ class EventRateEstimator:
             self._window_ns = end_ns
 
     def _window(self, end_ns: int) -> None:
-        """Estimate the window that ends at a time; one that shows too little is looked at together with those before."""
+        """Estimate the window that ends at a time; where it shows too little, with those before it as one."""
         s = self._settings
         self.fit = None
         for seconds in dict.fromkeys((s.window_s, s.longest_s)):
@@ -151,7 +151,8 @@ class EventRateEstimator:
             )
         else:
             self.bound = BOUND_PX / (s.longest_s * focal)
-            self.problem = f"no star moves: the body turns across its cameras by less than {np.degrees(self.bound):.4f} °/s"
+            most = f"{np.degrees(self.bound):.4f} °/s"
+            self.problem = f"no star moves: the body turns across its boresights by less than {most}"
 
     def _fresh(self, end_ns: int) -> bool:
         """Whether the last estimate is a start for the window that ends at a time."""
@@ -160,7 +161,9 @@ class EventRateEstimator:
 
     def _is_good(self, fit: RateFit) -> bool:
         """Whether a fit tells about the two axes across a boresight at least."""
-        return bool(np.sqrt(np.linalg.eigvalsh(fit.covariance)[1]) < np.radians(self._settings.limit_deg))
+        if not np.isfinite(fit.covariance).all():
+            return False
+        return bool(np.linalg.eigvalsh(fit.covariance)[1] < np.radians(self._settings.limit_deg) ** 2)
 
     def _tracks(self, begin_ns: int, end_ns: int) -> dict[str, Tracks]:
         """Tracks of stars in each camera that has events in a window."""

@@ -10,6 +10,7 @@ from scipy import ndimage
 from fulmar_core.sky.events import Events
 
 SIDE = 3  # of the neighbourhood in which events are counted [px]
+MOST_IN_PIXEL = 1000  # events of one pixel that count
 LEAST = 4  # events in a neighbourhood, at least
 FALSE_ALARMS = 1e-6  # expected share of neighbourhoods that noise alone fills
 LEAST_EVENTS = 10  # of a track
@@ -47,13 +48,9 @@ def find_tracks(events: Events, begin_ns: int, end_ns: int) -> Tracks:
     # The median pixel sees noise alone: of few events per pixel the share of empty ones tells their rate.
     empty = float(np.mean(counts == 0))
     mean = -np.log(max(empty, 1e-6))
-    around = ndimage.uniform_filter1d(
-        ndimage.uniform_filter1d(counts * SIDE, SIDE, 0, mode="constant") * SIDE, SIDE, 1
-    )
-    dense = around >= _threshold(mean * SIDE * SIDE)
+    dense = _around(np.minimum(counts, MOST_IN_PIXEL).astype(np.uint16)) >= _threshold(mean * SIDE * SIDE)
     label, found = ndimage.label(dense, structure=np.ones((3, 3)))
-    near = ndimage.grey_dilation(label, size=(3, 3)) if found else label
-    of_event = near.ravel()[pixel]
+    of_event = _nearest_label(label)[events.y, events.x] if found else np.zeros(len(pixel), dtype=int)
     kept = np.flatnonzero(of_event)
     star = of_event[kept]
     kept, star = _without_hot_pixels(kept, star, pixel, found)
@@ -66,6 +63,20 @@ def find_tracks(events: Events, begin_ns: int, end_ns: int) -> Tracks:
     seconds = (end_ns - begin_ns) / 1e9
     group = 2 * star + events.p[kept]
     return Tracks(places, times, group, len(numbers), mean / seconds)
+
+
+def _around(counts: np.ndarray) -> np.ndarray:
+    """Sum over each neighbourhood of 3 × 3 pixels; sums of slices are ten times faster than a filter."""
+    padded = np.pad(counts, 1)
+    rows = padded[:-2] + padded[1:-1] + padded[2:]
+    return np.asarray(rows[:, :-2] + rows[:, 1:-1] + rows[:, 2:])
+
+
+def _nearest_label(label: np.ndarray) -> np.ndarray:
+    """Labels that reach one pixel farther."""
+    padded = np.pad(label, 1)
+    rows = np.maximum(np.maximum(padded[:-2], padded[1:-1]), padded[2:])
+    return np.asarray(np.maximum(np.maximum(rows[:, :-2], rows[:, 1:-1]), rows[:, 2:]))
 
 
 def _threshold(mean: float) -> int:

@@ -1,55 +1,26 @@
 """Simulated event camera that looks at the stars.
 
-A pixel reports an event whenever the logarithm of its brightness has moved by a threshold since its last one (Gallego et
-al., "Event-based Vision: A Survey", TPAMI 2022, §2.1). Only pixels near stars change: they are followed in steps of a
-quarter of a pixel of motion, everything else is background noise, drawn at once.
+A pixel reports an event whenever the logarithm of its brightness has moved by a threshold since its last one (Gallego
+et al., "Event-based Vision: A Survey", TPAMI 2022, §2.1). Only pixels near stars change: they are followed in steps of
+a quarter of a pixel of motion, everything else is background noise, drawn at once.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from fulmar_core.sensors.sampling import sensor_rng
 from fulmar_core.sky.catalogue import Stars
+from fulmar_core.sky.event_camera import EventSensorSpec
 from fulmar_core.sky.events import Events, events_of
 from fulmar_core.sky.star_camera import StarCamera
 
 STEP_PX = 0.25  # of motion
 FAINT = 0.05  # share of the background below which the light of a star is left out
 LAG_PX = 2  # beyond that, for pixels that settle after a star has left
-
-
-@dataclass(frozen=True)
-class EventSensorSpec:
-    """What pixels do."""
-
-    threshold: float = 0.25  # mean change of ln brightness that makes an event [-]
-    threshold_std: float = 0.03  # from pixel to pixel, and between brighter and darker [-]
-    refractory_s: float = 1e-4  # after an event a pixel is blind for so long [s]
-    noise_hz: float = 0.1  # of each pixel, without any change [Hz]
-    hot_pixels: int = 0  # that report far more noise
-    hot_hz: float = 100.0  # each of them [Hz]
-    jitter_s: float = 1e-4  # standard deviation of time stamps [s]
-    bandwidth_hz: float = 300.0  # of a pixel's first-order lag; 0: none [Hz]
-    background: float = 0.2  # brightness of the dark sky, in peaks of the faintest star [-]
-
-    def __post_init__(self) -> None:
-        if self.threshold <= 0.0 or self.background <= 0.0:
-            raise ValueError("threshold and background must be greater than 0.")
-        rest = (
-            self.threshold_std,
-            self.refractory_s,
-            self.noise_hz,
-            self.hot_pixels,
-            self.hot_hz,
-            self.jitter_s,
-        )
-        if min(*rest, self.bandwidth_hz) < 0.0:
-            raise ValueError("noise, hot pixels, times and bandwidth must not be negative.")
 
 
 class EventSensor:

@@ -38,7 +38,8 @@ class Events:
         if not len(self):
             return ""
         if int(self.x.max()) >= self.width or int(self.y.max()) >= self.height:
-            return f"an event at ({int(self.x.max())}, {int(self.y.max())}) lies outside of {self.width} × {self.height}"
+            x, y = int(self.x.max()), int(self.y.max())
+            return f"events up to ({x}, {y}) are of a camera of another size than {self.width} × {self.height} pixels"
         if (np.diff(self.t.astype(np.int64)) < 0).any():
             return "events are not in the order of time"
         return ""

@@ -14,8 +14,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
+from fulmar_core.rotation import rotate
 from fulmar_core.sky.catalogue import Stars
 
 Quaternion = tuple[float, float, float, float]
@@ -48,11 +48,11 @@ class StarCamera:
     @property
     def to_body(self) -> np.ndarray:
         """Rotation matrix from the camera's axes to the body's, shape (3, 3)."""
-        return np.asarray(Rotation.from_quat(self.mounting).as_matrix())
+        return np.asarray(rotate(np.array(self.mounting), np.eye(3)).T)
 
     def axes_in_world(self, quat_xyzw: np.ndarray) -> np.ndarray:
         """Rotation matrix from the camera's axes to the world's, of a body's attitude, shape (3, 3)."""
-        return np.asarray(Rotation.from_quat(quat_xyzw).as_matrix() @ self.to_body)
+        return np.asarray(rotate(np.asarray(quat_xyzw, dtype=float), np.eye(3)).T @ self.to_body)
 
     def near(self, stars: Stars, axes: np.ndarray, *, spare_deg: float = 0.0) -> Stars:
         """Stars in or around the field of view, of at most the faintest magnitude.
