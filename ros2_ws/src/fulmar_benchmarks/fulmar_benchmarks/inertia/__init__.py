@@ -1,0 +1,1 @@
+"""Inertia of satellites from their wheels and gyroscopes, beside thesis §6.3."""
