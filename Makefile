@@ -35,6 +35,8 @@ key = $(firstword $(shell cat $(1) pyproject.toml | cksum))
 RUN_STAMP := $(VENV)/.run-$(call key,$(RUN_LOCK))
 DEV_STAMP := $(VENV)/.dev-$(call key,$(DEV_LOCK))
 TF_STAMP := $(VENV)/.tf-$(firstword $(shell cksum < $(MESSAGES_LOCK)))
+STARS_LOCK := ros2_ws/src/fulmar_bringup/fulmar_bringup/stars/requirements.lock
+STARS_STAMP := $(VENV)/.stars-$(firstword $(shell cksum < $(STARS_LOCK)))
 # Elsewhere ROS does not come as wheels, and its own tf2_msgs comes with it.
 HAS_ROS_WHEELS := $(filter Linux-x86_64,$(shell uname -s)-$(shell uname -m))
 # Nothing of ours is installed beside the peers, so their lock alone counts.
@@ -78,7 +80,7 @@ setup: $(RUN_STAMP) ## Install what a robot or a simulation needs (no torch; 0.9
 tf: $(RUN_STAMP) $(TF_STAMP) ## Build the message package of /tf, for RViz and Foxglove (needs a C++ compiler)
 
 .PHONY: dev
-dev: $(DEV_STAMP) $(if $(HAS_ROS_WHEELS),$(TF_STAMP)) ## Install everything, also for training and tests (6.9 GiB)
+dev: $(DEV_STAMP) $(if $(HAS_ROS_WHEELS),$(TF_STAMP)) $(STARS_STAMP) ## Install everything, also for training and tests (6.9 GiB)
 
 .PHONY: peers
 peers: $(PEERS_STAMP) ## Install the outside programs that tests compare with, into .venv-peers (8.3 GiB)
@@ -109,6 +111,11 @@ $(DEV_STAMP): | $(VENV)/bin/python
 $(TF_STAMP): | $(RUN_STAMP)
 	@$(BIN)/fulmar install-tf
 	@rm -f $(VENV)/.tf-*
+	@touch $@
+
+$(STARS_STAMP): | $(RUN_STAMP)
+	@$(BIN)/fulmar install-stars
+	@rm -f $(VENV)/.stars-*
 	@touch $@
 
 $(PEERS_STAMP): | $(PEERS)/bin/python

@@ -41,6 +41,7 @@ GIVEN = {
     "identify": (f"{POLICY}", ("bags",)),
     "demo": ("", ("ros", "sim", "policy", "bags", "view")),
     "install-tf": ("", ()),
+    "install-stars": ("", ()),
     "benchmark drift": ("", ("policy", "sim")),
     "benchmark endurance": ("", ("bags",)),
     "benchmark latency": ("", ("ros",)),

@@ -16,7 +16,7 @@ setup(
     maintainer=ABOUT.findtext("maintainer"),
     maintainer_email=ABOUT.find("maintainer").get("email"),
     packages=find_packages(include=[NAME, f"{NAME}.*"]),
-    package_data={NAME: ["tf2_msgs/*", "tf2_msgs/msg/*"]},
+    package_data={NAME: ["tf2_msgs/*", "tf2_msgs/msg/*", "stars/*"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),

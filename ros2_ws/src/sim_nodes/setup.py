@@ -22,6 +22,7 @@ setup(
     entry_points={
         "console_scripts": [
             "emulator_node = sim_nodes.emulator_node:main",
+            "event_camera_node = sim_nodes.event_camera_node:main",
             "sim_node = sim_nodes.sim_node:main",
         ]
     },

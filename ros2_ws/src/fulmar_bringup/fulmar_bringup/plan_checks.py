@@ -18,6 +18,7 @@ from fulmar_bringup.system import (
     default_hardware,
 )
 from fulmar_core.bundle_signature import verify_bundle
+from fulmar_core.controller_settings import POLICY
 from fulmar_core.controllers.classical import has_law
 from fulmar_core.disturbances.scenario import Scenario
 from fulmar_core.errors import BundleError, ConfigError, UnknownNameError
@@ -236,6 +237,12 @@ def _split_estimators(asked: Mapping[str, Any]) -> dict[str, Any]:
         )
     found = {key: value for key, value in asked.items() if key != "estimator"}
     return found | ({"estimator": first[0]} if first else {}) | ({"estimators": rest} if rest else {})
+
+
+def usual_controller(controller: str, policy: Path | None, robot: Robot, task: Task) -> str:
+    """The controller that was asked for, or the classical one in the place of a policy that no satellite has."""
+    wanted = controller == POLICY and policy is None and robot.actuators.turns_only
+    return "classical" if wanted and shipped_policy(robot.name, task.name) is None else controller
 
 
 def with_usual_estimators(guards: Guards, robot: Robot, scenario: Scenario, backend: str) -> Guards:

@@ -34,6 +34,7 @@ from fulmar_bringup.plan_checks import (
     checked_rate,
     chosen_policy,
     read_remappings,
+    usual_controller,
     with_usual_estimators,
 )
 from fulmar_bringup.run_plan import NodeSpec, RunPlan
@@ -152,6 +153,7 @@ def plan_run(
         raise ConfigError(
             "--lockstep gives the same bytes each time; it takes no --markers, drawn by the clock."
         )
+    controller = usual_controller(controller, policy, load_robot(robot), load_task(task))
     check_names(robot, task, controller, backend, hardware)
     own_name = "" if name is None else checked_name(name)
     hardware = checked_hardware(robot, backend, hardware, emulate=emulate, hurried=lockstep or rate != 1.0)

@@ -28,6 +28,7 @@ from fulmar_cli.commands.faults import faults
 from fulmar_cli.commands.goals import goals
 from fulmar_cli.commands.identify import identify
 from fulmar_cli.commands.import_policy import import_policy
+from fulmar_cli.commands.install_stars import install_stars
 from fulmar_cli.commands.install_tf import install_tf
 from fulmar_cli.commands.layout import layout
 from fulmar_cli.commands.list import list_names
@@ -105,6 +106,7 @@ app.command()(identify)
 app.command()(demo)
 app.command()(doctor)
 app.command()(install_tf)
+app.command()(install_stars)
 
 
 def main() -> None:

@@ -24,7 +24,7 @@ class Events:
 
     def between(self, begin_ns: int, end_ns: int) -> Events:
         """Those from a time on and before another one [ns]."""
-        first, last = np.searchsorted(self.t, np.array([begin_ns, end_ns], dtype=np.uint64))
+        first, last = np.searchsorted(self.t, np.array([max(begin_ns, 0), max(end_ns, 0)], dtype=np.uint64))
         return self[first:last]
 
     def __getitem__(self, index: slice | np.ndarray) -> Events:
