@@ -20,6 +20,11 @@ THESIS = {
     "dual": {"rms_p": 0.0115, "rms_q": 0.0192, "rms_r": 0.0160, "rss": 0.0275},
 }
 FIELDS_DEG = (8.0, 10.0, 15.0, 20.0, 30.0, 40.0)
+FIELD_RATE_DEG = (
+    1.0  # in a field of view of 8.5° [deg/s]: of one size, so that no window outweighs the others
+)
+FIELD_WINDOWS = 3  # windows of each field of view, for each of the table
+STARS_PER_MAGNITUDE = 0.51  # growth of the logarithm of their number with the limiting magnitude
 BAND = 0.95  # of the normalised error squared, three degrees of freedom, from 0 on
 PARTS = ("table", "fields", "sensitivity", "slow_and_fast", "pointing")
 SPANS = ((0.005, 0.02), (0.02, 0.1), (0.1, 2.0), (2.0, 10.0), (10.0, 20.0))  # of rates [deg/s]
@@ -52,7 +57,7 @@ def run_events(request: Request, progress: Progress) -> dict[str, Any]:
         groups["table", ""] = usual, runs
     if "fields" in request.parts:
         for fov in FIELDS_DEG:
-            groups["fields", fov] = replace(usual, camera=replace(usual.camera, fov_deg=fov)), runs
+            groups["fields", fov] = _at_field(usual, fov), FIELD_WINDOWS * runs
     if "sensitivity" in request.parts:
         for name, value, changed in _variants(usual):
             groups["sensitivity", f"{name} {value:g}"] = changed, few
@@ -80,6 +85,17 @@ def run_events(request: Request, progress: Progress) -> dict[str, Any]:
     if pointing:
         document["pointing"] = _pointing([next(found) for _ in pointing], pointing)
     return document
+
+
+def _at_field(usual: Conditions, fov_deg: float) -> Conditions:
+    """One camera of another field of view that sees as many stars, at a rate at which they move over as many pixels."""
+    camera = replace(usual.camera, fov_deg=fov_deg)
+    faster = usual.camera.focal_px / camera.focal_px
+    faintest = usual.camera.faintest - 2.0 * math.log10(faster) / STARS_PER_MAGNITUDE
+    rate = FIELD_RATE_DEG * faster
+    return replace(
+        usual, camera=replace(camera, faintest=faintest), slowest_deg=rate, fastest_deg=rate, cameras=1
+    )
 
 
 def _variants(usual: Conditions) -> list[tuple[str, float, Conditions]]:

@@ -74,7 +74,8 @@ class EventSensor:
         steps = max(1, math.ceil(fastest * seconds / STEP_PX))
         dt = seconds / steps
         places = self._places(near, quat_xyzw, rate, dt, steps)
-        flux, reach = camera.flux(near.magnitudes), self._reach(camera.flux(near.magnitudes))
+        flux = camera.flux(near.magnitudes)
+        reach = self._reaches(flux)
         if not self._begun:
             self._settle(places[0], flux, reach)
         found: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []  # pixel, time [s], polarity
@@ -92,15 +93,24 @@ class EventSensor:
         middle = np.array([0.5 * (camera.width - 1), 0.5 * (camera.height - 1)])
         return np.asarray(np.stack((x / z, y / z), axis=-1) * camera.focal_px + middle)
 
-    def _reach(self, flux: np.ndarray) -> int:
-        """Half of the side of the patch around a star, that of the brightest one [px]."""
-        brightest = float(flux.max(initial=1.0))
-        ratio = max(brightest / (FAINT * self._spec.background), 2.0)
-        return math.ceil(self.camera.psf_px * math.sqrt(2.0 * math.log(ratio))) + LAG_PX
+    def _reaches(self, flux: np.ndarray) -> np.ndarray:
+        """Half of the side of the patch around each star, which bright ones need larger, shape (n,) [px]."""
+        ratio = np.maximum(flux / (FAINT * self._spec.background), 2.0)
+        return np.ceil(self.camera.psf_px * np.sqrt(2.0 * np.log(ratio))).astype(int) + LAG_PX
 
-    def _seen(self, places: np.ndarray, flux: np.ndarray, reach: int) -> tuple[np.ndarray, np.ndarray]:
+    def _seen(self, places: np.ndarray, flux: np.ndarray, reach: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Pixels near stars, each once, and the logarithm of their brightness."""
-        camera, spec = self.camera, self._spec
+        pixels = [
+            self._lit(places[reach == each], flux[reach == each], int(each)) for each in np.unique(reach)
+        ]
+        pixel = np.unique(np.concatenate(pixels)) if pixels else np.zeros(0, dtype=int)
+        level = np.log(self._light[pixel])
+        self._light[pixel] = self._spec.background
+        return pixel, level
+
+    def _lit(self, places: np.ndarray, flux: np.ndarray, reach: int) -> np.ndarray:
+        """Add the light of stars with patches of one size to the image; returns the pixels."""
+        camera = self.camera
         inside = camera.is_inside(places, reach)
         places, flux = places[inside], flux[inside]
         offsets = np.arange(-reach, reach + 1)
@@ -116,12 +126,9 @@ class EventSensor:
         )[:, None]
         pixel, light = pixel[there], light[there]
         np.add.at(self._light, pixel, light)
-        pixel = np.unique(pixel)
-        level = np.log(self._light[pixel])
-        self._light[pixel] = spec.background
-        return pixel, level
+        return np.asarray(pixel)
 
-    def _settle(self, places: np.ndarray, flux: np.ndarray, reach: int) -> None:
+    def _settle(self, places: np.ndarray, flux: np.ndarray, reach: np.ndarray) -> None:
         """Let pixels have seen the first image for long; their last events are anywhere below their thresholds."""
         pixel, level = self._seen(places, flux, reach)
         self._level[pixel] = level
@@ -133,7 +140,7 @@ class EventSensor:
         self,
         places: np.ndarray,
         flux: np.ndarray,
-        reach: int,
+        reach: np.ndarray,
         begin_s: float,
         dt: float,
         found: list[tuple[np.ndarray, np.ndarray, np.ndarray]],
