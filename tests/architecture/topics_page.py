@@ -20,6 +20,7 @@ Every topic is recorded in the bag of a run, except {UNRECORDED}.
 |---|---|
 | 0 (closed) to 1 (open) | valves |
 | -1 to 1, share of full command | propellers |
+| N·m | reaction wheels: torque of the motor on its wheel; unloading: torque on the body |
 | m/s, then rad/s | differential drive: speed, turn rate |
 | m/s, then rad | Ackermann steering: speed, steering angle |
 
@@ -45,6 +46,7 @@ DIRECTIONS = {
     "operator": "From the operator to plant and controller",
     "every node": "From every node to the operator",
     "display": "From the node that draws to viewers",
+    "camera": "From cameras to estimators",
 }
 
 HEAD = "| Topic | Type | QoS | Rate | Unit | Frame | Content |\n|---|---|---|---|---|---|---|"

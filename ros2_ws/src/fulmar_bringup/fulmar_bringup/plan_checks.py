@@ -227,7 +227,7 @@ def checked_guards(usual: Guards, asked: Mapping[str, Any], robot: Robot, task: 
 
 
 def _split_estimators(asked: Mapping[str, Any]) -> dict[str, Any]:
-    """The same with several files of estimators, separated by commas, told apart: the one of odometry, and the rest."""
+    """The same with several files of estimators, separated by commas, split: the one of odometry, and the rest."""
     files = [file.strip() for file in str(asked.get("estimator") or "").split(",") if file.strip()]
     rest = tuple(file for file in files if ODOMETRY not in estimator_kind(file).publishes)
     first = [file for file in files if file not in rest]

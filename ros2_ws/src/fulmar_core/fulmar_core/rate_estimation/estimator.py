@@ -160,7 +160,7 @@ class EventRateEstimator:
         return end_ns - self._estimate.stamp_ns < 2.1e9 * self._settings.window_s
 
     def _is_good(self, fit: RateFit) -> bool:
-        """Whether a fit tells about the two axes across a boresight at least."""
+        """Whether a fit determines the two axes across a boresight at least."""
         if not np.isfinite(fit.covariance).all():
             return False
         return bool(np.linalg.eigvalsh(fit.covariance)[1] < np.radians(self._settings.limit_deg) ** 2)

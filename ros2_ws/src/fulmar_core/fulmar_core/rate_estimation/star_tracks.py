@@ -45,7 +45,7 @@ def find_tracks(events: Events, begin_ns: int, end_ns: int) -> Tracks:
     width, height = events.width, events.height
     pixel = events.y.astype(np.int64) * width + events.x
     counts = np.bincount(pixel, minlength=width * height).reshape(height, width)
-    # The median pixel sees noise alone: of few events per pixel the share of empty ones tells their rate.
+    # Most pixels see noise alone: their rate follows from the share of pixels without an event.
     empty = float(np.mean(counts == 0))
     mean = -np.log(max(empty, 1e-6))
     dense = _around(np.minimum(counts, MOST_IN_PIXEL).astype(np.uint16)) >= _threshold(mean * SIDE * SIDE)

@@ -46,7 +46,7 @@ def load_stars() -> Stars:
     path = catalogue_path()
     if path is None:
         raise ConfigError("the star catalogue is not installed. Run: fulmar install-stars")
-    with np.load(path) as file:
+    with np.load(path, allow_pickle=False) as file:
         table = np.asarray(
             file["star_table"], dtype=float
         )  # right ascension, declination, x, y, z, magnitude
