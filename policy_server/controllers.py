@@ -12,8 +12,7 @@ from pathlib import Path
 
 from fulmar_core.controllers.classical import LAWS, check_pair, families_of, load_classical
 from fulmar_core.controllers.controller import Controller
-from fulmar_core.controllers.excite import TASKS as EXCITE_TASKS
-from fulmar_core.controllers.excite import Excite, excite_of
+from fulmar_core.controllers.excite import Excite, excite_of, excite_tasks
 from fulmar_core.errors import BundleError, ConfigError, UnknownNameError
 from fulmar_core.own_class import is_own, load_class
 from fulmar_core.policy_bundle import PASSPORT
@@ -80,7 +79,7 @@ def _load_excite(robot: Robot, task: Task, choice: Choice) -> Controller:
 
 
 def _check_excite(robot: Robot, task: Task) -> None:
-    tasks = EXCITE_TASKS[robot.state_type]
+    tasks = excite_tasks(robot)
     if task.kind not in tasks:
         raise ConfigError(
             f"controller 'excite' stays around one place, '{task.name}' has none. "

@@ -45,13 +45,18 @@ def identify(
     fulmar identify runs/bare --known mass=5.32+-0.02 --out calibration.yaml
 
     fulmar identify runs/bare runs/heavy --ballast runs/heavy=2.000+-0.005
+
+    Of a satellite the inertia is estimated from gyroscope and wheels, by three methods; there is no calibration of it.
     """
+    from fulmar_cli.commands.identify_satellite import print_satellite
     from fulmar_core.calibration import save_calibration
     from fulmar_core.identification.identify import SIGMAS, Weight, calibration_of
     from fulmar_core.identification.identify import identify as estimate
     from fulmar_core.identification.model import Known
     from fulmar_evaluation.driven_run import driven_run
 
+    if print_satellite(bags, as_json=as_json):
+        return
     known_values = []
     for text in known or []:
         name, value, error = _read(text, "--known", "mass=5.32+-0.02")

@@ -143,6 +143,11 @@ class InertiaEstimator:
             whole[i, i] = (self._settings.spread * float(np.mean(numbers[:3]))) ** 2
         return Estimate(tensor_of(numbers), whole, self._last_ns)
 
+    @property
+    def is_diagonal(self) -> bool:
+        """Whether products of inertia are not estimated."""
+        return self._settings.tensor == "diagonal"
+
     def shares(self) -> np.ndarray:
         """Standard deviation of each moment, as a share of it, shape (3,); infinite before there is one."""
         numbers, covariance = self._believed()

@@ -1,0 +1,38 @@
+"""The part of `fulmar identify` that is for satellites: their inertia, by three estimators."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from fulmar_bringup.console import print_result, write_line
+
+
+def print_satellite(bags: list[Path], *, as_json: bool) -> bool:
+    """Identify the inertia where the bags are of one satellite, and print it; False for any other robot."""
+    from fulmar_core.robot import load_robot
+    from fulmar_evaluation.satellite_identification import identify_satellite, robot_of_bag
+
+    names = {robot_of_bag(bag) for bag in bags}
+    if len(names) != 1 or not (name := names.pop()):
+        return False
+    robot = load_robot(name)
+    if not robot.actuators.turns_only:
+        return False
+    print_result(identify_satellite(robot, bags), _print, as_json=as_json)
+    return True
+
+
+def _print(document: dict[str, Any]) -> None:
+    write_line(f"{document['robot']}, {document['driven_s']:g} s; inertia about the centre of mass [kg·m²]")
+    for method, found in document["estimates"].items():
+        if "problem" in found:
+            write_line(f"  {method:6} {found['problem']}")
+            continue
+        entries = (
+            f"{name} {e['value']:.5g} ({e['low']:.5g} to {e['high']:.5g})" for name, e in found.items()
+        )
+        write_line(f"  {method:6} " + ", ".join(entries))
+    write_line(
+        "  file   " + ", ".join(f"{name} {value:g}" for name, value in list(document["file"].items())[:3])
+    )
