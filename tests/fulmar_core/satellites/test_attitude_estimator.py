@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -142,17 +143,41 @@ def test_a_reading_that_cannot_be_is_refused_in_words_and_changes_nothing(name, 
 
 def test_attitudes_from_elsewhere_are_outliers_until_they_agree():
     estimator = make_estimator("attitude", CUBESAT)
-    now = fed(estimator, 10.0)
-    elsewhere = (Rotation.from_quat(truth(10.0)) * Rotation.from_rotvec([0.3, 0.0, 0.0])).as_quat()
-    problems = [
-        estimator.take(
-            "star_tracker", Reading(elsewhere, now + k * SECOND, covariance=TRACKER_STD**2 * np.eye(3))
-        )
-        for k in range(1, 11)
-    ]
+    fed(estimator, 10.0)
+    jump, problems = Rotation.from_rotvec([0.3, 0.0, 0.0]), []
+    for second in range(10, 20):
+        elsewhere = (Rotation.from_quat(truth(second)) * jump).as_quat()
+        fed(estimator, 1.0, tracker=False, begin_s=second)
+        reading = Reading(elsewhere, SECOND + second * SECOND, covariance=TRACKER_STD**2 * np.eye(3))
+        problems.append(estimator.take("star_tracker", reading))
     assert all("beyond the gate" in problem for problem in problems[:9])
     assert problems[9] is None
     assert (estimator.outliers, estimator.epoch) == (10, 1)
+
+
+@pytest.mark.parametrize("order", itertools.permutations(("star_tracker", "imu", "wheels")))
+@pytest.mark.parametrize("every", [1, 4])
+def test_wheels_may_turn_the_body_fast_whatever_the_order_of_readings(order, every):
+    """Each tenth of a second, the wheels' each `every` of them."""
+    estimator, moment = make_estimator("attitude", CUBESAT), CUBESAT.body.inertia_matrix[2, 2]
+    spun = 0.06  # of the body about z [rad/s²]
+    for k in range(61):
+        t = 0.1 * k
+        stamp = SECOND + round(1e9 * t)
+        quat = Rotation.from_rotvec([0.0, 0.0, 0.5 * spun * t * t]).as_quat()
+        speed = -moment * spun * t / CUBESAT.actuators.spin_inertia
+        readings = {
+            "imu": Reading(imu([0.0, 0.0, spun * t]), stamp),
+            "wheels": Reading(WheelSpeeds(NAMES, np.array([0.0, 0.0, speed])), stamp),
+            "star_tracker": Reading(quat, stamp, covariance=TRACKER_STD**2 * np.eye(3)),
+        }
+        for name in order:
+            if k % {"imu": 1, "wheels": every, "star_tracker": 10}[name] == 0:
+                assert estimator.take(name, readings[name]) is None
+    state = estimator.estimate().value
+    assert estimator.outliers == 0
+    assert (Rotation.from_quat(state.quat_xyzw) * Rotation.from_quat(quat).inv()).magnitude() < 2e-4
+    np.testing.assert_allclose(state.angular_velocity_in_body, [0.0, 0.0, spun * t], atol=2e-4)
 
 
 def test_a_jump_of_time_begins_a_new_epoch():

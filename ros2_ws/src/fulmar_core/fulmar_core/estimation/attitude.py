@@ -13,6 +13,8 @@ moves it, and a gyroscope measures it, as long as it lives. So the filter goes o
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -34,6 +36,7 @@ TO_BEGIN_ANEW = 10  # attitudes in a row that are no match: then it is the estim
 GATE = 16.3  # 1 good reading of 1,000 lies beyond it: chi-squared, 3 degrees of freedom
 RATE_STD = 0.05  # of the turn rate when the filter begins [rad/s]
 BIAS_STD = 1e-4  # of the gyroscope's bias when the filter begins [rad/s]
+SPIN_GAP_NS = 500_000_000  # between readings of the wheels: after a longer one their torque is not known [ns]
 NO_ATTITUDE = "no attitude yet. Does the star tracker see stars?"
 
 
@@ -61,9 +64,12 @@ class AttitudeEstimator:
         self._stamp_ns = 0
         self._newest_ns: dict[str, int] = {}
         self._momentum: np.ndarray | None = None  # of the wheels, in the body [N·m·s]
+        self._held: list[
+            tuple[int, Callable[[int], str]]
+        ] = []  # readings until the wheels' of that time come
         self._past: deque[tuple[int, np.ndarray]] = deque()  # stamps [ns] and attitudes, oldest first
         self._strangers = 0
-        self._gyroscope_ns = self._rate_ns = self._attitude_ns = 0
+        self._gyroscope_ns = self._rate_ns = self._attitude_ns = self._spin_ns = 0
 
     def take(self, name: str, reading: Reading) -> str | None:
         """See `Estimator.take`."""
@@ -139,6 +145,9 @@ class AttitudeEstimator:
         if not self._begun:
             self._begin(quat, noise, stamp_ns)
             return ""
+        return self._with_wheels(stamp_ns, partial(self._use_attitude, quat, noise))
+
+    def _use_attitude(self, quat: np.ndarray, noise: np.ndarray, stamp_ns: int) -> str:
         self._move_to(stamp_ns)
         residual = np.array(rotation_error(tuple(self._quat_at(stamp_ns)), tuple(quat)))
         if not self._correct(residual, TURN, noise, gated=True):
@@ -169,6 +178,9 @@ class AttitudeEstimator:
             return f"the gyroscope reads {largest:.2f} rad/s, beyond what is possible"
         if not self._begun:
             return ""
+        return self._with_wheels(stamp_ns, partial(self._use_gyroscope, rate))
+
+    def _use_gyroscope(self, rate: np.ndarray, stamp_ns: int) -> str:
         self._move_to(stamp_ns)
         noise = self._settings.gyroscope_std**2 * np.eye(3)
         self._correct(rate - self._turning - self._bias, (RATE, BIAS), noise, gated=False)
@@ -181,13 +193,27 @@ class AttitudeEstimator:
             return "the rate is not finite, or has no covariance"
         if not self._begun:
             return ""
+        return self._with_wheels(stamp_ns, partial(self._use_rate, rate, np.asarray(reading.covariance)))
+
+    def _use_rate(self, rate: np.ndarray, covariance: np.ndarray, stamp_ns: int) -> str:
         self._move_to(stamp_ns)
         late_s = max(0.0, (self._stamp_ns - stamp_ns) / 1e9)
-        noise = np.asarray(reading.covariance) + self._settings.rate_spread**2 * late_s * np.eye(3)
+        noise = covariance + self._settings.rate_spread**2 * late_s * np.eye(3)
         if not self._correct(rate - self._turning, RATE, noise, gated=True):
             return f"the rate lies beyond the gate: {self.outliers} outliers so far"
         self._rate_ns = stamp_ns
         return ""
+
+    def _with_wheels(self, stamp_ns: int, use: Callable[[int], str]) -> str:
+        """Use a reading now, or once the wheels' of its time came: torque that is not known yet would look like noise."""
+        self._held.append((stamp_ns, use))
+        self._held.sort(key=lambda one: one[0])
+        silent = self._held[-1][0] > self._spin_ns + SPIN_GAP_NS
+        problems = []
+        while self._held and (silent or self._held[0][0] <= self._spin_ns):
+            held_ns, use = self._held.pop(0)
+            problems.append(use(held_ns))
+        return "; ".join(filter(None, problems))
 
     def _spin(self, reading: Reading, stamp_ns: int) -> str:
         speeds = dict(zip(reading.value.names, np.asarray(reading.value.speeds, dtype=float), strict=False))
@@ -198,17 +224,38 @@ class AttitudeEstimator:
         )
         if not np.isfinite(momentum).all():
             return "a wheel reports a speed that is not finite"
-        before, self._momentum = self._momentum, momentum
-        if self._begun and before is not None:
-            self._move_to(stamp_ns)
-            # What the wheels took, the body lost, as far as its inertia is known; their noise comes with it.
-            lost = self._lightness @ (momentum - before)
-            self._turning = self._turning - lost
-            spread = self._settings.wheel_std * self._wheels.spin_inertia
-            noise = 2.0 * spread**2 * self._lightness @ self._lightness.T
-            self._P = self._P.copy()
-            self._P[RATE, RATE] += noise + self._settings.inertia_share**2 * np.outer(lost, lost)
-        return ""
+        before, before_ns = self._momentum, self._spin_ns
+        self._momentum, self._spin_ns = momentum, stamp_ns
+        if not self._begun or before is None:
+            return ""
+        meanwhile = [one for one in self._held if one[0] <= stamp_ns]
+        self._held = self._held[len(meanwhile) :]
+        change, done_ns, problems = momentum - before, before_ns, []
+        for until_ns, use in (*meanwhile, (stamp_ns, None)):
+            if until_ns > done_ns:
+                self._move_to(until_ns)
+                share = (until_ns - done_ns) / (stamp_ns - before_ns)
+                self._lose(self._lightness @ (share * change), (until_ns - done_ns) / 1e9)
+                done_ns = until_ns
+            problems.append(use(until_ns) if use else "")
+        return "; ".join(filter(None, problems))
+
+    def _lose(self, lost: np.ndarray, passed_s: float) -> None:
+        """Take from the turn rate what the wheels took since their last reading, evenly over that time [rad/s, s].
+
+        As far as the inertia is known; the noise of their speeds comes with it.
+        """
+        half_s = 0.5 * min(passed_s, SPIN_GAP_NS / 1e9)
+        self._turning = self._turning - lost
+        self._quat = np.asarray(normalised(product(tuple(self._quat), exponential(tuple(-half_s * lost)))))
+        spread = self._settings.wheel_std * self._wheels.spin_inertia
+        noise = 2.0 * spread**2 * self._lightness @ self._lightness.T
+        noise = noise + self._settings.inertia_share**2 * np.outer(lost, lost)
+        self._P = self._P.copy()
+        self._P[RATE, RATE] += noise
+        self._P[TURN, RATE] += half_s * noise
+        self._P[RATE, TURN] += half_s * noise
+        self._P[TURN, TURN] += half_s**2 * noise
 
     def _move_to(self, stamp_ns: int) -> None:
         """Predict to a time; one before the newest moves nothing [ns]."""
@@ -226,7 +273,7 @@ class AttitudeEstimator:
         F[TURN, TURN] = rotate(np.asarray(turned), np.eye(3))  # of the inverse rotation: rows are turned axes
         F[TURN, RATE] = t * np.eye(3)
         Q, one, s = np.zeros((ERRORS, ERRORS)), np.eye(3), self._settings
-        spin = (s.rate_spread if self._momentum is not None else s.rate_spread_blind) ** 2
+        spin = (s.rate_spread if stamp_ns <= self._spin_ns + SPIN_GAP_NS else s.rate_spread_blind) ** 2
         Q[TURN, TURN], Q[RATE, RATE] = spin * t**3 / 3.0 * one, spin * t * one
         Q[TURN, RATE] = Q[RATE, TURN] = spin * t * t / 2.0 * one
         Q[BIAS, BIAS] = s.gyroscope_drift**2 * t * one
