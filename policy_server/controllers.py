@@ -14,6 +14,7 @@ from fulmar_core.controllers.classical import LAWS, check_pair, families_of, loa
 from fulmar_core.controllers.controller import Controller
 from fulmar_core.controllers.excite import Excite, excite_of, excite_tasks
 from fulmar_core.errors import BundleError, ConfigError, UnknownNameError
+from fulmar_core.goal_files import load_torques
 from fulmar_core.own_class import is_own, load_class
 from fulmar_core.policy_bundle import PASSPORT
 from fulmar_core.robot import Robot
@@ -30,6 +31,7 @@ class Choice:
     control_hz: float  # command rate [Hz]
     policy: str = ""  # folder of a bundle; empty: the shipped one
     trusted_keys: str = ""  # file or folder of public keys, one of which must have signed the bundle
+    excitation: str = ""  # goal file of torques, for `excite` on satellites; empty: our own profile
 
 
 @dataclass(frozen=True)
@@ -75,7 +77,8 @@ def _law(title: str, law: str | None) -> ControllerEntry:
 
 
 def _load_excite(robot: Robot, task: Task, choice: Choice) -> Controller:
-    return excite_of(robot, task, control_hz=choice.control_hz)
+    torques = load_torques(choice.excitation) if choice.excitation else None
+    return excite_of(robot, task, control_hz=choice.control_hz, torques=torques)
 
 
 def _check_excite(robot: Robot, task: Task) -> None:

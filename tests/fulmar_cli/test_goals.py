@@ -10,7 +10,7 @@ import pytest
 from fulmar_bringup.operator_rows import goals_spec
 from fulmar_cli.commands.goals import goals
 from fulmar_core.errors import ConfigError, UnknownNameError
-from fulmar_core.goal_files import Poses, Positions, load_goals, single_goal
+from fulmar_core.goal_files import Poses, Positions, load_goal_file, single_goal
 from fulmar_core.paths import config_names
 from fulmar_ros.goal_node import GoalSettings
 
@@ -23,7 +23,7 @@ def test_without_a_name_every_file_is_listed_with_its_title(capsys):
     call()
     reported = capsys.readouterr().out
     for name in config_names("goals"):
-        assert name in reported and load_goals(name).title in reported
+        assert name in reported and load_goal_file(name).title in reported
 
 
 def test_goals_are_somebody_s():

@@ -42,7 +42,7 @@ def drive(sequence, robot_moves_sideways: bool, *, seconds: float, start=(1.2, 0
     return np.array(places), goal
 
 
-@pytest.mark.parametrize("name", config_names("goals"))
+@pytest.mark.parametrize("name", [n for n in config_names("goals") if not n.startswith("excite_")])
 @pytest.mark.parametrize(
     "robot", ["floating_platform", "kingfisher", "turtlebot2", "leatherback", "spacecraft_16"]
 )

@@ -184,6 +184,7 @@ def _settings(
             lockstep=bool(info.get("lockstep")),
             rate=rate,
             goals_streamed=bool(info.get("goals")),
+            excitation=str(info.get("excitation") or ""),
             fallback=str(guards.get("fallback") or ""),
             estop=bool(guards.get("estop")),
             max_run_time_s=max_run_time_s,

@@ -41,7 +41,7 @@ def attachments(plan: RunPlan) -> str:
         "robot.yaml": config_path("robots", plan.robot),
         **_of_task(plan.task),
         "scenario.yaml": scenario_path(plan.scenario),
-        **({"goals.yaml": Path(plan.goals)} if plan.goals else {}),
+        **_of_goals(plan.goals or plan.excitation),
         **({"hardware.yaml": Path(plan.hardware)} if plan.hardware else {}),
         **({"estimator.yaml": estimator_path(estimator)} if estimator else {}),
         **({CALIBRATION: calibration} if calibration else {}),
@@ -61,6 +61,13 @@ def effective_system(plan: RunPlan) -> System:
         guards=plan.guards,
         recorder=plan.recording,
     )
+
+
+def _of_goals(goals: str) -> dict[str, Path]:
+    """The goal file, by its name or its path; none where it is empty."""
+    if not goals:
+        return {}
+    return {"goals.yaml": Path(goals) if goals.endswith(".yaml") else config_path("goals", goals)}
 
 
 def _of_task(name: str) -> dict[str, Path]:

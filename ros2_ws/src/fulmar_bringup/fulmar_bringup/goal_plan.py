@@ -9,9 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
+from fulmar_bringup.excitation_plan import torques_note
 from fulmar_bringup.system import default_hardware
 from fulmar_core.attitude import angle_between
 from fulmar_core.errors import ConfigError
+from fulmar_core.excitation.settings import Torques
 from fulmar_core.goal import PoseTuple
 from fulmar_core.goal_files import (
     FollowedPath,
@@ -20,6 +22,7 @@ from fulmar_core.goal_files import (
     Positions,
     Trajectory,
     Velocities,
+    load_goal_file,
     load_goals,
 )
 from fulmar_core.goal_sequence import goal_sequence
@@ -86,14 +89,15 @@ def task_of_run(
         hardware: Hardware file that was given.
 
     Raises:
-        ConfigError: As of `default_task`, `whole_pose` and `check_heading`.
+        ConfigError: As of `default_task`, `whole_pose`, `check_heading` and `excitation_of`.
     """
     if goal is not None:
         whole_pose(goal, load_robot(robot), "--goal")
+    note = torques_note(goals, load_robot(robot), controller) if goals else ""
     if task is not None:
-        return task, "" if goal is None else check_heading(task, goal)
+        return task, note if goal is None else check_heading(task, goal)
     if goals:
-        return task_of_goals(goals), ""
+        return task_of_goals(goals), note
     return default_task(robot, controller, backend, goal=goal, policy=policy, hardware=hardware), ""
 
 
@@ -174,6 +178,7 @@ def check_heading(task: str, goal: tuple[float, ...]) -> str:
 
 
 DEFAULT_TASKS = {Positions: POSITION, Poses: POSE}  # all others are about velocities
+EXCITED = "point_inertial"  # while a satellite plays torques
 GOALS_HZ = 10.0  # of a goal node, at most
 TRIED = 720  # places along a path where a step is measured
 SHOWN = 400  # points of a path that a record carries along
@@ -186,7 +191,9 @@ def task_of_goals(goals: str) -> str:
     Raises:
         ConfigError: Unknown name, or a mistake in the file.
     """
-    file = load_goals(goals)
+    file = load_goal_file(goals)
+    if isinstance(file, Torques):
+        return EXCITED
     if isinstance(file, Trajectory):
         return (POSITION if file.facing == "any" else POSE) + file.form.SUFFIX
     return DEFAULT_TASKS.get(type(file), "track_velocities") + file.form.SUFFIX

@@ -60,6 +60,8 @@ def controller_spec(plan: RunPlan) -> NodeSpec:
         "rate": plan.rate,
         "goals_streamed": bool(plan.goals),
     }
+    if plan.excitation:
+        parameters["excitation"] = plan.excitation
     guards = plan.guards
     if controller_entry(plan.controller).runs_bundle:
         texts = {

@@ -9,6 +9,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, cast
 
+from fulmar_bringup.excitation_plan import excitation_of
 from fulmar_bringup.goal_plan import (
     checked_goals,
     duration_of,
@@ -48,6 +49,7 @@ from fulmar_bringup.system_rows import own_nodes
 from fulmar_core.disturbances.scenario import Scenario, load_scenario
 from fulmar_core.episode import draw_episode
 from fulmar_core.errors import ConfigError, UnknownNameError
+from fulmar_core.excitation.profiles import DURATION_S
 from fulmar_core.goal import PLACES, Goal, PoseTuple
 from fulmar_core.goal_files import GoalFile
 from fulmar_core.recording import MODES, Mode, Recording
@@ -188,6 +190,9 @@ def plan_run(
             raise ConfigError("a real robot goes nowhere by chance: say where with --goal or --goals.")
     if goals is not None and goal is not None:
         raise ConfigError("--goals brings its own goals; it takes no --goal.")
+    excitation = excitation_of(goals, the_robot, controller)
+    if excitation:
+        goals, duration_s = None, duration_s or DURATION_S
     file = (
         None if goals is None else checked_goals(goals, the_robot, the_task, goal_rate(hz, lockstep=lockstep))
     )
@@ -228,6 +233,7 @@ def plan_run(
         lockstep=lockstep,
         rate=rate,
         goals=str(goal_path(goals)) if goals else "",
+        excitation=excitation,
         hardware=hardware,
         emulated=emulate,
         arm=arm,

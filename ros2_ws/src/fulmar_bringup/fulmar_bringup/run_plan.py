@@ -62,6 +62,7 @@ class RunPlan:
     lockstep: bool = False
     rate: float = 1.0  # simulated seconds a wall-clock second
     goals: str = ""  # goal file that a node of its own publishes; empty: somebody else gives the goal
+    excitation: str = ""  # goal file of torques that the controller plays; empty: none
     guards: Guards = NONE
     supervised: bool = False  # somebody else activates the plant when all are ready
     hardware: str = ""  # file of `configs/hardware`, where the backend is hardware

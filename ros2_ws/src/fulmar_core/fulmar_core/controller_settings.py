@@ -33,6 +33,7 @@ class ControllerSettings:
     wait_for_subscribers: int = 0  # of actuators/command, before the first answer in lock step
     goals_streamed: bool = False  # a goal node sends the goal with each odometry; lock step waits for it
     fallback: str = ""  # classical controller that takes over when a policy is refused, or its commands are
+    excitation: str = ""  # goal file of torques, for `excite` on satellites; empty: our own profile
     trusted_keys: str = ""  # file or folder of public keys: no bundle runs that none of them has signed
     estop: bool = False  # nothing moves before an e-stop message is received
     unattended: bool = (

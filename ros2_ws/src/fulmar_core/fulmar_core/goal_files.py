@@ -10,6 +10,8 @@ from typing import Literal, cast
 import numpy as np
 
 from fulmar_core.config import load_config
+from fulmar_core.errors import ConfigError
+from fulmar_core.excitation.settings import Torques
 from fulmar_core.paths import config_path
 from fulmar_core.planar import PlanarState
 from fulmar_core.references import ReferencePath
@@ -211,11 +213,30 @@ def single_goal(place: tuple[float, ...], form: type[State] = PlanarState) -> Po
     return Poses("poses", f"pose {', '.join(words)}", (place,))
 
 
-def load_goals(name: str) -> GoalFile:
+def load_goal_file(name: str) -> GoalFile | Torques:
     """Read `configs/goals/<name>.yaml`, or a file anywhere whose path ends in `.yaml`.
 
     Raises:
         ConfigError: Unknown name, or a mistake in the file.
     """
     path = Path(name) if name.endswith(".yaml") else config_path("goals", name)
-    return cast(GoalFile, load_config(GoalFile, path))  # type: ignore[arg-type]
+    return cast(GoalFile | Torques, load_config(GoalFile | Torques, path))  # type: ignore[arg-type]
+
+
+def load_goals(name: str) -> GoalFile:
+    """Read a file of goals; argument and errors as of `load_goal_file`, and torques are none."""
+    file = load_goal_file(name)
+    if isinstance(file, Torques):
+        raise ConfigError(
+            f"the goals '{name}' are torques, which a controller plays: "
+            f"fulmar run cubesat_wheels --controller excite --goals {name}"
+        )
+    return file
+
+
+def load_torques(name: str) -> Torques:
+    """Read a file of torques; argument and errors as of `load_goal_file`, and goals are none."""
+    file = load_goal_file(name)
+    if not isinstance(file, Torques):
+        raise ConfigError(f"the goals '{name}' are no torques: their file says 'kind: {file.kind}'.")
+    return file

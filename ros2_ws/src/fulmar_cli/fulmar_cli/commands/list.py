@@ -69,7 +69,7 @@ def _family(family: str) -> tuple[list[str], Callable[[str], str]]:
     from fulmar_bringup.system import load_system
     from fulmar_core.disturbances.scenario import load_scenario
     from fulmar_core.estimation.kinds import load_estimator
-    from fulmar_core.goal_files import load_goals
+    from fulmar_core.goal_files import load_goal_file
     from fulmar_core.policy_bundle import read_passport
     from fulmar_core.robot import load_robot
     from fulmar_core.tasks import load_task
@@ -87,7 +87,7 @@ def _family(family: str) -> tuple[list[str], Callable[[str], str]]:
     loaders: dict[str, Callable[[str], Any]] = {
         "robots": load_robot,
         "tasks": load_task,
-        "goals": load_goals,
+        "goals": load_goal_file,
         "hardware": load_hardware,
         "scenarios": load_scenario,
         "estimators": load_estimator,

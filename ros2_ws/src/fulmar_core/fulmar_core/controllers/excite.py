@@ -17,17 +17,15 @@ from fulmar_core.actuators.excitation import Excitation
 from fulmar_core.actuators.families import FAMILIES
 from fulmar_core.attitude import length, minus, plus, scaled
 from fulmar_core.batch_dynamics import dynamics_of
-from fulmar_core.config import load_config
 from fulmar_core.controllers.body_frame import BodyFrame
 from fulmar_core.controllers.controller import Inputs
 from fulmar_core.controllers.excite_wheels import TASKS as TURNING
 from fulmar_core.controllers.excite_wheels import ExciteWheels
 from fulmar_core.controllers.law import Law
 from fulmar_core.dynamics.linear_model import nominal_worlds
-from fulmar_core.excitation.settings import WheelExcitation
+from fulmar_core.excitation.settings import Torques
 from fulmar_core.identification.model import nominal_world
 from fulmar_core.motion import actuation_of, move
-from fulmar_core.paths import config_names, config_path
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
 from fulmar_core.spatial import SpatialState, position_of
@@ -184,12 +182,18 @@ class ExciteInSpace(Excite):
         return np.asarray(length(then)), np.asarray(length(after.rate))
 
 
-def excite_of(robot: Robot, task: Task, *, control_hz: float | None = None) -> Law:
-    """The controller `excite` of a robot; arguments and errors as of `Excite`, or of `ExciteWheels` for satellites."""
+def excite_of(
+    robot: Robot, task: Task, *, control_hz: float | None = None, torques: Torques | None = None
+) -> Law:
+    """The controller `excite` of a robot; arguments and errors as of `Excite`, or of `ExciteWheels` for satellites.
+
+    Args:
+        robot: The robot.
+        task: What it would do.
+        control_hz: Command rate; the robot's own by default [Hz].
+        torques: Profile of a satellite; our own by default.
+    """
     if robot.actuators.turns_only:
-        name = f"{robot.name}_excite"
-        known = name in config_names("controllers")
-        how = load_config(WheelExcitation, config_path("controllers", name)) if known else None
-        return ExciteWheels(robot, task, how, control_hz=control_hz)
+        return ExciteWheels(robot, task, torques, control_hz=control_hz)
     kind = ExciteInSpace if robot.state_type is SpatialState else Excite
     return kind(robot, task, control_hz=control_hz)

@@ -8,7 +8,7 @@ from fulmar_core.actuators.reaction_wheels import ReactionWheels
 from fulmar_core.controllers.controller import Inputs
 from fulmar_core.controllers.law import Law
 from fulmar_core.excitation.profiles import gain_of, profile_of
-from fulmar_core.excitation.settings import WheelExcitation
+from fulmar_core.excitation.settings import Torques
 from fulmar_core.robot import Robot
 from fulmar_core.tasks import Task
 
@@ -22,13 +22,13 @@ class ExciteWheels(Law):
     law = "excite"
     title = "a profile of torques, to identify the inertia by"
 
-    gains: WheelExcitation
+    gains: Torques
 
     def __init__(
         self,
         robot: Robot,
         task: Task,
-        gains: WheelExcitation | None = None,
+        gains: Torques | None = None,
         *,
         control_hz: float | None = None,
     ) -> None:
@@ -39,7 +39,7 @@ class ExciteWheels(Law):
         """
         if task.kind not in TASKS:
             raise ValueError(f"'excite' turns a satellite; tasks for that are of kind {', '.join(TASKS)}.")
-        super().__init__(robot, task, gains or WheelExcitation(), control_hz=control_hz)
+        super().__init__(robot, task, gains or Torques(), control_hz=control_hz)
 
     def bind(self) -> None:
         """See `Law.bind`."""

@@ -205,7 +205,7 @@ class AttitudeEstimator:
         return ""
 
     def _with_wheels(self, stamp_ns: int, use: Callable[[int], str]) -> str:
-        """Use a reading now, or once the wheels' of its time came: torque that is not known yet would look like noise."""
+        """Use a reading now, or once the wheels' of its time came: unknown torque would look like noise."""
         self._held.append((stamp_ns, use))
         self._held.sort(key=lambda one: one[0])
         silent = self._held[-1][0] > self._spin_ns + SPIN_GAP_NS

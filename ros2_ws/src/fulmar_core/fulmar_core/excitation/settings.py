@@ -1,17 +1,21 @@
-"""Which profile the controller `excite` plays on a satellite."""
+"""Which profile of torques the controller `excite` plays on a satellite: goal files of the kind `torques`."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 from fulmar_core.errors import did_you_mean
 from fulmar_core.excitation.profiles import OWN, PROFILES
+from fulmar_core.spatial import SpatialState
 
 
 @dataclass(frozen=True)
-class WheelExcitation:
-    """One file `configs/controllers/<robot>_excite.yaml`; without one our own profile is played."""
+class Torques:
+    """Torques of reaction wheels over time, whatever the attitude: commands, which no node publishes as goals."""
 
+    kind: Literal["torques"] = "torques"
+    title: str = "our own profile, that shows a satellite's inertia"
     profile: str = OWN  # one of `excitation.profiles.PROFILES`
     seed: int = 0  # of the pseudorandom binary sequence
     saturate: bool = False  # whether wheels may reach their limits, as in the study
@@ -22,3 +26,10 @@ class WheelExcitation:
                 f"'profile' = '{self.profile}' is not known. Known: {', '.join(PROFILES)}."
                 f"{did_you_mean(self.profile, PROFILES)}"
             )
+        if self.seed < 0:
+            raise ValueError(f"'seed' = {self.seed} must not be negative.")
+
+    @property
+    def form(self) -> type[SpatialState]:
+        """State type of satellites."""
+        return SpatialState
