@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from fulmar_core.goal_files import load_goals
 from fulmar_core.paths import config_names
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import load_robot
@@ -15,12 +16,24 @@ from fulmar_core.safety.geofence import is_inside
 from fulmar_core.spatial import SpatialState
 from fulmar_evaluation.faults import command_faults
 from fulmar_evaluation.faults.fault import possible
-from fulmar_evaluation.faults.fault_environment import USUAL, FaultEnvironment, area_of, goal_of, task_of
+from fulmar_evaluation.faults.fault_environment import (
+    USUAL,
+    FaultEnvironment,
+    area_of,
+    goal_of,
+    request_of,
+    task_of,
+)
 from fulmar_evaluation.faults.suite import EVERY, faults_of, modules_for
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "safety.md"
 ROBOTS = config_names("robots")
-IN_SPACE = [name for name in ROBOTS if load_robot(name).state_type is SpatialState]
+FLYING = [
+    name
+    for name in ROBOTS
+    if load_robot(name).state_type is SpatialState and not load_robot(name).actuators.turns_only
+]
+SATELLITES = [name for name in ROBOTS if load_robot(name).actuators.turns_only]
 MOST_LEFT_OUT = 4
 
 
@@ -33,7 +46,7 @@ def left_out(robot: str) -> dict[str, str]:
     return {fault.name: fault.reason for fault in faults_of(robot)[1]}
 
 
-@pytest.mark.parametrize("robot", IN_SPACE)
+@pytest.mark.parametrize("robot", FLYING)
 def test_at_most_four_faults_do_not_apply_in_space_and_each_has_a_reason(robot: str):
     reasons = left_out(robot)
     assert len(reasons) <= MOST_LEFT_OUT
@@ -41,10 +54,31 @@ def test_at_most_four_faults_do_not_apply_in_space_and_each_has_a_reason(robot: 
 
 
 def test_a_spacecraft_has_every_fault_of_the_platform_but_that_of_its_air_bearing():
-    assert set(left_out("spacecraft_16")) == {"driver_killed", "driver_hangs", "bearing_late"}
+    assert set(left_out("spacecraft_16")) == {
+        "driver_killed",
+        "driver_hangs",
+        "bearing_late",
+        "gyroscope_dies",
+    }
     platform = {fault.name for fault in faults_of("floating_platform")[0]}
     spacecraft = {fault.name for fault in faults_of("spacecraft_16")[0]}
     assert platform - spacecraft == {"bearing_late"}
+
+
+@pytest.mark.parametrize("robot", SATELLITES)
+def test_a_satellite_lacks_what_needs_a_policy_a_place_or_a_person_and_each_has_a_reason(robot: str):
+    reasons = left_out(robot)
+    assert all(reasons.values())
+    needs = ("swap", "bundle", "area", "geofence", "teleop", "driver", "mocap", "bearing", "gyroscope")
+    assert [name for name in reasons if not any(word in name for word in needs)] == []
+    assert ("gyroscope_dies" in reasons) is not bool(load_robot(robot).event_cameras)
+
+
+def test_a_satellite_keeps_its_place_and_gets_another_attitude_from_a_file_of_goals(tmp_path):
+    request = request_of("cubesat_wheels", tmp_path / "bag", FaultEnvironment(by_goal_node=True))
+    poses = load_goals(request.plan.goals).poses
+    assert [pose[:3] for pose in poses] == [(0.0, 0.0, 0.0)] * 2
+    assert poses[0] != poses[1]
 
 
 def test_what_applies_follows_from_what_a_robot_has_not_from_its_name():
@@ -86,7 +120,11 @@ def test_the_document_lists_every_fault_and_those_that_may_not_apply():
     table = section[section.index("| Does not apply |") :]
     rows = re.findall(r"^\| (`[^|]+) \|", table[: table.index("\n\n")], re.MULTILINE)
     listed = {name for row in rows for name in re.findall(r"`(\w+)`", row)}
-    assert listed == {fault.name for fault in EVERY if fault.why_not is not possible}
+    satellite = load_robot("cubesat_wheels")
+    may_not = {
+        fault.name for fault in EVERY if fault.why_not is not possible or fault.inapplicable(satellite)
+    }
+    assert listed == may_not
 
     for robot in re.findall(r"`(\w+)`", table.split("\n")[0]):
         column = [cell.strip(" `") for cell in table.split("\n")[0].split("|")].index(robot)

@@ -37,6 +37,15 @@ IN_SPACE = (  # what differs there: three axes, sixteen valves, longer ticks, an
     "bundle_refused_with_fallback",
     "swap_to_the_same_policy",
 )
+SATELLITE = "cubesat_wheels"
+ON_A_SATELLITE = (  # what differs there: estimators in a chain, a place that does not change
+    "gyroscope_dies",
+    "estimator_killed",
+    "odometry_frozen",
+    "odometry_dated_back",
+    "goals_killed",
+    "goal_with_a_wrong_quaternion",
+)
 KEYS = [
     "name",
     "detected_by",
@@ -152,5 +161,14 @@ def test_every_other_fault_is_survived(robot: str, fault: Fault, ros_domain: Ros
 @pytest.mark.parametrize("fault", IN_SPACE)
 def test_a_spacecraft_survives_what_differs_in_space(fault: str, ros_domain: RosDomain) -> None:
     (found,) = run_faults(SPACECRAFT, faults_of(SPACECRAFT, [fault])[0], lambda _done: None)
+    assert found.passed, found
+    assert found.bag_intact
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(240)
+@pytest.mark.parametrize("fault", ON_A_SATELLITE)
+def test_a_satellite_survives_what_differs_there(fault: str, ros_domain: RosDomain) -> None:
+    (found,) = run_faults(SATELLITE, faults_of(SATELLITE, [fault])[0], lambda _done: None)
     assert found.passed, found
     assert found.bag_intact

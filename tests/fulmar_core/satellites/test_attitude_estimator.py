@@ -180,6 +180,35 @@ def test_wheels_may_turn_the_body_fast_whatever_the_order_of_readings(order, eve
     np.testing.assert_allclose(state.angular_velocity_in_body, [0.0, 0.0, spun * t], atol=2e-4)
 
 
+def test_a_late_rate_counts_for_its_own_time_while_the_body_turns_faster():
+    """As that of events, which comes a quarter of a second after its window while the motors push."""
+    estimator, moment, spun = make_estimator("attitude", CUBESAT), CUBESAT.body.inertia_matrix[2, 2], 0.03
+    for k in range(101):
+        t = 0.1 * k
+        stamp = SECOND + round(1e9 * t)
+        speed = -moment * spun * t / CUBESAT.actuators.spin_inertia
+        wheels = WheelSpeeds(NAMES, np.array([0.0, 0.0, speed]))
+        assert estimator.take("wheels", Reading(wheels, stamp)) is None
+        if k % 10 == 0:
+            quat = Rotation.from_rotvec([0.0, 0.0, 0.5 * spun * t * t]).as_quat()
+            reading = Reading(quat, stamp, covariance=TRACKER_STD**2 * np.eye(3))
+            assert estimator.take("star_tracker", reading) is None
+        if k % 2 == 0 and k > 4:
+            seen = Reading(
+                np.array([0.0, 0.0, spun * (t - 0.25)]), stamp - SECOND // 4, covariance=4e-10 * np.eye(3)
+            )
+            assert estimator.take("rate", seen) is None
+    found = estimator.estimate().value.angular_velocity_in_body
+    np.testing.assert_allclose(found, [0.0, 0.0, spun * t], atol=1e-4)
+
+
+def test_a_gap_in_all_readings_is_bridged_without_a_past():
+    estimator = make_estimator("attitude", CUBESAT)
+    now = fed(estimator, 5.0)
+    assert estimator.estimate(now + 3 * SECOND) is not None
+    assert estimator.take("rate", Reading(RATE, now + SECOND, covariance=1e-10 * np.eye(3))) is None
+
+
 def test_a_jump_of_time_begins_a_new_epoch():
     estimator = make_estimator("attitude", CUBESAT)
     now = fed(estimator, 5.0)

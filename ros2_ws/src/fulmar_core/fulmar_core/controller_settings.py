@@ -98,7 +98,8 @@ class ControllerSettings:
         """What lets measurements in; in lock step they may repeat themselves, and episodes begin anywhere."""
         if self.lockstep:
             return InputGate(robot.limits, frozen_after=0, turns_freely=robot.state_type is SpatialState)
-        repeats = self.odometry_may_repeat or robot.sensors.odometry.position.std == 0.0
+        odometry = robot.sensors.odometry
+        repeats = self.odometry_may_repeat or odometry.position.std == odometry.heading.std == 0.0
         return InputGate(
             robot.limits,
             frozen_after=0 if repeats else FROZEN_AFTER,

@@ -33,6 +33,7 @@ TURN, RATE, BIAS = slice(0, 3), slice(3, 6), slice(6, 9)  # of the errors
 ERRORS = 9
 KEPT_NS = 2_000_000_000  # how late a reading may come
 TO_BEGIN_ANEW = 10  # attitudes in a row that are no match: then it is the estimate that is wrong
+LATE_SHARE = 0.1  # of what a rate changed since its reading: how far the reading may be off by that
 GATE = 16.3  # 1 good reading of 1,000 lies beyond it: chi-squared, 3 degrees of freedom
 RATE_STD = 0.05  # of the turn rate when the filter begins [rad/s]
 BIAS_STD = 1e-4  # of the gyroscope's bias when the filter begins [rad/s]
@@ -67,7 +68,8 @@ class AttitudeEstimator:
         self._held: list[
             tuple[int, Callable[[int], str]]
         ] = []  # readings until the wheels' of that time come
-        self._past: deque[tuple[int, np.ndarray]] = deque()  # stamps [ns] and attitudes, oldest first
+        # Stamps [ns], attitudes and turn rates before now, oldest first.
+        self._past: deque[tuple[int, np.ndarray, np.ndarray]] = deque()
         self._strangers = 0
         self._gyroscope_ns = self._rate_ns = self._attitude_ns = self._spin_ns = 0
 
@@ -197,9 +199,13 @@ class AttitudeEstimator:
 
     def _use_rate(self, rate: np.ndarray, covariance: np.ndarray, stamp_ns: int) -> str:
         self._move_to(stamp_ns)
-        late_s = max(0.0, (self._stamp_ns - stamp_ns) / 1e9)
-        noise = covariance + self._settings.rate_spread**2 * late_s * np.eye(3)
-        if not self._correct(rate - self._turning, RATE, noise, gated=True):
+        believed = self._rate_at(stamp_ns)
+        change = LATE_SHARE * (
+            self._turning - believed
+        )  # a window of events shows the mean of a rate that changes
+        late_s = (self._stamp_ns - stamp_ns) / 1e9
+        noise = covariance + self._settings.rate_spread**2 * late_s * np.eye(3) + np.outer(change, change)
+        if not self._correct(rate - believed, RATE, noise, gated=True):
             return f"the rate lies beyond the gate: {self.outliers} outliers so far"
         self._rate_ns = stamp_ns
         return ""
@@ -262,6 +268,7 @@ class AttitudeEstimator:
         t = (stamp_ns - self._stamp_ns) / 1e9
         if t <= 0.0:
             return
+        self._past.append((self._stamp_ns, self._quat, self._turning))
         momentum = np.zeros(3) if self._momentum is None else self._momentum
         rate = self._turning
         gyroscopic = -self._lightness @ np.cross(rate, self._inertia @ rate + momentum)
@@ -279,16 +286,23 @@ class AttitudeEstimator:
         Q[BIAS, BIAS] = s.gyroscope_drift**2 * t * one
         self._P = F @ self._P @ F.T + Q
         self._stamp_ns = stamp_ns
-        self._past.append((stamp_ns, self._quat))
-        while self._past[0][0] < stamp_ns - KEPT_NS:
+        while self._past and self._past[0][0] < stamp_ns - KEPT_NS:
             self._past.popleft()
 
     def _quat_at(self, stamp_ns: int) -> np.ndarray:
         """Attitude that was believed at a time not long ago [ns]."""
         if not self._past or stamp_ns >= self._stamp_ns:
             return self._quat
-        _, quat = min(self._past, key=lambda one: abs(one[0] - stamp_ns))
+        _, quat, _ = min(self._past, key=lambda one: abs(one[0] - stamp_ns))
         return quat
+
+    def _rate_at(self, stamp_ns: int) -> np.ndarray:
+        """Turn rate that was believed at a time not long ago [ns]."""
+        if not self._past or stamp_ns >= self._stamp_ns:
+            return self._turning
+        rates = [*self._past, (self._stamp_ns, self._quat, self._turning)]
+        stamps = [one[0] for one in rates]
+        return np.array([np.interp(stamp_ns, stamps, [one[2][axis] for one in rates]) for axis in range(3)])
 
     def _correct(self, residual: np.ndarray, part: Any, noise: np.ndarray, *, gated: bool) -> bool:
         """Correct by a residual of one part of the errors, or of the sum of several; whether it passed the gate."""

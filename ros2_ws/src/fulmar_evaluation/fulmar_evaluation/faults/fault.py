@@ -119,6 +119,10 @@ class Fault:
     why_not: Callable[[Robot], str] = possible
     begins: bool = True  # whether the system is under way when it is done
 
+    def inapplicable(self, robot: Robot) -> str:
+        """Why a robot, or this machine, cannot have it, by the system that it is done to too; empty if it can."""
+        return self.why_not(robot) or self.about.why_not(robot)
+
     @property
     def name(self) -> str:
         """What people call it."""

@@ -13,7 +13,7 @@ import yaml
 from geometry_msgs.msg import PoseStamped, TwistStamped
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
-from sensor_msgs.msg import JointState
+from sensor_msgs.msg import Imu, JointState
 
 from fulmar_bringup.planning import RunRequest, plan_run
 from fulmar_core.estimation.kinds import default_estimator
@@ -22,11 +22,17 @@ from fulmar_core.robot import Robot, load_robot
 from fulmar_core.spatial import SpatialState
 from fulmar_core.state import State
 from fulmar_core.tasks import Task, load_task
-from fulmar_core.topics import COMMAND, GOAL_POINT, GOAL_POSE, MOCAP, ODOMETRY, VELOCITY_COMMAND, Wire
+from fulmar_core.topics import COMMAND, GOAL_POINT, GOAL_POSE, IMU, MOCAP, ODOMETRY, VELOCITY_COMMAND, Wire
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 from policy_server.controllers import shipped_policy
 
-KINDS = {ODOMETRY: Odometry, MOCAP: PoseStamped, COMMAND: JointState, VELOCITY_COMMAND: TwistStamped}
+KINDS = {
+    ODOMETRY: Odometry,
+    IMU: Imu,
+    MOCAP: PoseStamped,
+    COMMAND: JointState,
+    VELOCITY_COMMAND: TwistStamped,
+}
 Injection = Callable[[Any], Any]  # a message to what is passed on in its place, or to None
 
 
@@ -79,6 +85,8 @@ GOALS: Mapping[type[State], tuple[float, ...]] = {
     PlanarState: (FAR_M, 0.0, 0.0),
     SpatialState: (4.0, 4.0, 2.0, 20.0, -30.0, 90.0),
 }
+STAYS = "it stays where it is"  # why what only turns has no limits of place
+TURNED = (0.0, 0.0, 0.0, 20.0, -30.0, 90.0)  # the same of what only turns
 CORNER_M = 1.0  # from there to the second place that a node of goals sends it to, along y
 ROOM_M = 2.0  # of an area beyond start and goal
 TASKS = (
@@ -105,6 +113,7 @@ class FaultEnvironment:
     emulated: bool = False  # a driver drives an emulated device
     two_hosts: bool = False  # the controller is on another one
     bundle: Callable[[Path], None] | None = None  # what is done to the bundle before the start
+    nadir: bool = False  # a satellite keeps pointing to the Earth, and turns with its orbit
 
     def guards_of(self, robot: Robot) -> dict[str, Any]:
         """What replaces guards of the system, by name."""
@@ -115,19 +124,33 @@ class FaultEnvironment:
             **({"area": area_of(robot)} if self.has_area else {}),
         }
 
+    def why_not(self, robot: Robot) -> str:
+        """Why a robot cannot be in such a system; empty if it can."""
+        if not robot.actuators.turns_only:
+            return ""
+        reasons = {
+            "no policy is shipped for it": self.bundle is not None or self.fallback is not None,
+            STAYS: self.has_area,
+            "it is not seen by motion capture": self.intercepted == MOCAP,
+            "only its own controllers drive it": self.by_hand,
+        }
+        return next((reason for reason, counts in reasons.items() if counts), "")
+
 
 USUAL = FaultEnvironment()
 
 
 def task_of(robot: Robot) -> Task:
     """What a robot does when a fault comes: the first of `TASKS` in its world that a policy is shipped for."""
+    if robot.actuators.turns_only:
+        return load_task("slew")
     fitting = [task for task in map(load_task, TASKS) if task.state_type is robot.state_type]
     return next((task for task in fitting if shipped_policy(robot.name, task.name)), fitting[0])
 
 
 def goal_of(robot: Robot) -> tuple[float, ...]:
     """Where it goes, as people write it [m, deg]."""
-    return GOALS[robot.state_type]
+    return TURNED if robot.actuators.turns_only else GOALS[robot.state_type]
 
 
 def area_of(robot: Robot) -> tuple[float, ...]:
@@ -145,18 +168,18 @@ def request_of(name: str, record: Path, about: FaultEnvironment = USUAL) -> RunR
         about: What is unusual.
 
     Raises:
-        FulmarError: The robot has no policy to run.
+        FulmarError: The robot has no controller to run.
     """
     robot = load_robot(name)
-    task = task_of(robot)
+    task = load_task("point") if about.nadir else task_of(robot)
     request = plan_run(
         robot=name,
         task=task.name,
-        controller="policy",
+        controller="classical" if robot.actuators.turns_only else "policy",
         backend="hardware" if about.emulated else "mujoco",
         policy=None,
-        goal=None if about.by_goal_node else goal_of(robot),
-        start=(0.0,) * robot.state_type.AXES,
+        goal=None if about.by_goal_node or about.nadir else goal_of(robot),
+        start=None if about.nadir else (0.0,) * robot.state_type.AXES,
         duration_s=None,
         lockstep=False,
         rate=1.0,
@@ -178,7 +201,9 @@ def request_of(name: str, record: Path, about: FaultEnvironment = USUAL) -> RunR
 def _goals_file(folder: Path, robot: Robot, task: Task) -> str:
     kind = {GOAL_POSE.name: "poses", GOAL_POINT.name: "positions"}[task.goal_topic]
     far = list(goal_of(robot))
-    corner = [far[0], far[1] + CORNER_M, *far[2:]]
+    corner = (
+        [-number for number in far] if robot.actuators.turns_only else [far[0], far[1] + CORNER_M, *far[2:]]
+    )
     places = [place if kind == "poses" else place[: robot.state_type.AXES] for place in (far, corner)]
     path = folder / "goals.yaml"
     path.write_text(yaml.safe_dump({"kind": kind, "title": "far away", kind: places}))

@@ -166,7 +166,11 @@ def _stamped(by_ns: int) -> Injection:
 
 def _epoch(live: LiveSystem, since_s: float) -> tuple[str, str]:
     """The epoch that the controller has reported since then, and what it was doing in it."""
-    statuses = [status for status in live.observer.statuses_since(since_s) if "epoch" in status.values]
+    statuses = [
+        status
+        for status in live.observer.statuses_since(since_s)
+        if "mode" in status.values and "epoch" in status.values
+    ]
     return (statuses[-1].values["epoch"], statuses[-1].values["mode"]) if statuses else ("", "silent")
 
 

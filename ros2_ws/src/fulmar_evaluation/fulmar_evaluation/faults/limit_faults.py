@@ -18,7 +18,7 @@ from fulmar_core.safety.geofence import is_inside
 from fulmar_core.spatial import SpatialState
 from fulmar_core.topics import GOAL_POSE, GOAL_WIRES, SIMULATION_START_NS
 from fulmar_evaluation.faults.fault import STAYS_S, WORDS_S, Fault, Outcome, stopped, went_on
-from fulmar_evaluation.faults.fault_environment import ROOM_M, FaultEnvironment, goal_of, task_of
+from fulmar_evaluation.faults.fault_environment import ROOM_M, STAYS, FaultEnvironment, goal_of, task_of
 from fulmar_evaluation.faults.input_faults import changing, intercept
 from fulmar_evaluation.faults.live_system import LiveSystem
 from fulmar_evaluation.faults.observer import wait_for
@@ -143,6 +143,10 @@ def _refusal(live: LiveSystem, since_s: float) -> str:
     )
 
 
+def _without_place(robot: Robot) -> str:
+    return STAYS if robot.actuators.turns_only else ""
+
+
 def _without_attitude(robot: Robot) -> str:
     task = task_of(robot)
     if task.goal_topic == GOAL_POSE.name:
@@ -155,7 +159,7 @@ LIMIT_FAULTS = (
     Fault(odometry_too_fast),
     Fault(odometry_turns_too_fast),
     Fault(odometry_leaves_the_area, IN_AN_AREA),
-    Fault(odometry_leaves_the_geofence),
+    Fault(odometry_leaves_the_geofence, why_not=_without_place),
     Fault(goal_with_a_wrong_quaternion, why_not=_without_attitude),
     Fault(goal_outside_the_area, IN_AN_AREA),
 )

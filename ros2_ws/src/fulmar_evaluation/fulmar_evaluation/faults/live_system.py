@@ -27,6 +27,7 @@ from fulmar_core.safety.watchdog import default_timeout
 from fulmar_core.topics import (
     ACTUATORS_STATE,
     DEVICE_STATE,
+    IMU,
     MOCAP,
     ODOMETRY,
     SIMULATION_START_NS,
@@ -211,4 +212,4 @@ def _specs(request: RunRequest, about: FaultEnvironment, robot: Robot, wires: Pa
 def _publisher_of(wire: Wire, plan: RunPlan) -> str:
     if wire == ODOMETRY:  # it may have come from another process
         return "estimator" if plan.guards.estimator else "plant"
-    return "plant" if wire == MOCAP else "controller"
+    return "plant" if wire in (MOCAP, IMU) else "controller"

@@ -12,12 +12,14 @@ from std_msgs.msg import String
 
 from fulmar_core.errors import RunFailed
 from fulmar_core.policy_bundle import NETWORK, Passport, read_golden, read_passport, write_bundle
+from fulmar_core.robot import Robot
 from fulmar_core.topics import SWAP
 from fulmar_evaluation.faults.fault import STAYS_S, Fault, Outcome, went_on
-from fulmar_evaluation.faults.fault_environment import FaultEnvironment
+from fulmar_evaluation.faults.fault_environment import FaultEnvironment, task_of
 from fulmar_evaluation.faults.live_system import LiveSystem
 from fulmar_evaluation.faults.observer import wait_for
 from fulmar_ros.qos import publisher_qos
+from policy_server.controllers import shipped_policy
 
 ANSWER_S = 15.0  # to load a network on a busy machine
 GOES_ON_S = 1.0
@@ -89,14 +91,19 @@ def bundle_refused_with_fallback(live: LiveSystem) -> Outcome:
     )
 
 
+def _without_policy(robot: Robot) -> str:
+    shipped = shipped_policy(robot.name, task_of(robot).name)
+    return "" if shipped else f"no policy is shipped for '{robot.name}'"
+
+
 POLICY_FAULTS = (
     Fault(bundle_refused, FaultEnvironment(bundle=flip_a_byte), begins=False),
     Fault(bundle_refused_with_fallback, FaultEnvironment(fallback="classical", bundle=flip_a_byte)),
-    Fault(swap_to_the_same_policy),
-    Fault(swap_to_a_wrong_hash),
-    Fault(swap_to_another_robot),
-    Fault(swap_to_another_rate),
-    Fault(swap_to_another_shape),
+    Fault(swap_to_the_same_policy, why_not=_without_policy),
+    Fault(swap_to_a_wrong_hash, why_not=_without_policy),
+    Fault(swap_to_another_robot, why_not=_without_policy),
+    Fault(swap_to_another_rate, why_not=_without_policy),
+    Fault(swap_to_another_shape, why_not=_without_policy),
 )
 
 

@@ -24,6 +24,7 @@ from fulmar_evaluation.faults.observer import BagEvidence, bag_evidence
 from fulmar_evaluation.faults.operator_faults import OPERATOR_FAULTS
 from fulmar_evaluation.faults.policy_faults import POLICY_FAULTS
 from fulmar_evaluation.faults.process_faults import PROCESS_FAULTS
+from fulmar_evaluation.faults.satellite_faults import SATELLITE_FAULTS
 from fulmar_evaluation.faults.two_hosts import ACROSS, TwoHosts, inside, two_hosts
 
 EVERY = (
@@ -35,6 +36,7 @@ EVERY = (
     *COMMAND_FAULTS,
     *POLICY_FAULTS,
     *CABLE_FAULTS,
+    *SATELLITE_FAULTS,
 )
 ATTEMPTS = 3  # a robot may stand still just when something is done to it
 
@@ -64,7 +66,7 @@ def faults_of(robot: str, names: list[str] | None = None) -> tuple[list[Fault], 
     known = {fault.name: fault for fault in EVERY}
     the_robot = load_robot(robot)
     if names is None:
-        reasons = {fault.name: fault.why_not(the_robot) for fault in EVERY}
+        reasons = {fault.name: fault.inapplicable(the_robot) for fault in EVERY}
         skipped = [Skipped(name, reason) for name, reason in reasons.items() if reason]
         return [fault for fault in EVERY if not reasons[fault.name]], skipped
     if not names:
@@ -72,7 +74,7 @@ def faults_of(robot: str, names: list[str] | None = None) -> tuple[list[Fault], 
     for name in names:
         if name not in known:
             raise UnknownNameError("fault", name, known)
-        reason = known[name].why_not(the_robot)
+        reason = known[name].inapplicable(the_robot)
         if reason:
             raise ConfigError(f"{name}: {reason}.")
     return [known[name] for name in dict.fromkeys(names)], []
@@ -93,7 +95,7 @@ def run_faults(robot: str, faults: list[Fault], progress: Callable[[int], None])
     """Do each of them to a system of its own, one after another, in a ROS domain that nobody else uses.
 
     Raises:
-        FulmarError: The robot has no policy to run.
+        FulmarError: The robot has no controller to run.
     """
     with tempfile.TemporaryDirectory() as folder:
         request_of(
