@@ -25,6 +25,7 @@ PROGRAMS = {
     "hardware_drivers/driver_node": "hardware_drivers.driver_node",
     "policy_server/controller_node": "policy_server.controller_node",
     "sim_nodes/emulator_node": "sim_nodes.emulator_node",
+    "sim_nodes/event_camera_node": "sim_nodes.event_camera_node",
     "sim_nodes/sim_node": "sim_nodes.sim_node",
 }
 SOURCES = ["configs", "hardware_drivers", "policy_server", "ros2_ws/src", "sim_nodes"]

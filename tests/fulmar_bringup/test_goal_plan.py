@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from fulmar_bringup.goal_plan import is_endless, shown_path, start_of, task_of_goals
+from fulmar_bringup.goal_plan import is_endless, shown_path, start_of, task_of_goals, task_of_run
 from fulmar_bringup.launched_system import list_nodes
 from fulmar_bringup.node_table import controller_spec
 from fulmar_bringup.operator_rows import run_goals_spec
@@ -40,6 +40,7 @@ def file(tmp_path):
     return write
 
 
+TURNS = "kind: poses\ntitle: turns\nposes: [[0, 0, 0, 0, 0, 90], [0, 0, 0, 0, 0, -90]]\n"
 FAR = "kind: positions\ntitle: far\npositions: [[0.0, 0.0], [30.0, 0.0]]\n"
 NEAR = "kind: positions\ntitle: near\npositions: [[7.0, 0.0], [7.0, 1.0]]\n"
 ROUND = (
@@ -68,6 +69,30 @@ def test_a_path_is_begun_at_its_beginning_and_lasts_as_long_as_it_takes(plan):
     assert math.radians(heading) == pytest.approx(math.atan2(*(points[1] - points[0])[::-1]))
     assert request.plan.duration_s > 2 * math.pi * 1.5 / 0.25
     assert request.goal is None
+
+
+@pytest.mark.parametrize(
+    ("given", "task"),
+    [({}, "point"), ({"goal": (0.0, 0.0, 0.0, 0.0, 0.0, 40.0)}, "slew"), ({"goals": "turns"}, "slew")],
+)
+def test_a_satellite_turns_to_goals_and_else_points_to_the_earth(file, given, task):
+    if "goals" in given:
+        given = {"goals": file(TURNS)}
+    found, _ = task_of_run(
+        None,
+        "cubesat_wheels",
+        "lqr",
+        "mujoco",
+        goal=given.get("goal"),
+        goals=given.get("goals"),
+        policy=None,
+    )
+    assert found == task
+
+
+def test_a_satellite_has_the_time_that_its_turns_take(plan, file):
+    request = plan(file(TURNS), robot="cubesat_wheels", task="slew", start=(0.0,) * 6)
+    assert request.plan.duration_s == pytest.approx(2 * 20.0 + 3.0 * math.radians(90.0 + 180.0) / 0.03 + 5.0)
 
 
 def test_velocities_begin_at_the_origin_and_end_a_little_after_the_last(plan):

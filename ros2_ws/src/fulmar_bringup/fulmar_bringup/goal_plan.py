@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import replace
@@ -29,7 +30,7 @@ from fulmar_core.goal_sequence import goal_sequence
 from fulmar_core.paths import config_path
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot, load_robot
-from fulmar_core.spatial import quat_of
+from fulmar_core.spatial import SpatialState, quat_of
 from fulmar_core.state import State
 from fulmar_core.tasks import Task, load_task
 from policy_server.controllers import CONTROLLERS, shipped_policy
@@ -97,7 +98,8 @@ def task_of_run(
     if task is not None:
         return task, note if goal is None else check_heading(task, goal)
     if goals:
-        return task_of_goals(goals), note
+        turns = load_robot(robot).actuators.turns_only and task_of_goals(goals) == POSE + SpatialState.SUFFIX
+        return SLEW if turns else task_of_goals(goals), note
     return default_task(robot, controller, backend, goal=goal, policy=policy, hardware=hardware), ""
 
 
@@ -112,6 +114,8 @@ def default_task(
 ) -> str:
     """Name of the task that a goal asks for: a place is a position, with angles it is a pose, as without a goal.
 
+    A satellite turns to a goal, and without one points to the Earth.
+
     The goal is as `State.NUMBERS` of the robot; a bundle that was given is checked later. Without a hardware file the
     robot has to have its own.
 
@@ -120,6 +124,8 @@ def default_task(
     """
     if backend == "hardware":
         default_hardware(robot, hardware)
+    if load_robot(robot).actuators.turns_only:
+        return POINT if goal is None else SLEW
     form = load_robot(robot).state_type
     pose, position = (name + form.SUFFIX for name in (POSE, POSITION))
     asked = position if goal is not None and len(goal) == form.AXES else pose
@@ -179,6 +185,7 @@ def check_heading(task: str, goal: tuple[float, ...]) -> str:
 
 DEFAULT_TASKS = {Positions: POSITION, Poses: POSE}  # all others are about velocities
 EXCITED = "point_inertial"  # while a satellite plays torques
+POINT, SLEW = "point", "slew"  # of a satellite, without and with a goal
 GOALS_HZ = 10.0  # of a goal node, at most
 TRIED = 720  # places along a path where a step is measured
 SHOWN = 400  # points of a path that a record carries along
@@ -355,10 +362,14 @@ def duration_of(file: GoalFile, robot: Robot, start: PoseTuple) -> float:
         return 1.25 * length / file.speed + SPARE_S
     if isinstance(file, Trajectory):
         return replace(file, loops=max(1, file.loops)).target().duration_s + 2.0 * SPARE_S  # it stops at once
-    axes = file.form.AXES
+    axes, can = file.form.AXES, robot.performance
+    if robot.actuators.turns_only:
+        attitudes = np.concatenate((file.form.target_at(start)[None], file.targets()))[:, axes:]
+        turns = [angle_between(tuple(q), tuple(after)) for q, after in itertools.pairwise(attitudes)]
+        return float(np.sum(20.0 + 3.0 * np.array(turns) / can.yaw_rate)) + SPARE_S
     places = np.concatenate((np.array([start[:axes]]), file.targets()[:, :axes]))
     ways = np.linalg.norm(np.diff(places, axis=0), axis=1)
-    return float(np.sum(20.0 + 3.0 * ways / robot.performance.speed)) + SPARE_S
+    return float(np.sum(20.0 + 3.0 * ways / can.speed)) + SPARE_S
 
 
 def shown_path(file: GoalFile) -> list[list[float]]:

@@ -15,14 +15,14 @@ from fulmar_cli.commands.values import read_area, read_goal, read_pose
 
 RUN_TASK_HELP = (
     f"{cli.TASK_HELP} By default the goal decides: go_to_position for x,y, go_to_pose for x,y,deg and without a goal, "
-    "and the task that takes the goals of --goals. In space, go_to_position_3d for x,y,z, else go_to_pose_3d."
+    "and the task that takes the goals of --goals. In space go_to_position_3d or go_to_pose_3d; satellites: slew, point."
 )
 BACKEND_HELP = "mujoco, mock (Fulmar's own dynamics, perfect sensors) or hardware."
 DURATION_HELP = "Simulated seconds; the task's episode by default."
 GOAL_HELP = "Where to go [m, deg], in space x,y,z or x,y,z,roll,pitch,yaw; by default the seed draws it."
 START_HELP = "Where to begin [m, deg], in space x,y,z or x,y,z,roll,pitch,yaw; by default the seed draws it."
-GOALS_HELP = "Goals one after another, or a path to follow: a name from `fulmar list goals`, or a .yaml file."
-ESTIMATOR_HELP = "Estimate odometry from poses and inertial readings: a name from configs/estimators."
+GOALS_HELP = "Goals in turn, a path, or torques for excite: one of `fulmar list goals`, or a .yaml file."
+ESTIMATOR_HELP = "Estimate odometry, inertia, rates: names from configs/estimators, with commas."
 END_HELP = "An e-stop ends and fails the run; by default the robot waits for a reset and a new goal."
 AREA_HELP = "x_min, x_max, y_min, y_max, in space also z_min, z_max, not to be left [m]: --area=-2,2,-1,1."
 RECORDING_HELP = (
@@ -112,7 +112,7 @@ def run(
 
     fulmar run turtlebot2 --backend hardware --emulate --task go_to_position --seed 3
 
-    fulmar run turtlebot2 --task go_to_position --controller external
+    fulmar run cubesat_wheels --scenario gyro_dies --lockstep
     """
     from fulmar_bringup.goal_plan import task_of_run
     from fulmar_bringup.planning import plan_run
