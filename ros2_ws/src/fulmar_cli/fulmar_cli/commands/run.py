@@ -15,7 +15,7 @@ from fulmar_cli.commands.values import read_area, read_goal, read_pose
 
 RUN_TASK_HELP = (
     f"{cli.TASK_HELP} By default the goal decides: go_to_position for x,y, go_to_pose for x,y,deg and without a goal, "
-    "and the task that takes the goals of --goals. In space go_to_position_3d or go_to_pose_3d; satellites: slew, point."
+    "and the task that takes the goals of --goals. In space go_to_position_3d or go_to_pose_3d; satellites slew, point."
 )
 BACKEND_HELP = "mujoco, mock (Fulmar's own dynamics, perfect sensors) or hardware."
 DURATION_HELP = "Simulated seconds; the task's episode by default."
