@@ -9,26 +9,15 @@ from pathlib import Path
 
 import psutil
 import pytest
-from mcap.reader import make_reader
 
 from fulmar_core.paths import OWN_FOLDERS
 from tests.conftest import RosDomain
 from tests.ros.cli import fulmar, json_of, start_fulmar
+from tests.ros.wires import wires_of
 
 pytestmark = pytest.mark.real_time  # five processes at full speed leave other tests no processor
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "estimation.md"
 ESTIMATED = ("floating_platform", "--estimator", "mocap_imu", "--lockstep")
-HEALTH = ("/diagnostics", "/floating_platform/controller/status")  # these follow the wall clock
-
-
-def wires_of(bag: Path) -> dict[str, list[bytes]]:
-    """Every message of a bag by its topic, as it was on the wire, but for the health of nodes."""
-    found: dict[str, list[bytes]] = {}
-    for file in sorted(bag.glob("*.mcap")):
-        with file.open("rb") as stream:
-            for _, channel, message in make_reader(stream).iter_messages():
-                found.setdefault(channel.topic, []).append(message.data)
-    return {topic: data for topic, data in found.items() if topic not in HEALTH}
 
 
 @pytest.mark.slow

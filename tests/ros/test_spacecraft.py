@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from mcap.reader import make_reader
 
 from tests.conftest import RosDomain
 from tests.ros.cli import fulmar, json_of
+from tests.ros.wires import wires_of
 
 CONTROLLER = '''
 """Opens the valves that push and turn towards the goal."""
@@ -37,7 +37,6 @@ class Hold:
 OWN = ("--controller", "by_hand:Hold")
 GOAL = ("--goal", "0.5,0.2,-0.3,0,20,30", "--start", "0,0,0,-20,0,10")
 RUN = ("run", "spacecraft_16", *OWN, *GOAL, "--lockstep", "--seed", "3", "--duration", "40", "--json")
-HEALTH = ("/clock", "/diagnostics", "/spacecraft_16/controller/status")  # these follow the wall clock
 
 
 @pytest.fixture
@@ -45,16 +44,6 @@ def folder(tmp_path: Path) -> Path:
     """The current folder of every command, with the controller in it."""
     (tmp_path / "by_hand.py").write_text(CONTROLLER, encoding="utf-8")
     return tmp_path
-
-
-def wires_of(bag: Path) -> dict[str, list[bytes]]:
-    """Every message of a bag by its topic, as it was on the wire, but for those of the wall clock."""
-    found: dict[str, list[bytes]] = {}
-    (file,) = bag.glob("*.mcap")
-    with file.open("rb") as stream:
-        for _, channel, message in make_reader(stream).iter_messages():
-            found.setdefault(channel.topic, []).append(message.data)
-    return {topic: data for topic, data in found.items() if topic not in HEALTH}
 
 
 @pytest.mark.slow

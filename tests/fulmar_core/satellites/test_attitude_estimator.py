@@ -155,7 +155,7 @@ def test_attitudes_from_elsewhere_are_outliers_until_they_agree():
     assert (estimator.outliers, estimator.epoch) == (10, 1)
 
 
-@pytest.mark.parametrize("order", itertools.permutations(("star_tracker", "imu", "wheels")))
+@pytest.mark.parametrize("order", tuple(itertools.permutations(("star_tracker", "imu", "wheels"))))
 @pytest.mark.parametrize("every", [1, 4])
 def test_wheels_may_turn_the_body_fast_whatever_the_order_of_readings(order, every):
     """Each tenth of a second, the wheels' each `every` of them."""

@@ -302,3 +302,43 @@ def test_cameras_and_pixels_that_cannot_be_are_refused():
     with contextlib.suppress(ValueError):
         EventSensorSpec(noise_hz=-1.0)
         pytest.fail("a negative noise was taken")
+
+
+class TestChangingRates:
+    """Bodies that begin to turn."""
+
+    @pytest.mark.parametrize("degrees", [0.02, 1.0])
+    def test_a_body_that_turns_faster_and_faster_from_rest_gets_the_rate_of_each_middle(self, degrees):
+        change = np.radians(degrees) * np.array([0.6, -0.5, 0.62])
+        cameras = (CAMERA, SECOND_CAMERA)
+        estimator = EventRateEstimator(load_estimator("event_rate"), cameras)
+        sensors = [
+            EventSensor(each, EventSensorSpec(), load_stars(), name=str(k)) for k, each in enumerate(cameras)
+        ]
+        for number, sensor in enumerate(sensors):
+            sensor.reset(7, number)
+        attitude, seen = Rotation.from_quat(QUAT), {}
+        for step in range(24):
+            rate, begin, length = change * (0.05 * step + 0.025), step * 50_000_000, 50_000_000
+            for name, sensor in zip(("events", "events_2"), sensors, strict=True):
+                packet = sensor.expose(attitude.as_quat(), rate, begin, length)
+                assert estimator.take(name, Reading(packet, begin + length)) is None
+            attitude = attitude * Rotation.from_rotvec(0.05 * rate)
+            estimate = estimator.estimate()
+            if estimate is not None:
+                error = estimate.value - change * estimate.stamp_ns / 1e9
+                assert np.linalg.norm(estimate.value) < np.radians(2.0)
+                seen[estimate.stamp_ns] = error @ np.linalg.solve(estimate.covariance, error)
+        assert len(seen) >= 3
+        assert np.median(list(seen.values())) < 7.8  # 95 % of chi-squared with 3 degrees of freedom
+        assert list(seen.values())[-1] < 16.3
+
+    def test_stars_that_hardly_move_give_a_bound_and_no_rate(self):
+        estimator = EventRateEstimator(load_estimator("event_rate"), (CAMERA,))
+        rate = np.radians([0.001, -0.001, 0.0])
+        for step in range(6):
+            packet = watched(rate, seed=step)
+            shifted = replace(packet, t=packet.t + np.uint64(step * WINDOW))
+            estimator.take("events", Reading(shifted, (step + 1) * WINDOW))
+            assert estimator.estimate() is None
+        assert estimator.bound is not None or "too few" in estimator.problem

@@ -225,11 +225,10 @@ class AttitudeEstimator:
         speeds = dict(zip(reading.value.names, np.asarray(reading.value.speeds, dtype=float), strict=False))
         if not set(self._names) <= set(speeds):
             return f"wheels {', '.join(sorted(set(self._names) - set(speeds)))} are missing"
-        momentum = self._wheels.to_body(
-            self._wheels.spin_inertia * np.array([speeds[n] for n in self._names])
-        )
-        if not np.isfinite(momentum).all():
+        each = np.array([speeds[name] for name in self._names])
+        if not np.isfinite(each).all():
             return "a wheel reports a speed that is not finite"
+        momentum = self._wheels.to_body(self._wheels.spin_inertia * each)
         before, before_ns = self._momentum, self._spin_ns
         self._momentum, self._spin_ns = momentum, stamp_ns
         if not self._begun or before is None:

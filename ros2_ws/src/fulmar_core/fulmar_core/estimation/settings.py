@@ -145,10 +145,13 @@ class EventRateSettings(EstimatorSettings):
     kind: str = "event_rate"
     window_s: float = 0.2  # length of a window [s]
     longest_s: float = 1.0  # of the window that is used where a short one shows too little [s]
-    least_stars: int = 2  # in a window
+    least_stars: int = 6  # in a window: fewer may agree by chance
     limit_deg: float = 0.5  # standard deviation about an axis beyond which it is not observable [deg/s]
+    fastest_deg: float = 60.0  # a faster rate is a wrong one [deg/s]
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not 0.0 < self.window_s <= self.longest_s or self.least_stars < 1 or self.limit_deg <= 0.0:
-            raise ValueError("0 < window_s <= longest_s, least_stars >= 1 and limit_deg > 0 are needed.")
+        if not 0.0 < self.window_s <= self.longest_s or self.least_stars < 1:
+            raise ValueError("0 < window_s <= longest_s and least_stars >= 1 are needed.")
+        if min(self.limit_deg, self.fastest_deg) <= 0.0:
+            raise ValueError("limit_deg and fastest_deg must be greater than 0.")

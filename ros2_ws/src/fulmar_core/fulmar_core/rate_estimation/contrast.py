@@ -23,6 +23,8 @@ WARM_PX = (3.0, 2.5, 2.5)  # where the rate of the last window is a start
 # Errors of stars have causes in common that their scores do not show, such as rows of pixels: without it the normalised
 # error squared is 1.5 times what it should be (`fulmar benchmark events`).
 INFLATION = 1.6
+CHANGE_SHOWS = 16.3  # chi-squared, 3 degrees of freedom: 1 steady rate of 1,000 lies beyond it
+CHANGE_STEPS = 2
 
 
 @dataclass(frozen=True)
@@ -33,6 +35,7 @@ class RateFit:
     covariance: np.ndarray  # shape (3, 3) [rad²/s²]
     stars: int  # that it comes from
     contrast: float  # mean weight of the events of stars, 0 to 1 [-]
+    speed_px: float  # of the median star [px/s]
 
 
 def fit_rate(
@@ -54,18 +57,36 @@ def fit_rate(
     problem = [_Camera(each, camera) for each, camera in zip(tracks, cameras, strict=True) if each.count]
     for scale in SCALES_PX if start is None else WARM_PX:
         rate, weights = _step(problem, rate, scale)
-    information, scores, stars = np.zeros((3, 3)), np.zeros((3, 3)), 0
+    stars = sum(each.count for each in problem)
+    covariance = _covariance(problem, rate, weights, scale, stars)
+    # Where a rate changes within the window, the fast part of it makes more events than its middle: the change is
+    # estimated too, if it shows.
+    changing = _solved(problem, weights, 2)
+    its_covariance = _covariance(problem, changing, weights, scale, stars)
+    change = changing[3:]
+    if change @ np.linalg.pinv(its_covariance[3:, 3:], hermitian=True) @ change > CHANGE_SHOWS:
+        for _ in range(CHANGE_STEPS):
+            changing, weights = _step(problem, changing, scale)
+        rate, covariance = changing[:3], _covariance(problem, changing, weights, scale, stars)[:3, :3]
+    contrast = float(np.mean(np.concatenate(weights)))
+    speeds = np.concatenate([np.linalg.norm(each.field @ rate, axis=-1) for each in problem])
+    return RateFit(rate, covariance, stars, contrast, float(np.median(speeds)))
+
+
+def _covariance(
+    problem: Sequence[_Camera], motion: np.ndarray, weights: list[np.ndarray], scale: float, stars: int
+) -> np.ndarray:
+    """Covariance of a solution, shape (3, 3), or (6, 6) with a change."""
+    size = len(motion)
+    information, scores = np.zeros((size, size)), np.zeros((size, size))
     for each, weight in zip(problem, weights, strict=True):
-        one, many = each.scores(rate, weight, scale)
+        one, many = each.scores(motion, weight, scale)
         information += one
         scores += many
-        stars += each.count
     # Events of one star err together: their scores are added up before they are squared (Liang and Zeger, 1986).
     inverse = np.linalg.pinv(information, rcond=1e-10, hermitian=True)
     few = stars / max(stars - 2.0, 0.5)
-    covariance = INFLATION * few * inverse @ scores @ inverse
-    contrast = float(np.mean(np.concatenate(weights)))
-    return RateFit(rate, covariance, stars, contrast)
+    return np.asarray(INFLATION * few * inverse @ scores @ inverse)
 
 
 def _rate_of_flows(tracks: Sequence[Tracks], cameras: Sequence[StarCamera]) -> np.ndarray:
@@ -87,20 +108,24 @@ class _Camera:
         self.tracks, self.count = tracks, tracks.count
         self.groups = 2 * tracks.count
         self.camera = camera
+        t = tracks.times_s
+        self.times = np.stack((t, 0.5 * t * t))  # by which a rate and its change move a star
         self.field = self._field_at(local_flow(tracks).middle)
 
     def _field_at(self, middle: np.ndarray) -> np.ndarray:
         inside = np.clip(middle, 0.0, [self.camera.width - 1, self.camera.height - 1])
         return np.asarray(self.camera.motion_field(inside) @ self.camera.to_body.T)  # (stars, 2, 3)
 
-    def carried(self, rate: np.ndarray) -> np.ndarray:
+    def carried(self, motion: np.ndarray) -> np.ndarray:
         """Places of events in the middle of the window, shape (n, 2) [px]."""
-        velocity = self.field @ rate
-        return np.asarray(self.tracks.places - velocity[self.tracks.star] * self.tracks.times_s[:, None])
+        places, star = self.tracks.places, self.tracks.star
+        for part, time in zip(motion.reshape(-1, 3), self.times, strict=False):
+            places = places - (self.field @ part)[star] * time[:, None]
+        return np.asarray(places)
 
-    def weights(self, rate: np.ndarray, scale: float) -> np.ndarray:
+    def weights(self, motion: np.ndarray, scale: float) -> np.ndarray:
         """Gaussian of each event's distance from the middle of its star and polarity, shape (n,)."""
-        carried, group = self.carried(rate), self.tracks.group
+        carried, group = self.carried(motion), self.tracks.group
         weights = np.ones(len(group))
         for _ in range(2):
             middle = self._means(carried, weights)
@@ -116,37 +141,62 @@ class _Camera:
         ]
         return np.asarray(np.stack(parts, axis=-1) / total[:, None])
 
-    def normal(self, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Normal equations of the rate, places of stars left aside, shapes (3, 3) and (3,)."""
-        group, star = self.tracks.group, self.tracks.star
-        t = self.tracks.times_s - self._means(self.tracks.times_s[:, None], weights)[group, 0]
-        off = self.tracks.places - self._means(self.tracks.places, weights)[group]
-        lasting = np.bincount(star, weights * t * t, self.count)
-        moved = np.stack([np.bincount(star, weights * t * off[:, i], self.count) for i in range(2)], axis=-1)
-        information = np.einsum("nij,nik,n->jk", self.field, self.field, lasting)
-        return information, np.einsum("nij,ni->j", self.field, moved)
+    def normal(self, weights: np.ndarray, parts: int) -> tuple[np.ndarray, np.ndarray]:
+        """Normal equations of the motion, places of stars left aside, shapes (3 · parts,) * 2 and (3 · parts,)."""
+        times = self._off(self.times[:parts].T, weights).T
+        off = self._off(self.tracks.places, weights)
+        return self._information(weights, times), self._slopes(weights, times, off).sum(axis=0)
 
-    def scores(self, rate: np.ndarray, weights: np.ndarray, scale: float) -> tuple[np.ndarray, np.ndarray]:
-        """Curvature of the contrast, and the sum of squared slopes of each star's, shapes (3, 3)."""
-        group, star = self.tracks.group, self.tracks.star
-        t = self.tracks.times_s - self._means(self.tracks.times_s[:, None], weights)[group, 0]
-        carried = self.carried(rate)
-        off = carried - self._means(carried, weights)[group]
+    def scores(self, motion: np.ndarray, weights: np.ndarray, scale: float) -> tuple[np.ndarray, np.ndarray]:
+        """Curvature of the contrast, and the sum of squared slopes of each star's, shapes as of `normal`."""
+        times = self._off(self.times[: len(motion) // 3].T, weights).T
+        off = self._off(self.carried(motion), weights)
         bent = weights * (
             1.0 - 0.5 * np.sum(off * off, axis=-1) / scale**2
         )  # second derivative of the Gaussian
-        lasting = np.maximum(np.bincount(star, bent * t * t, self.count), 0.0)
-        moved = np.stack([np.bincount(star, weights * t * off[:, i], self.count) for i in range(2)], axis=-1)
-        each = np.einsum("nij,ni->nj", self.field, moved)
-        return np.einsum("nij,nik,n->jk", self.field, self.field, lasting), each.T @ each
+        each = self._slopes(weights, times, off)
+        return self._information(bent, times), each.T @ each
+
+    def _off(self, values: np.ndarray, weights: np.ndarray) -> np.ndarray:
+        """Values without the mean of their star and polarity."""
+        return np.asarray(values - self._means(values, weights)[self.tracks.group])
+
+    def _information(self, weights: np.ndarray, times: np.ndarray) -> np.ndarray:
+        """Information of the motion: `times` has the time factor of each part of it, shape (parts, n)."""
+        rows = [
+            [
+                np.einsum(
+                    "nij,nik,n->jk", self.field, self.field,
+                    np.maximum(np.bincount(self.tracks.star, weights * a * b, self.count), 0.0 if a is b else -np.inf),
+                )
+                for b in times
+            ]
+            for a in times
+        ]  # fmt: skip
+        return np.block(rows)
+
+    def _slopes(self, weights: np.ndarray, times: np.ndarray, off: np.ndarray) -> np.ndarray:
+        """What each star pulls the motion by, shape (stars, 3 · parts)."""
+        pulled = []
+        for time in times:
+            moved = [np.bincount(self.tracks.star, weights * time * off[:, i], self.count) for i in range(2)]
+            pulled.append(np.einsum("nij,ni->nj", self.field, np.stack(moved, axis=-1)))
+        return np.concatenate(pulled, axis=-1)
 
 
-def _step(problem: Sequence[_Camera], rate: np.ndarray, scale: float) -> tuple[np.ndarray, list[np.ndarray]]:
-    """Weights of the events at a rate, and the rate that they give."""
-    weights = [each.weights(rate, scale) for each in problem]
-    information, aim = np.zeros((3, 3)), np.zeros(3)
+def _step(
+    problem: Sequence[_Camera], motion: np.ndarray, scale: float
+) -> tuple[np.ndarray, list[np.ndarray]]:
+    """The motion that the weights of events under another one give, and those weights."""
+    weights = [each.weights(motion, scale) for each in problem]
+    return _solved(problem, weights, len(motion) // 3), weights
+
+
+def _solved(problem: Sequence[_Camera], weights: list[np.ndarray], parts: int) -> np.ndarray:
+    """The motion that weighted events give: a rate, shape (3,) [rad/s], or with its change, shape (6,) [rad/s²]."""
+    information, aim = np.zeros((3 * parts, 3 * parts)), np.zeros(3 * parts)
     for each, weight in zip(problem, weights, strict=True):
-        one, other = each.normal(weight)
+        one, other = each.normal(weight, parts)
         information += one
         aim += other
-    return np.asarray(np.linalg.lstsq(information, aim, rcond=1e-10)[0]), weights
+    return np.asarray(np.linalg.lstsq(information, aim, rcond=1e-10)[0])

@@ -22,6 +22,10 @@ from fulmar_core.sky.star_camera import StarCamera
 
 AXES = "xyz"
 NO_EVENTS = "no events yet. Does the camera run?"
+LEAST_PX = (
+    1.0,
+    0.5,
+)  # of motion in a window, the longest one last: events of less show pixels rather than a rate
 BOUND_PX = 2.0  # a star that moves so far in a window makes events enough to be found
 UNKNOWN_STD = 1.0  # of an axis about which nothing is observable [rad/s]
 SILENT = 3  # windows without a camera's events, after which the other goes on alone
@@ -52,7 +56,7 @@ class EventRateEstimator:
         self.bound: float | None = None
         self._packets: dict[str, deque[tuple[int, Events]]] = {name: deque() for name in self._cameras}
         self._until_ns: dict[str, int] = {}  # end of the newest packet, by camera
-        self._window_ns = -1  # where the next window begins
+        self._window_ns = self._begun_ns = -1  # where the next window begins, and where the first one began
         self._estimate: Estimate | None = None
         self._noise_hz = 0.0
         self._events_hz = 0.0
@@ -85,7 +89,7 @@ class EventRateEstimator:
         self._packets[name].append((reading.stamp_ns, packet))
         if self._window_ns < 0:
             begin = int(packet.t[0]) if len(packet) else reading.stamp_ns
-            self._window_ns = begin
+            self._window_ns = self._begun_ns = begin
         self._run()
         return None
 
@@ -129,15 +133,20 @@ class EventRateEstimator:
         """Estimate the window that ends at a time; where it shows too little, with those before it as one."""
         s = self._settings
         self.fit = None
-        for seconds in dict.fromkeys((s.window_s, s.longest_s)):
-            begin_ns = end_ns - round(1e9 * seconds)
+        for seconds, least_px in {s.window_s: LEAST_PX[0], s.longest_s: LEAST_PX[1]}.items():
+            begin_ns = max(end_ns - round(1e9 * seconds), self._begun_ns)
             tracks = self._tracks(begin_ns, end_ns)
             if not tracks:
                 self.problem = "no events in this window"
                 return
             start = self._estimate.value if self._estimate is not None and self._fresh(end_ns) else None
             fit = fit_rate(list(tracks.values()), [self._cameras[name] for name in tracks], start=start)
-            if fit is not None and fit.stars >= s.least_stars and self._is_good(fit):
+            moved = (
+                fit is not None
+                and fit.stars >= s.least_stars
+                and fit.speed_px * (end_ns - begin_ns) >= 1e9 * least_px
+            )
+            if fit is not None and moved and self._is_good(fit):
                 covariance = np.minimum(fit.covariance, UNKNOWN_STD**2)
                 self.fit, self.bound, self.problem = replace(fit, covariance=covariance), None, ""
                 self._estimate = Estimate(fit.rate, covariance, (begin_ns + end_ns) // 2)
@@ -160,8 +169,10 @@ class EventRateEstimator:
         return end_ns - self._estimate.stamp_ns < 2.1e9 * self._settings.window_s
 
     def _is_good(self, fit: RateFit) -> bool:
-        """Whether a fit determines the two axes across a boresight at least."""
-        if not np.isfinite(fit.covariance).all():
+        """Whether a fit is a rate that can be, and determines the two axes across a boresight at least."""
+        if not np.isfinite(fit.covariance).all() or np.linalg.norm(fit.rate) > np.radians(
+            self._settings.fastest_deg
+        ):
             return False
         return bool(np.linalg.eigvalsh(fit.covariance)[1] < np.radians(self._settings.limit_deg) ** 2)
 

@@ -50,6 +50,7 @@ def find_tracks(events: Events, begin_ns: int, end_ns: int) -> Tracks:
     mean = -np.log(max(empty, 1e-6))
     dense = _around(np.minimum(counts, MOST_IN_PIXEL).astype(np.uint16)) >= _threshold(mean * SIDE * SIDE)
     label, found = ndimage.label(dense, structure=np.ones((3, 3)))
+    label = label.astype(np.uint16) if found < 1 << 16 else label  # half as much memory to move
     of_event = _nearest_label(label)[events.y, events.x] if found else np.zeros(len(pixel), dtype=int)
     kept = np.flatnonzero(of_event)
     star = of_event[kept]
