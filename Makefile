@@ -23,7 +23,7 @@ MESSAGES_LOCK := ros2_ws/src/fulmar_bringup/fulmar_bringup/tf2_msgs/requirements
 # Of .venv after an install on x86-64 [MiB], measured by `du -s --block-size=1M .venv`; the last one of .venv-peers.
 RUN_SIZE := 884
 DEV_SIZE := 7053
-PEERS_SIZE := 8452
+PEERS_SIZE := 8838
 
 # A sourced ROS shell puts its own packages before those of .venv; the two must not mix.
 unexport PYTHONPATH
@@ -83,7 +83,7 @@ tf: $(RUN_STAMP) $(TF_STAMP) ## Build the message package of /tf, for RViz and F
 dev: $(DEV_STAMP) $(if $(HAS_ROS_WHEELS),$(TF_STAMP)) $(STARS_STAMP) ## Install everything, also for training and tests (6.9 GiB)
 
 .PHONY: peers
-peers: $(PEERS_STAMP) ## Install the outside programs that tests compare with, into .venv-peers (8.3 GiB)
+peers: $(PEERS_STAMP) ## Install the outside programs that tests compare with, into .venv-peers (8.6 GiB)
 
 $(VENV)/bin/python $(PEERS)/bin/python:
 	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 14))' || { \

@@ -31,6 +31,7 @@ EXTRAS: dict[str, tuple[str, ...]] = {
     "bags": ("mcap", "rosbags", "mcap_ros2", "zstandard"),
     "hardware": ("filterpy", "serial", "gpiod", "pymavlink"),
     "view": ("matplotlib",),
+    "events": ("h5py", "hdf5plugin", "aedat"),
     "datasets": ("pyarrow",),
     "train": ("torch", "stable_baselines3", "sb3_contrib", "gymnasium", "onnx", "tensorboard"),
     "cluster": ("ray",),

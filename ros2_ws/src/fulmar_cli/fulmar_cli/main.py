@@ -33,6 +33,7 @@ from fulmar_cli.commands.install_tf import install_tf
 from fulmar_cli.commands.layout import layout
 from fulmar_cli.commands.list import list_names
 from fulmar_cli.commands.policies import policies
+from fulmar_cli.commands.rates import rates
 from fulmar_cli.commands.report import report
 from fulmar_cli.commands.run import run
 from fulmar_cli.commands.service import service
@@ -103,6 +104,7 @@ app.add_typer(check, name="check")
 app.add_typer(service, name="service")
 app.command()(report)
 app.command()(identify)
+app.command()(rates)
 app.command()(demo)
 app.command()(doctor)
 app.command()(install_tf)

@@ -11,6 +11,7 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu, PointCloud2
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension, MultiArrayLayout
 
+from fulmar_bags.event_packets import events_of_cloud
 from fulmar_bags.message_reader import reading_of, stamp_ns
 from fulmar_core.errors import shortened
 from fulmar_core.estimation.estimator import Estimate
@@ -22,7 +23,6 @@ from fulmar_core.sensors.reading import Reading
 from fulmar_core.sensors.table import SENSORS
 from fulmar_core.topics import EVENTS, EVENTS_2, IMU, INERTIA, INERTIA_COVARIANCE, MOCAP, ODOMETRY, RATE, Wire
 from fulmar_ros.convert import OdometryWriter, stamp_of
-from fulmar_ros.event_packets import events_of_cloud
 from fulmar_ros.message_class import message_class
 
 FRAMES = ("odom", "map", "world")  # names of the room in motion captures; all with Z up
