@@ -92,11 +92,21 @@ def test_torch_plays_every_task_as_numpy_does(name):
     assert_alike(robot_for(task, load_robot("leatherback")), task, "float64", "cpu")
 
 
-@pytest.mark.skipif(
+ON_A_CARD = pytest.mark.skipif(
     not torch.cuda.is_available(), reason="no CUDA device; the same comparison on the processor runs above"
 )
+
+
+@ON_A_CARD
 @pytest.mark.parametrize("dtype", CLOSE)
 @pytest.mark.parametrize("name", ROBOTS)
 def test_a_graphics_card_moves_every_robot_as_numpy_does(name, dtype):
     robot = load_robot(name)
     assert_alike(robot, busiest(robot), dtype, "cuda")
+
+
+@ON_A_CARD
+@pytest.mark.parametrize("name", TASKS)
+def test_a_graphics_card_plays_every_task_as_numpy_does(name):
+    task = load_task(name)
+    assert_alike(robot_for(task, load_robot("leatherback")), task, "float64", "cuda")

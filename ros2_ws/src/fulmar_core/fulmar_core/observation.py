@@ -40,9 +40,11 @@ class Observer:
         """
         terms = self._task.observe(state, goal)
         xp = array_namespace(state.like)
-        shape = state.like.shape
+        shape, place = state.like.shape, device(state.like)
         columns = [
-            term if getattr(term, "shape", None) == shape else xp.broadcast_to(xp.asarray(term), shape)
+            term
+            if getattr(term, "shape", None) == shape
+            else xp.broadcast_to(xp.asarray(term, device=place), shape)
             for term in terms
         ]
         if self._remembers:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from array_api_compat import device
+
 from fulmar_core.arrays import array_namespace, clip
 from fulmar_core.attitude import exponential, normalised, product
 from fulmar_core.counter_rng import normal_from, uniform_from
@@ -55,7 +57,7 @@ class SpatialOdometer(Odometer[SpatialState]):
     def _errors(self, columns: Array, world: SpatialWorld, bits: Array) -> Array:
         """Bias, noise and blur of each channel, shape (12, n)."""
         xp = array_namespace(columns)
-        error = xp.zeros((SENSED, columns.shape[1]), dtype=columns.dtype)
+        error = xp.zeros((SENSED, columns.shape[1]), dtype=columns.dtype, device=device(columns))
         if "bias_std" in self._used:
             error = error + self._constant("bias_std", columns) * world.sensor_bias
         if "std" in self._used:

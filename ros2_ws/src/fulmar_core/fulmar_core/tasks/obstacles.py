@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from array_api_compat import device
 
 from fulmar_core.arrays import array_namespace, clip
 from fulmar_core.counter_rng import Draws
@@ -95,7 +96,7 @@ class Obstacles:
         x, y, gap = _relative(state, obstacles)
         missing = self.seen - obstacles.shape[-2]
         if missing > 0:
-            pad = xp.zeros((*x.shape[:-1], missing), dtype=x.dtype)
+            pad = xp.zeros((*x.shape[:-1], missing), dtype=x.dtype, device=device(x))
             x, y, gap = (xp.concat((a, pad + b), axis=-1) for a, b in ((x, -FAR), (y, 0.0), (gap, FAR)))
         order = xp.argsort(gap, axis=-1)[..., : self.seen]
         x, y, gap = (xp.take_along_axis(a, order, axis=-1) for a in (x, y, gap))

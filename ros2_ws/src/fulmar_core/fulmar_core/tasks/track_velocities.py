@@ -6,6 +6,8 @@ import math
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Literal
 
+from array_api_compat import device
+
 from fulmar_core.arrays import array_namespace, clip
 from fulmar_core.counter_rng import Draws
 from fulmar_core.goal import Goal, no_obstacles
@@ -93,7 +95,7 @@ class TrackVelocities(Task[PlanarState]):
         """Targets at every `STEP_S`, which turn at some rates [rad/s] while they hold, shape (worlds, steps, 3)."""
         xp = array_namespace(targets)
         steps = round(self.hold_s / STEP_S)
-        angle = rates[..., None] * STEP_S * xp.arange(steps, dtype=targets.dtype)
+        angle = rates[..., None] * STEP_S * xp.arange(steps, dtype=targets.dtype, device=device(targets))
         c, s = xp.cos(angle), xp.sin(angle)
         u, v = targets[..., 0, None], targets[..., 1, None]
         turned = xp.stack((c * u - s * v, s * u + c * v, targets[..., 2, None] + 0.0 * c), axis=-1)
