@@ -14,7 +14,7 @@ SIGMAS = 1.96  # of a band: 95 %
 
 
 def write_rate_plot(rates: Rates, path: Path) -> None:
-    """Draw the rates of every window into a picture; its ending says of which kind.
+    """Draw the rates of every window into a file; its ending says of which kind.
 
     Raises:
         OSError: It cannot be written.
