@@ -22,10 +22,10 @@ import numpy as np
 from fulmar_core.actuators.reaction_wheels import ReactionWheels
 from fulmar_core.attitude import exponential, normalised, product, rotation_error
 from fulmar_core.estimation.estimator import Estimate
+from fulmar_core.estimation.reading_times import ReadingTimes, TimeJumpError
 from fulmar_core.estimation.settings import AttitudeSettings
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import rotate
-from fulmar_core.safety.input_gate import BACK_NS, FORWARD_NS
 from fulmar_core.sensors.reading import Reading
 from fulmar_core.state import RigidBodyState
 
@@ -63,7 +63,7 @@ class AttitudeEstimator:
         self.problem = NO_ATTITUDE
         self._begun = False
         self._stamp_ns = 0
-        self._newest_ns: dict[str, int] = {}
+        self._times = ReadingTimes()
         self._momentum: np.ndarray | None = None  # of the wheels, in the body [N·m·s]
         self._held: list[
             tuple[int, Callable[[int], str]]
@@ -83,20 +83,16 @@ class AttitudeEstimator:
         }
         if name not in takers:
             return f"reading '{name}' is not known here, only {', '.join(takers)}"
-        stamp_ns = reading.stamp_ns
-        if stamp_ns is None:
-            return f"reading of '{name}' has no stamp"
-        last_ns = self._newest_ns.get(name)
-        if last_ns is not None:
-            ahead = stamp_ns - last_ns
-            if not -BACK_NS <= ahead <= FORWARD_NS:
-                self._forget()
-                self.epoch += 1
-                return f"time of '{name}' jumped by {ahead / 1e9:+.1f} s: a new epoch begins"
-            if ahead <= 0:
-                return f"stamp of '{name}' did not advance"
-        self._newest_ns[name] = stamp_ns
-        return takers[name](reading, stamp_ns) or None
+        try:
+            problem = self._times.problem(name, reading.stamp_ns)
+        except TimeJumpError as jump:
+            self._forget()
+            self.epoch += 1
+            return str(jump)
+        if problem:
+            return problem
+        assert reading.stamp_ns is not None  # as of the line above
+        return takers[name](reading, reading.stamp_ns) or None
 
     def estimate(self, stamp_ns: int | None = None) -> Estimate | None:
         """See `Estimator.estimate`."""

@@ -16,11 +16,16 @@ class EstimatorSettings:
         0.0  # from capture to the stamp of a pose, as measured; 0: sources stamp at capture [s]
     )
 
+    POSITIVE: ClassVar[tuple[str, ...]] = ()  # names of entries that must be greater than 0
+
     def __post_init__(self) -> None:
         if not self.bridge_s > 0.0:
             raise ValueError(f"'bridge_s' = {self.bridge_s:g} must be greater than 0.")
         if not 0.0 <= self.latency_s <= 1.0:
             raise ValueError(f"'latency_s' = {self.latency_s:g} must be from 0 to 1 s.")
+        for name in self.POSITIVE:
+            if not getattr(self, name) > 0.0:
+                raise ValueError(f"'{name}' = {getattr(self, name):g} must be greater than 0.")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,9 +53,6 @@ class MotionSettings(EstimatorSettings):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for name in self.POSITIVE:
-            if not getattr(self, name) > 0.0:
-                raise ValueError(f"'{name}' = {getattr(self, name):g} must be greater than 0.")
         if min(self.accelerometer_drift, self.gyroscope_drift) < 0.0:
             raise ValueError("accelerometer_drift and gyroscope_drift must not be negative.")
 
@@ -97,9 +99,6 @@ class AttitudeSettings(EstimatorSettings):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for name in self.POSITIVE:
-            if not getattr(self, name) > 0.0:
-                raise ValueError(f"'{name}' = {getattr(self, name):g} must be greater than 0.")
         if min(self.gyroscope_drift, self.wheel_std, self.inertia_share) < 0.0:
             raise ValueError("gyroscope_drift, wheel_std and inertia_share must not be negative.")
 
@@ -125,12 +124,6 @@ class InertiaSettings(EstimatorSettings):
     POSITIVE: ClassVar[tuple[str, ...]] = (
         "every_s", "gyroscope_std", "wheel_std", "guess", "spread", "walk", "memory_s", "known_share",
     )  # fmt: skip
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        for name in self.POSITIVE:
-            if not getattr(self, name) > 0.0:
-                raise ValueError(f"'{name}' = {getattr(self, name):g} must be greater than 0.")
 
     @property
     def count(self) -> int:

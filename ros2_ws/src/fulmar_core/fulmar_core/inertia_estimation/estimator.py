@@ -13,13 +13,13 @@ import numpy as np
 
 from fulmar_core.actuators.reaction_wheels import ReactionWheels
 from fulmar_core.estimation.estimator import Estimate
+from fulmar_core.estimation.reading_times import ReadingTimes, TimeJumpError
 from fulmar_core.estimation.settings import InertiaSettings
 from fulmar_core.inertia_estimation.batch import SPAN_S, batch_fit
 from fulmar_core.inertia_estimation.ekf import EkfSettings, InertiaFilter
 from fulmar_core.inertia_estimation.momentum_balance import FULL, is_body, numbers_of, tensor_of
 from fulmar_core.inertia_estimation.recursive import RecursiveFit
 from fulmar_core.robot import Robot
-from fulmar_core.safety.input_gate import BACK_NS, FORWARD_NS
 from fulmar_core.sensors.reading import Reading
 
 AXES = "xyz"
@@ -51,7 +51,7 @@ class InertiaEstimator:
         s = self._settings
         self.problem = NOT_BEGUN
         self.saturated: tuple[str, ...] = ()
-        self._newest_ns: dict[str, int] = {}
+        self._times = ReadingTimes()
         self._waiting: dict[str, deque[tuple[int, np.ndarray]]] = {"imu": deque(), "wheels": deque()}
         self._samples: deque[tuple[float, np.ndarray, np.ndarray]] = deque(maxlen=MOST_SAMPLES)
         self._first_ns = self._last_ns = -1
@@ -67,23 +67,18 @@ class InertiaEstimator:
         """See `Estimator.take`."""
         if name not in self._waiting:
             return f"reading '{name}' is not known here, only {', '.join(self._waiting)}"
-        stamp_ns = reading.stamp_ns
-        if stamp_ns is None:
-            return f"reading of '{name}' has no stamp"
-        last_ns = self._newest_ns.get(name)
-        if last_ns is not None:
-            ahead = stamp_ns - last_ns
-            if not -BACK_NS <= ahead <= FORWARD_NS:
-                self._forget()
-                self.epoch += 1
-                return f"time of '{name}' jumped by {ahead / 1e9:+.1f} s: a new epoch begins"
-            if ahead <= 0:
-                return f"stamp of '{name}' did not advance"
-        self._newest_ns[name] = stamp_ns
+        try:
+            problem = self._times.problem(name, reading.stamp_ns)
+        except TimeJumpError as jump:
+            self._forget()
+            self.epoch += 1
+            return str(jump)
+        if problem:
+            return problem
         value, problem = self._rate_of(reading) if name == "imu" else self._momentum_of(reading)
         if problem:
             return problem
-        self._waiting[name].append((stamp_ns, value))
+        self._waiting[name].append((reading.stamp_ns or 0, value))
         self._pair()
         return None
 

@@ -12,10 +12,10 @@ from dataclasses import replace
 import numpy as np
 
 from fulmar_core.estimation.estimator import Estimate
+from fulmar_core.estimation.reading_times import ReadingTimes, TimeJumpError
 from fulmar_core.estimation.settings import EventRateSettings
 from fulmar_core.rate_estimation.contrast import RateFit, fit_rate
 from fulmar_core.rate_estimation.star_tracks import Tracks, find_tracks
-from fulmar_core.safety.input_gate import BACK_NS, FORWARD_NS
 from fulmar_core.sensors.reading import Reading
 from fulmar_core.sky.events import Events, joined
 from fulmar_core.sky.star_camera import StarCamera
@@ -55,6 +55,7 @@ class EventRateEstimator:
         self.fit: RateFit | None = None
         self.bound: float | None = None
         self._packets: dict[str, deque[tuple[int, Events]]] = {name: deque() for name in self._cameras}
+        self._times = ReadingTimes()
         self._until_ns: dict[str, int] = {}  # end of the newest packet, by camera
         self._window_ns = self._begun_ns = -1  # where the next window begins, and where the first one began
         self._estimate: Estimate | None = None
@@ -65,8 +66,6 @@ class EventRateEstimator:
         """See `Estimator.take`."""
         if name not in self._cameras:
             return f"reading '{name}' is not known here, only {', '.join(self._cameras)}"
-        if reading.stamp_ns is None:
-            return f"packet of '{name}' has no stamp"
         packet: Events = reading.value
         camera = self._cameras[name]
         if not packet.width:  # a message does not say how large its camera is
@@ -76,19 +75,19 @@ class EventRateEstimator:
             return f"packet of '{name}' comes from a camera of {its} pixels, and the robot's has {ours}"
         if problem := packet.problem():
             return f"packet of '{name}': {problem}"
-        last_ns = self._until_ns.get(name)
-        if last_ns is not None:
-            ahead = reading.stamp_ns - last_ns
-            if not -BACK_NS <= ahead <= FORWARD_NS:
-                self._forget()
-                self.epoch += 1
-                return f"time of '{name}' jumped by {ahead / 1e9:+.1f} s: a new epoch begins"
-            if ahead <= 0:
-                return f"packet of '{name}' is out of order: it ends {-ahead / 1e9:g} s before one that came earlier"
-        self._until_ns[name] = reading.stamp_ns
-        self._packets[name].append((reading.stamp_ns, packet))
+        try:
+            problem = self._times.problem(name, reading.stamp_ns)
+        except TimeJumpError as jump:
+            self._forget()
+            self.epoch += 1
+            return str(jump)
+        if problem:
+            return problem
+        end_ns = reading.stamp_ns or 0
+        self._until_ns[name] = end_ns
+        self._packets[name].append((end_ns, packet))
         if self._window_ns < 0:
-            begin = int(packet.t[0]) if len(packet) else reading.stamp_ns
+            begin = int(packet.t[0]) if len(packet) else end_ns
             self._window_ns = self._begun_ns = begin
         self._run()
         return None
