@@ -268,9 +268,7 @@ class TestEstimator:
         unknown = replace(small, x=np.array([1279], dtype=np.uint16), width=0, height=0)
         assert "of a camera of another size" in estimator.take("events", Reading(unknown, last + 1))
         good = no_events(1024, 1024)
-        assert "is out of order: 0.1 s before" in estimator.take(
-            "events", Reading(good, last - 100_000_000)
-        )
+        assert "is out of order: 0.1 s before" in estimator.take("events", Reading(good, last - 100_000_000))
         backwards = replace(
             small, x=np.zeros(2, np.uint16), y=np.zeros(2, np.uint16), t=np.array([5, 1], np.uint64),
             p=np.zeros(2, np.uint8), width=1024, height=1024,
