@@ -26,7 +26,7 @@ SPARE = 0.9  # share of torque and momentum that a profile may take which must n
 SWITCH_S = 20.0  # of the pseudorandom binary sequence
 OWN = "persistent"  # name of our own profile
 # Of our own profile: share of the momentum and of the torque that it uses, and how long each axis stays at an end.
-SHARE, PUSH, HOLDS_S = 0.9, 0.95, (20.0, 31.0, 13.0)
+SHARE, PUSH, HOLDS_S = 0.9, 0.95, (5.0, 8.0, 3.0)
 
 
 @dataclass(frozen=True)
@@ -145,8 +145,9 @@ def _persistent(t: np.ndarray, *, wheels: ReactionWheels) -> np.ndarray:
     Information about the inertia comes from momenta that change, and, where wheels are large beside the body, far more
     from bodies that turn fast about several axes at once: over a few seconds ω × J ω moves more momentum than a motor.
     So every wheel is at an end of its range whenever it is not on its way to the other one, and the three ways differ
-    in length, so that every product of rates comes up. By the D-criterion (the determinant of the information of all
-    six numbers, a second) of `fulmar benchmark inertia`.
+    in length, so that every product of rates comes up. The stays are short, so that an inertia that swings within a
+    minute is followed; longer ones have a larger D-criterion (the determinant of the information of all six numbers, a
+    second; `fulmar benchmark inertia`), up to 1.4 times that of the study's best profile, and do not.
     """
     columns = []
     torque = PUSH * wheels.torque
