@@ -74,17 +74,17 @@ def draw_carried() -> Figure:
     events = sensor.expose(quat, rate, 0, 200_000_000)
     tracks = find_tracks(events, 0, 200_000_000)
     fit = fit_rate([tracks], [camera])
-    figure = Figure(figsize=(7.2, 3.7), layout="constrained")
+    figure = Figure(figsize=(7.2, 4.2), layout="constrained")
     left, right = figure.subplots(1, 2, sharex=True, sharey=True)
     for value, colour in ((0, "#d6336c"), (1, "#1c7ed6")):
         some = events.p == value
-        left.plot(events.x[some], events.y[some], ",", color=colour, alpha=0.6)
+        left.plot(events.x[some], events.y[some], ",", color=colour, alpha=0.6, rasterized=True)
     if fit is not None:
         velocity = camera.motion_field(tracks.places) @ (camera.to_body.T @ fit.rate)
         carried = tracks.places - velocity * tracks.times_s[:, None]
         for value, colour in ((0, "#d6336c"), (1, "#1c7ed6")):
             some = tracks.group % 2 == value
-            right.plot(*carried[some].T, ",", color=colour, alpha=0.6)
+            right.plot(*carried[some].T, ",", color=colour, alpha=0.6, rasterized=True)
     for axes, title in ((left, "as they came"), (right, "carried")):
         axes.set_title(title)
         axes.set_aspect("equal")
@@ -108,7 +108,7 @@ def draw_errors(document: dict[str, Any]) -> Figure:
         axes.set_yscale("symlog", linthresh=1e-3)
         quiet_grid(axes)
     panels[0].set_ylabel("error [°/s]")
-    panels[0].legend()
+    panels[1].legend(loc="lower right", ncols=3)
     return figure
 
 
