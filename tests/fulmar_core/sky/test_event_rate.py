@@ -331,6 +331,13 @@ class TestChangingRates:
         assert np.median(list(seen.values())) < 7.8  # 95 % of chi-squared with 3 degrees of freedom
         assert list(seen.values())[-1] < 16.3
 
+    def test_packets_that_do_not_come_are_counted(self):
+        estimator = EventRateEstimator(load_estimator("event_rate"), (CAMERA,))
+        for tenth in (1, 2, 3, 6, 7, 9):
+            reading = Reading(no_events(CAMERA.width, CAMERA.height), tenth * 100_000_000)
+            assert estimator.take("events", reading) is None
+        assert estimator.status()["packets_lost"] == "3"
+
     def test_stars_that_hardly_move_give_a_bound_and_no_rate(self):
         estimator = EventRateEstimator(load_estimator("event_rate"), (CAMERA,))
         rate = np.radians([0.001, -0.001, 0.0])

@@ -25,6 +25,7 @@ from fulmar_core.process import CONTROL_PRIORITY, take_priority_with_helpers
 from fulmar_core.robot import load_robot
 from fulmar_core.sensors.reading import Reading
 from fulmar_core.topics import ODOMETRY, Wire
+from fulmar_ros.deadline import Spread
 from fulmar_ros.estimator_wires import READERS, WRITERS, Read, Write
 from fulmar_ros.frame_wires import odometry_transform
 from fulmar_ros.health import Health
@@ -72,6 +73,7 @@ class EstimatorNode(Node):
         self._published_ns = -1
         self._published, self._refused = 0, 0
         self._problem, self._refusal = self._estimator.problem, ""
+        self._computation_ms = Spread()  # of each reading
         self._received_s = time.monotonic()
         self._prior = settings.lockstep  # whether this thread has what priority it needs
         self._said: tuple[object, ...] = ()
@@ -129,7 +131,9 @@ class EstimatorNode(Node):
         if not self._prior:
             take_priority_with_helpers(CONTROL_PRIORITY)  # a controller waits for us
             self._prior = True
+        begun_s = time.perf_counter()
         refusal = reading if isinstance(reading, str) else self._estimator.take(name, reading)
+        self._computation_ms.add(1e3 * (time.perf_counter() - begun_s))
         if refusal is not None:
             self._refused += 1
             self._refusal = refusal
@@ -188,6 +192,7 @@ class EstimatorNode(Node):
             "last_refusal": self._refusal,
             "epoch": str(self._estimator.epoch),
             "stale": str(bool(problem)).lower(),
+            **self._computation_ms.percentiles("computation_ms"),
         }
         values |= self._estimator.status()
         self._health.publish("warn" if problem else "ok", problem or "estimating", values)

@@ -37,6 +37,7 @@ class EventRateEstimator:
     Attributes:
         bound: Upper bound of the turn rate across the boresight where no star moves; None where one does [rad/s].
         fit: Of the newest window; None where it has none.
+        packets_lost: Packets that did not come, by the time between those that did.
     """
 
     def __init__(self, settings: EventRateSettings, cameras: tuple[StarCamera, ...]) -> None:
@@ -47,7 +48,7 @@ class EventRateEstimator:
 
     def reset(self) -> None:
         """See `Estimator.reset`."""
-        self.outliers, self.epoch = 0, 0
+        self.outliers, self.epoch, self.packets_lost = 0, 0, 0
         self._forget()
 
     def _forget(self) -> None:
@@ -56,6 +57,7 @@ class EventRateEstimator:
         self.bound: float | None = None
         self._packets: dict[str, deque[tuple[int, Events]]] = {name: deque() for name in self._cameras}
         self._times = ReadingTimes()
+        self._spacing_ns: dict[str, int] = {}  # shortest time between two packets, by camera
         self._until_ns: dict[str, int] = {}  # end of the newest packet, by camera
         self._window_ns = self._begun_ns = -1  # where the next window begins, and where the first one began
         self._estimate: Estimate | None = None
@@ -84,6 +86,7 @@ class EventRateEstimator:
         if problem:
             return problem
         end_ns = reading.stamp_ns or 0
+        self._count_lost(name, end_ns)
         self._until_ns[name] = end_ns
         self._packets[name].append((end_ns, packet))
         if self._window_ns < 0:
@@ -91,6 +94,13 @@ class EventRateEstimator:
             self._window_ns = self._begun_ns = begin
         self._run()
         return None
+
+    def _count_lost(self, name: str, end_ns: int) -> None:
+        last_ns = self._until_ns.get(name)
+        if last_ns is not None:
+            spacing_ns = min(self._spacing_ns.get(name, end_ns - last_ns), end_ns - last_ns)
+            self._spacing_ns[name] = spacing_ns
+            self.packets_lost += round((end_ns - last_ns) / spacing_ns) - 1
 
     def estimate(self, stamp_ns: int | None = None) -> Estimate | None:
         """See `Estimator.estimate`: that of the newest window, until it is `bridge_s` old; its stamp is its own."""
@@ -104,6 +114,7 @@ class EventRateEstimator:
     def status(self) -> dict[str, str]:
         """See `Estimator.status`."""
         found = {"noise_hz_per_pixel": f"{self._noise_hz:.3g}", "events_per_s": f"{self._events_hz:.0f}"}
+        found["packets_lost"] = str(self.packets_lost)
         found["stars"] = str(self.fit.stars if self.fit else 0)
         found["not_observable"] = ", ".join(self._unobservable()) or "none"
         if self.bound is not None:
