@@ -7,14 +7,16 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from fulmar_bringup.system import NONE, Guards
+from fulmar_core.estimation.kinds import KINDS
 from fulmar_core.recording import Recording
 from fulmar_core.robot_name import Frames, frames_of, namespace_of
 
 Parameter = bool | int | float | str | list[float] | list[int] | list[str]
 PLANT, CONTROLLER = PARTS = ("plant", "controller")  # values of `RunPlan.only`
 # Nodes of a system by name: those that publish diagnostics, and all.
-REPORTING = (*PARTS, "recorder", "estop", "estimator", "markers")
-NODES = (*REPORTING, "emulator")
+ESTIMATORS = tuple(dict.fromkeys(kind.node for kind in KINDS.values()))
+REPORTING = (*PARTS, "recorder", "estop", *ESTIMATORS, "markers")
+NODES = (*REPORTING, "event_camera", "emulator")
 
 
 @dataclass(frozen=True)

@@ -59,8 +59,9 @@ def status(
 
 def _show(robot: RobotStatus) -> None:
     output.print(f"{robot.name}  e-stop: {robot.estop}", markup=False)
+    width = max([11, *(len(node.node) + 1 for node in robot.nodes)])
     for node in robot.nodes:
-        output.print(f"  {node.node:<11}{node.level:<7}{_words(node)}", markup=False, soft_wrap=True)
+        output.print(f"  {node.node:<{width}}{node.level:<7}{_words(node)}", markup=False, soft_wrap=True)
 
 
 def _words(node: NodeStatus) -> str:

@@ -70,6 +70,8 @@ def _check_alike(records: Sequence[RunRecord]) -> None:
 
 def _parts(runs: Sequence[View]) -> list[Part]:
     path = (_space_path, _progress, _motion) if in_space(runs) else (_trajectory, _progress)
+    if all(result.robot.actuators.turns_only for _, result in evaluated(runs)):
+        path = (_progress, _motion)  # a satellite stays where it is
     plots = (*path, _actuators, _use, _latency) if evaluated(runs) else ()
     return [
         *faint(_subtitle(runs)),
