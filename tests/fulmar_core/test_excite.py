@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from fulmar_core.actuators.reaction_wheels import ReactionWheels
 from fulmar_core.controllers.excite import Excite, excite_of
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.paths import config_names
@@ -20,12 +23,13 @@ TASKS = {PlanarState: "go_to_position", SpatialState: "go_to_pose_3d"}
 
 def commands_of(name, *, seconds=90.0, worlds=4):
     robot = load_robot(name)
-    task = load_task(TASKS[robot.state_type])
+    task = load_task("point_inertial" if robot.actuators.turns_only else TASKS[robot.state_type])
     simulation = BatchSimulation(robot, task, load_scenario("nominal"), worlds=worlds, seed=3)
     controller = excite_of(robot, task)
     commands, far = [], 0.0
-    for _ in range(round(seconds * controller.control_hz)):
-        simulation.step(controller.act(inputs_of(simulation)))
+    for step in range(round(seconds * controller.control_hz)):
+        stamp = 1_000_000_000 + round(1e9 * step / controller.control_hz)
+        simulation.step(controller.act(replace(inputs_of(simulation), stamp_ns=stamp)))
         commands.append(simulation.command[0])
         far = max(far, float(simulation.truth.distance_to(simulation.goal.current).max()))
     return robot, np.array(commands), far
@@ -36,9 +40,12 @@ def test_a_robot_stays_inside_its_geofence_and_uses_all_of_its_actuators(name):
     robot, commands, far = commands_of(name)
     assert far < robot.limits.geofence
     used = np.abs(commands).max(axis=0) / robot.actuators.scale
+    wheels = isinstance(robot.actuators, ReactionWheels)
+    if wheels:
+        used = used[: robot.actuators.count]  # what unloads wheels would spoil what they show
     assert (used > 0.5).all()  # two wheels cannot go and turn at full speed at once
     changes = np.any(np.diff(commands, axis=0) != 0.0, axis=1).mean()
-    assert changes > 0.02
+    assert changes > (0.005 if wheels else 0.02)  # heavy flywheels take a minute from end to end
 
 
 def test_valves_open_alone_and_in_company():
