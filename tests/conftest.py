@@ -39,6 +39,38 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
         metafunc.parametrize("seed_of_series", range(1, metafunc.config.getoption("seeds") + 1))
 
 
+# Robots that differ from another one by figures alone: where a test has both, they are left to `make test-all`.
+ALIKE = {
+    "microsat": "cubesat_wheels",
+    "smallsat": "cubesat_wheels",
+    "jetbot": "turtlebot2",
+    "floating_platform_roboran": "floating_platform",
+}
+
+
+def robot_names(item: pytest.Item) -> dict[tuple[str, str], str]:
+    """Names of robots among the parameters of a test, by the test and the parameter."""
+    parameters = item.callspec.params if hasattr(item, "callspec") else {}
+    named = {
+        key: value if isinstance(value, str) else getattr(value, "name", "")
+        for key, value in parameters.items()
+    }
+    return {
+        (item.nodeid.partition("[")[0], key): str(name)
+        for key, name in named.items()
+        if isinstance(name, str)
+    }
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark tests of robots that are like another one of the same test as slow."""
+    found = {(key, name) for item in items for key, name in robot_names(item).items()}
+    for item in items:
+        if any((key, ALIKE.get(name)) in found for key, name in robot_names(item).items()):
+            item.add_marker(pytest.mark.slow)
+
+
 def pytest_collection_finish() -> None:
     """Exclude imported modules from the garbage collection between tests of ROS nodes."""
     gc.collect()

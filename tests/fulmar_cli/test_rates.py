@@ -9,21 +9,23 @@ from __future__ import annotations
 import json
 import os
 from pathlib import Path
+from types import SimpleNamespace
 
 import h5py
 import hdf5plugin
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 from fulmar_bags.contents import open_bag
 from fulmar_bags.event_files import EventFile, open_event_file
 from fulmar_bags.event_packets import events_of_cloud
 from fulmar_bags.wire_reader import WireReader
+from fulmar_cli.main import app
 from fulmar_core.errors import BagError, ConfigError
 from fulmar_core.sky.events import Events, joined
 from fulmar_core.topics import EVENTS
 from tests.fulmar_cli.bag_commands import POLICY
-from tests.ros import cli
 
 AEDAT4 = Path(__file__).parents[1] / "fulmar_bags" / "event_files" / "stars.aedat4"
 TURNED = np.array([0.4, -0.3, 0.2])  # °/s
@@ -32,8 +34,15 @@ OFFSET_US = 54_321_000_000
 
 
 def fulmar(*arguments, cwd: Path):
-    """Run a command to its end."""
-    return cli.fulmar(*map(str, arguments), env=dict(os.environ), cwd=cwd)
+    """Run a command to its end, in this process."""
+    before = Path.cwd()
+    os.chdir(cwd)
+    try:
+        done = CliRunner().invoke(app, list(map(str, arguments)))
+    finally:
+        os.chdir(before)
+    refused = "" if done.exception is None else str(done.exception)
+    return SimpleNamespace(returncode=done.exit_code, stdout=done.stdout, stderr=done.stderr + refused)
 
 
 def whole(file: EventFile) -> Events:

@@ -19,7 +19,7 @@ from tests.ros.wires import wires_of
 
 pytestmark = pytest.mark.real_time  # up to six processes at full speed leave other tests no processor
 CUBESAT = "cubesat_wheels"
-DIES_S = 4.0
+DIES_S = 3.0
 SOON = f"""title: a gyroscope that dies soon
 sensor_noise: true
 body: nominal
@@ -47,7 +47,7 @@ def env(ros_domain: RosDomain, tmp_path: Path) -> dict[str, str]:
 
 
 def test_the_gyroscope_dies_and_two_runs_of_one_seed_go_on_alike_by_the_stars(env, tmp_path: Path) -> None:
-    asked = ("run", CUBESAT, "--scenario", "soon", "--lockstep", "--seed", "3", "--duration", "9", "--json")
+    asked = ("run", CUBESAT, "--scenario", "soon", "--lockstep", "--seed", "3", "--duration", "7", "--json")
     for bag in ("one", "two"):
         done = fulmar(*asked, "--record", bag, env=env, cwd=tmp_path)
         summary = json_of(done.stdout)
@@ -55,7 +55,7 @@ def test_the_gyroscope_dies_and_two_runs_of_one_seed_go_on_alike_by_the_stars(en
     one, two = wires_of(tmp_path / "one"), wires_of(tmp_path / "two")
     assert {topic for topic in one if one[topic] != two.get(topic)} == set()
     counts = {topic.removeprefix(f"/{CUBESAT}/"): len(data) for topic, data in one.items()}
-    assert counts["odom"] == counts["controller/action"] == 89  # on and on, although the gyroscope has died
+    assert counts["odom"] == counts["controller/action"] == 69  # on and on, although the gyroscope has died
     assert counts["imu/data"] == 20 * DIES_S + 1
     rates = received(tmp_path / "one", RATE)
     truth = {_stamp(each): each.twist.twist.angular for each in received(tmp_path / "one", TRUTH)}
@@ -65,7 +65,7 @@ def test_the_gyroscope_dies_and_two_runs_of_one_seed_go_on_alike_by_the_stars(en
         if (v := truth.get(_stamp(each))) is not None
         for w in [each.twist.twist.angular]
     ]
-    assert len(errors) > 30
+    assert len(errors) > 22
     assert float(np.sqrt(np.mean(np.square(errors)))) < 0.0275  # °/s: thesis Table 6.2, two cameras
 
 
@@ -73,6 +73,7 @@ def _stamp(message: Any) -> int:
     return int(message.header.stamp.sec * 10**9 + message.header.stamp.nanosec)
 
 
+@pytest.mark.slow
 def test_the_inertia_is_published_once_the_motion_shows_it_and_the_status_says_what_it_does_not(
     env, tmp_path: Path
 ) -> None:
