@@ -22,7 +22,7 @@ TRAIN_LOCK := docker/requirements-train.lock
 MESSAGES_LOCK := ros2_ws/src/fulmar_bringup/fulmar_bringup/tf2_msgs/requirements.lock
 # Of .venv after an install on x86-64 [MiB], measured by `du -s --block-size=1M .venv`; the last one of .venv-peers.
 RUN_SIZE := 884
-DEV_SIZE := 7053
+DEV_SIZE := 7386
 PEERS_SIZE := 8838
 
 # A sourced ROS shell puts its own packages before those of .venv; the two must not mix.
@@ -80,7 +80,7 @@ setup: $(RUN_STAMP) ## Install what a robot or a simulation needs (no torch; 0.9
 tf: $(RUN_STAMP) $(TF_STAMP) ## Build the message package of /tf, for RViz and Foxglove (needs a C++ compiler)
 
 .PHONY: dev
-dev: $(DEV_STAMP) $(if $(HAS_ROS_WHEELS),$(TF_STAMP)) $(STARS_STAMP) ## Install everything, also for training and tests (6.9 GiB)
+dev: $(DEV_STAMP) $(if $(HAS_ROS_WHEELS),$(TF_STAMP)) $(STARS_STAMP) ## Install everything, also for training and tests (7.2 GiB)
 
 .PHONY: peers
 peers: $(PEERS_STAMP) ## Install the outside programs that tests compare with, into .venv-peers (8.6 GiB)
