@@ -241,7 +241,7 @@ def test_weights_without_a_word_on_obstacles_are_refused_where_some_stand():
         Lqr(ROBOT, load_task("go_to_position_with_obstacles"), replace(WEIGHTS, speed_around=0.0))
 
 
-@pytest.mark.parametrize(("count", "shared"), [(16, True), (24, False)])
+@pytest.mark.parametrize(("count", "shared"), [(16, True), pytest.param(24, False, marks=pytest.mark.slow)])
 def test_it_brings_platforms_of_many_nozzles_home(count, shared):
     """Pairs on each of many arms; without a shared line as strong as with one while all arms push."""
     arms = 2.0 * np.pi * np.arange(count // 2) / (count // 2)

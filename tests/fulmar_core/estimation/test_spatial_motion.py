@@ -133,6 +133,7 @@ def test_a_gyroscope_that_falls_silent_leaves_its_bias_and_no_phantom_rate():
     assert np.abs(track.errors()[0][9:]).max() < 0.02
 
 
+@pytest.mark.slow
 def test_the_covariance_is_honest_or_careful():
     ratios = []
     for seed in range(20):
