@@ -100,6 +100,8 @@ class EventCameraNode(Node):
 
     def _exposed(self, time_ns: int, quat: np.ndarray) -> list[tuple[Publisher, PointCloud2]]:
         """Packets of every camera from the state before to this one."""
+        if self._before is not None and self._before[0] == time_ns:
+            return []  # a plant that waits for an answer sends its state again
         before, self._before = self._before, (time_ns, quat)
         if before is None:
             return []
