@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 from Basilisk.architecture import messaging
-from Basilisk.simulation import reactionWheelStateEffector, spacecraft
-from Basilisk.utilities import SimulationBaseClass, macros, simIncludeRW
+from Basilisk.simulation import GravityGradientEffector, reactionWheelStateEffector, spacecraft
+from Basilisk.utilities import SimulationBaseClass, macros, simIncludeGravBody, simIncludeRW
 
 RPM = 30.0 / np.pi  # of a rad/s
 asked = json.loads(Path(sys.argv[1]).read_text(encoding="utf-8"))
@@ -33,6 +33,19 @@ for axis, speed in zip(asked["axes"], asked["speeds"], strict=True):
 wheels = reactionWheelStateEffector.ReactionWheelStateEffector()
 factory.addToSpacecraft("wheels", wheels, body)
 simulation.AddModelToTask("task", wheels, 2)
+
+if asked["orbit_rate"]:  # a circular orbit over the pole z, towards x
+    earth = simIncludeGravBody.gravBodyFactory()
+    planet = earth.createEarth()
+    planet.isCentralBody = True
+    planet.mu = asked["orbit_rate"] ** 2 * asked["orbit_radius"] ** 3
+    earth.addBodiesTo(body)
+    body.hub.r_CN_NInit = [[0.0], [0.0], [asked["orbit_radius"]]]
+    body.hub.v_CN_NInit = [[asked["orbit_rate"] * asked["orbit_radius"]], [0.0], [0.0]]
+    gradient = GravityGradientEffector.GravityGradientEffector()
+    gradient.addPlanetName(planet.planetName)
+    body.addDynamicEffector(gradient)
+    simulation.AddModelToTask("task", gradient, 3)
 
 command = messaging.ArrayMotorTorqueMsg()
 wheels.rwMotorCmdInMsg.subscribeTo(command)
