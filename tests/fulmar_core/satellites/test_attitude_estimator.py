@@ -108,6 +108,17 @@ def test_what_the_wheels_take_the_body_loses():
     assert found[0] == pytest.approx(RATE[0] - lost, rel=0.02)
 
 
+def test_what_wheels_did_while_they_were_silent_counts_once_the_gyroscope_has_shown_it():
+    estimator, spun = make_estimator("attitude", CUBESAT), np.array([0.0, 0.0, 0.02])  # [rad/s]
+    now = fed(estimator, 10.0)
+    for k in range(1, 31):
+        estimator.take("imu", Reading(imu(RATE + spun * k / 30), now + k * SECOND // 10))
+    speeds = -CUBESAT.body.inertia_matrix @ spun / CUBESAT.actuators.spin_inertia
+    estimator.take("wheels", Reading(WheelSpeeds(NAMES, speeds), now + 3 * SECOND))
+    found = estimator.estimate().value.angular_velocity_in_body
+    np.testing.assert_allclose(found, RATE + spun, atol=1e-3)
+
+
 def test_a_late_attitude_counts_at_its_own_time():
     estimator = make_estimator("attitude", CUBESAT)
     now = fed(estimator, 20.0, tracker=True)

@@ -22,7 +22,7 @@ import numpy as np
 from fulmar_core.actuators.reaction_wheels import ReactionWheels
 from fulmar_core.attitude import exponential, normalised, product, rotation_error
 from fulmar_core.estimation.estimator import Estimate
-from fulmar_core.estimation.reading_times import ReadingTimes, TimeJumpError
+from fulmar_core.estimation.reading_times import ReadingTimes
 from fulmar_core.estimation.settings import AttitudeSettings
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import rotate
@@ -63,7 +63,7 @@ class AttitudeEstimator:
         self.problem = NO_ATTITUDE
         self._begun = False
         self._stamp_ns = 0
-        self._times = ReadingTimes()
+        self._times = ReadingTimes(self._begin_epoch)
         self._momentum: np.ndarray | None = None  # of the wheels, in the body [N·m·s]
         self._held: list[
             tuple[int, Callable[[int], str]]
@@ -72,6 +72,10 @@ class AttitudeEstimator:
         self._past: deque[tuple[int, np.ndarray, np.ndarray]] = deque()
         self._strangers = 0
         self._gyroscope_ns = self._rate_ns = self._attitude_ns = self._spin_ns = 0
+
+    def _begin_epoch(self) -> None:
+        self._forget()
+        self.epoch += 1
 
     def take(self, name: str, reading: Reading) -> str | None:
         """See `Estimator.take`."""
@@ -83,15 +87,9 @@ class AttitudeEstimator:
         }
         if name not in takers:
             return f"reading '{name}' is not known here, only {', '.join(takers)}"
-        try:
-            problem = self._times.problem(name, reading.stamp_ns)
-        except TimeJumpError as jump:
-            self._forget()
-            self.epoch += 1
-            return str(jump)
-        if problem:
+        if problem := self._times.problem(f"'{name}'", reading.stamp_ns):
             return problem
-        assert reading.stamp_ns is not None  # as of the line above
+        assert reading.stamp_ns is not None  # as of `problem`
         return takers[name](reading, reading.stamp_ns) or None
 
     def estimate(self, stamp_ns: int | None = None) -> Estimate | None:
@@ -227,8 +225,8 @@ class AttitudeEstimator:
         momentum = self._wheels.to_body(self._wheels.spin_inertia * each)
         before, before_ns = self._momentum, self._spin_ns
         self._momentum, self._spin_ns = momentum, stamp_ns
-        if not self._begun or before is None:
-            return ""
+        if not self._begun or before is None or stamp_ns - before_ns > SPIN_GAP_NS:
+            return ""  # of a longer change the gyroscope has shown its part already
         meanwhile = [one for one in self._held if one[0] <= stamp_ns]
         self._held = self._held[len(meanwhile) :]
         change, done_ns, problems = momentum - before, before_ns, []

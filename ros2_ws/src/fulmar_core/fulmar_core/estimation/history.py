@@ -16,9 +16,9 @@ from typing import Any, ClassVar, Generic, TypeVar
 import numpy as np
 
 from fulmar_core.estimation.estimator import Estimate
+from fulmar_core.estimation.reading_times import ReadingTimes
 from fulmar_core.estimation.settings import MotionSettings
 from fulmar_core.robot import Limits
-from fulmar_core.safety.input_gate import BACK_NS, FORWARD_NS
 from fulmar_core.sensors.imu import ImuSample
 from fulmar_core.sensors.reading import Reading
 
@@ -163,9 +163,8 @@ class HistoryEstimator(ABC, Generic[S]):
         saturated = self._saturation(reading) if kind == IMU else ""
         if problem and not saturated:
             return problem
-        if time_problem := self._time_problem(stamp_ns, WHAT[kind]):
+        if time_problem := self._times.problem(f"the {WHAT[kind]}", stamp_ns):
             return time_problem
-        self._newest_ns[WHAT[kind]] = stamp_ns
         if kind == IMU:
             self._saturated = saturated
         if problem or saturated:
@@ -254,7 +253,7 @@ class HistoryEstimator(ABC, Generic[S]):
         self._filter: Filter | None = None
         self._saturated = ""  # why the newest inertial reading has no turn rate
         self._history: list[Event] = []
-        self._newest_ns: dict[str, int] = {}  # stamp of the newest reading, by what it is
+        self._times: ReadingTimes = ReadingTimes(self._begin_epoch)
         self._believed_ns = 0
         self._strangers: list[Event] = []
         self.problem = NO_POSE
@@ -264,17 +263,9 @@ class HistoryEstimator(ABC, Generic[S]):
         event.after = self._filter.snapshot()
         self._history, self._strangers = [event], []
 
-    def _time_problem(self, stamp_ns: int, what: str) -> str:
-        """Reject old stamps; a jump of time is reported once and begins anew."""
-        last_ns = self._newest_ns.get(what)
-        if last_ns is None:
-            return ""
-        ahead = stamp_ns - last_ns
-        if not -BACK_NS <= ahead <= FORWARD_NS:
-            self._forget()
-            self.epoch += 1
-            return f"time of the {what} jumped by {ahead / 1e9:+.1f} s: a new epoch begins"
-        return "" if ahead > 0 else f"stamp of the {what} did not advance"
+    def _begin_epoch(self) -> None:
+        self._forget()
+        self.epoch += 1
 
     def _believe(self, event: Event) -> bool:
         """Insert a pose or an attitude if it is no outlier."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from fulmar_core.actuators.reaction_wheels import ReactionWheels
 from fulmar_core.estimation.estimator import Estimate
-from fulmar_core.estimation.reading_times import ReadingTimes, TimeJumpError
+from fulmar_core.estimation.reading_times import ReadingTimes
 from fulmar_core.estimation.settings import InertiaSettings
 from fulmar_core.inertia_estimation.batch import SPAN_S, batch_fit
 from fulmar_core.inertia_estimation.ekf import EkfSettings, InertiaFilter
@@ -51,7 +51,7 @@ class InertiaEstimator:
         s = self._settings
         self.problem = NOT_BEGUN
         self.saturated: tuple[str, ...] = ()
-        self._times = ReadingTimes()
+        self._times = ReadingTimes(self._begin_epoch)
         self._waiting: dict[str, deque[tuple[int, np.ndarray]]] = {"imu": deque(), "wheels": deque()}
         self._samples: deque[tuple[float, np.ndarray, np.ndarray]] = deque(maxlen=MOST_SAMPLES)
         self._first_ns = self._last_ns = -1
@@ -63,17 +63,15 @@ class InertiaEstimator:
             None  # samples that it had, numbers, covariance
         )
 
+    def _begin_epoch(self) -> None:
+        self._forget()
+        self.epoch += 1
+
     def take(self, name: str, reading: Reading) -> str | None:
         """See `Estimator.take`."""
         if name not in self._waiting:
             return f"reading '{name}' is not known here, only {', '.join(self._waiting)}"
-        try:
-            problem = self._times.problem(name, reading.stamp_ns)
-        except TimeJumpError as jump:
-            self._forget()
-            self.epoch += 1
-            return str(jump)
-        if problem:
+        if problem := self._times.problem(f"'{name}'", reading.stamp_ns):
             return problem
         value, problem = self._rate_of(reading) if name == "imu" else self._momentum_of(reading)
         if problem:
