@@ -142,6 +142,14 @@ def test_in_lock_step_no_answer_is_too_old_since_time_stands_still():
     assert guard.offer(NAMES, GOOD, 0, stamp_ns=5000 * MS, outdated=True)
 
 
+def test_in_lock_step_a_slow_answer_is_no_trip_of_the_watchdog():
+    guard = ActuatorGuard(THRUSTERS, Watchdog(200 * MS), lockstep=True)
+    assert guard.offer(NAMES, GOOD, 0, stamp_ns=5000 * MS)
+    assert guard.offer(NAMES, GOOD, 900 * MS, stamp_ns=5100 * MS)
+    assert not guard.watchdog.tripped
+    assert guard.watchdog.trips == 0
+
+
 WHEELS = load_robot("turtlebot2").actuators  # may change by 0.9 m/s and 1.8 rad/s a second
 
 

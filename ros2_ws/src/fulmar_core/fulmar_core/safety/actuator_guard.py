@@ -208,7 +208,7 @@ class ActuatorGuard:
             if self._is_safe(self.output(now_ns)):
                 self.command = self._actuators.safe_command  # nothing is left to slow down from
         else:
-            if self.watchdog.expired(now_ns) and not self._lockstep:
+            if not self._lockstep and self.watchdog.expired(now_ns):
                 self.command = self.output(now_ns)  # where wheels have slowed down to
             self.command = self._slewed(np.asarray(values, dtype=float), time_ns, seconds)
         self._taken_ns = time_ns
