@@ -163,17 +163,12 @@ class _Camera:
 
     def _information(self, weights: np.ndarray, times: np.ndarray) -> np.ndarray:
         """Information of the motion: `times` has the time factor of each part of it, shape (parts, n)."""
-        rows = [
-            [
-                np.einsum(
-                    "nij,nik,n->jk", self.field, self.field,
-                    np.maximum(np.bincount(self.tracks.star, weights * a * b, self.count), 0.0 if a is b else -np.inf),
-                )
-                for b in times
-            ]
-            for a in times
-        ]  # fmt: skip
-        return np.block(rows)
+        moments = np.array(
+            [[np.bincount(self.tracks.star, weights * a * b, self.count) for b in times] for a in times]
+        )
+        moments = moments * (moments[0, 0] > 0.0)  # a star whose events scatter too widely has none
+        blocks = np.einsum("nij,nik,abn->ajbk", self.field, self.field, moments)
+        return np.asarray(blocks.reshape(3 * len(times), 3 * len(times)))
 
     def _slopes(self, weights: np.ndarray, times: np.ndarray, off: np.ndarray) -> np.ndarray:
         """What each star pulls the motion by, shape (stars, 3 · parts)."""

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from fulmar_core.estimation.estimator import Estimate
-from fulmar_core.estimation.reading_times import ReadingTimes, TimeJumpError
+from fulmar_core.estimation.reading_times import ReadingTimes
 from fulmar_core.estimation.settings import EventRateSettings
 from fulmar_core.rate_estimation.contrast import RateFit, fit_rate
 from fulmar_core.rate_estimation.star_tracks import Tracks, find_tracks
@@ -22,10 +22,8 @@ from fulmar_core.sky.star_camera import StarCamera
 
 AXES = "xyz"
 NO_EVENTS = "no events yet. Does the camera run?"
-LEAST_PX = (
-    1.0,
-    0.5,
-)  # of motion in a window, the longest one last: events of less show pixels rather than a rate
+# Motion of stars in a window, and in the longest one: events of less show pixels rather than a rate [px]
+LEAST_PX, LEAST_PX_LONG = 1.0, 0.5
 BOUND_PX = 2.0  # a star that moves so far in a window makes events enough to be found
 UNKNOWN_STD = 1.0  # of an axis about which nothing is observable [rad/s]
 SILENT = 3  # windows without a camera's events, after which the other goes on alone
@@ -56,13 +54,17 @@ class EventRateEstimator:
         self.fit: RateFit | None = None
         self.bound: float | None = None
         self._packets: dict[str, deque[tuple[int, Events]]] = {name: deque() for name in self._cameras}
-        self._times = ReadingTimes()
+        self._times = ReadingTimes(self._begin_epoch)
         self._spacing_ns: dict[str, int] = {}  # shortest time between two packets, by camera
         self._until_ns: dict[str, int] = {}  # end of the newest packet, by camera
         self._window_ns = self._begun_ns = -1  # where the next window begins, and where the first one began
         self._estimate: Estimate | None = None
         self._noise_hz = 0.0
         self._events_hz = 0.0
+
+    def _begin_epoch(self) -> None:
+        self._forget()
+        self.epoch += 1
 
     def take(self, name: str, reading: Reading) -> str | None:
         """See `Estimator.take`."""
@@ -77,13 +79,7 @@ class EventRateEstimator:
             return f"packet of '{name}' comes from a camera of {its} pixels, and the robot's has {ours}"
         if problem := packet.problem():
             return f"packet of '{name}': {problem}"
-        try:
-            problem = self._times.problem(name, reading.stamp_ns)
-        except TimeJumpError as jump:
-            self._forget()
-            self.epoch += 1
-            return str(jump)
-        if problem:
+        if problem := self._times.problem(f"'{name}'", reading.stamp_ns):
             return problem
         end_ns = reading.stamp_ns or 0
         self._count_lost(name, end_ns)
@@ -143,7 +139,7 @@ class EventRateEstimator:
         """Estimate the window that ends at a time; where it shows too little, with those before it as one."""
         s = self._settings
         self.fit = None
-        for seconds, least_px in {s.window_s: LEAST_PX[0], s.longest_s: LEAST_PX[1]}.items():
+        for seconds, least_px in ((s.window_s, LEAST_PX), (s.longest_s, LEAST_PX_LONG)):
             begin_ns = max(end_ns - round(1e9 * seconds), self._begun_ns)
             tracks = self._tracks(begin_ns, end_ns)
             if not tracks:
