@@ -91,6 +91,11 @@ def test_the_inertia_is_published_once_the_motion_shows_it_and_the_status_says_w
     np.testing.assert_allclose(
         [inertia.ixx, inertia.iyy, inertia.izz], np.diag(load_robot(CUBESAT).body.inertia_matrix), rtol=0.02
     )
+    identified = fulmar("identify", "excited", "--json", env=env, cwd=tmp_path)
+    for method, found in json_of(identified.stdout)["estimates"].items():
+        assert found["xx"]["value"] == pytest.approx(inertia.ixx, rel=0.02), method
+    refused = fulmar("identify", "excited", "--known", "mass=5.32", env=env, cwd=tmp_path)
+    assert "not for 'cubesat_wheels'" in refused.stderr
     still = ("run", CUBESAT, "--task", "point_inertial", "--duration", "20")
     done = fulmar(*still, *chain, "still", env=env, cwd=tmp_path)
     assert json_of(done.stdout)["failure"] is None, done.stderr

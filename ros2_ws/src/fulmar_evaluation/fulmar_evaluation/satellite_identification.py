@@ -11,7 +11,6 @@ import numpy as np
 
 from fulmar_bags.contents import open_bag
 from fulmar_bags.message_reader import reading_of
-from fulmar_bags.run_record import read_run
 from fulmar_bags.wire_reader import WireReader
 from fulmar_core.errors import BagError
 from fulmar_core.estimation.kinds import load_estimator
@@ -93,4 +92,4 @@ def _document(estimator: InertiaEstimator) -> dict[str, Any]:
 
 def robot_of_bag(bag: Path) -> str:
     """Name of the robot whose run a bag holds."""
-    return str(read_run(bag).info.get("robot", ""))
+    return str((open_bag(bag).info or {}).get("robot", ""))

@@ -55,7 +55,7 @@ def identify(
     from fulmar_core.identification.model import Known
     from fulmar_evaluation.driven_run import driven_run
 
-    if print_satellite(bags, as_json=as_json):
+    if print_satellite(bags, given=bool(known or ballast or out), as_json=as_json):
         return
     known_values = []
     for text in known or []:

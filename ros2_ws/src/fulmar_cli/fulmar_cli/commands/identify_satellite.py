@@ -8,8 +8,13 @@ from typing import Any
 from fulmar_bringup.console import print_result, write_line
 
 
-def print_satellite(bags: list[Path], *, as_json: bool) -> bool:
-    """Identify the inertia where the bags are of one satellite, and print it; False for any other robot."""
+def print_satellite(bags: list[Path], *, given: bool, as_json: bool) -> bool:
+    """Identify the inertia where the bags are of one satellite, and print it; False for any other robot.
+
+    Raises:
+        ConfigError: Options were `given`, of which a satellite has none.
+    """
+    from fulmar_core.errors import ConfigError
     from fulmar_core.robot import load_robot
     from fulmar_evaluation.satellite_identification import identify_satellite, robot_of_bag
 
@@ -19,6 +24,11 @@ def print_satellite(bags: list[Path], *, as_json: bool) -> bool:
     robot = load_robot(name)
     if not robot.actuators.turns_only:
         return False
+    if given:
+        raise ConfigError(
+            f"--known, --ballast and --out are not for '{name}': wheels and gyroscope show its inertia in kg·m² "
+            "without them, and there is no calibration of it. Leave them out."
+        )
     print_result(identify_satellite(robot, bags), _print, as_json=as_json)
     return True
 
