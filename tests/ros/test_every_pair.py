@@ -38,16 +38,12 @@ from tests.spaces import robot_for, task_for
 SEED = 5
 LASTS_S = {"track_velocities": 14.0, "track_velocities_3d": 14.0}  # long enough for a second velocity
 BRIEFLY_S = 6.0  # short enough to leave no geofence and to touch no obstacle
-# A second robot of a family, and a second task of a kind with other figures, bring nothing new onto the wires.
+# A second task of a kind with other figures brings nothing new onto the wires; robots alike are in tests/conftest.py.
 ALIKE = {
-    "floating_platform_roboran",
-    "jetbot",
     "drift_go_to_pose",
     "drift_track_velocities",
     "race_waypoints",
     "race_wayposes",
-    "microsat",
-    "smallsat",
     "point_inertial",
     "slew",
 }

@@ -13,6 +13,7 @@ from fulmar_core.calibration import calibration_path
 from fulmar_core.controllers.classical import gains_of, gains_path
 from fulmar_core.disturbances.scenario import scenario_path
 from fulmar_core.estimation.kinds import estimator_path
+from fulmar_core.goal_files import goal_file_path
 from fulmar_core.paths import config_path
 from fulmar_core.policy_bundle import PASSPORT
 from fulmar_core.provenance import fulmar_version, git_revision
@@ -67,7 +68,7 @@ def _of_goals(goals: str) -> dict[str, Path]:
     """The goal file, by its name or its path; none where it is empty."""
     if not goals:
         return {}
-    return {"goals.yaml": Path(goals) if goals.endswith(".yaml") else config_path("goals", goals)}
+    return {"goals.yaml": goal_file_path(goals)}
 
 
 def _of_task(name: str) -> dict[str, Path]:

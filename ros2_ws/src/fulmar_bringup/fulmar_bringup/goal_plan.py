@@ -23,11 +23,11 @@ from fulmar_core.goal_files import (
     Positions,
     Trajectory,
     Velocities,
+    goal_file_path,
     load_goal_file,
     load_goals,
 )
 from fulmar_core.goal_sequence import goal_sequence
-from fulmar_core.paths import config_path
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.spatial import SpatialState, quat_of
@@ -208,7 +208,7 @@ def task_of_goals(goals: str) -> str:
 
 def goal_path(goals: str) -> Path:
     """Where a goal file lies, in full."""
-    return (Path(goals) if goals.endswith(".yaml") else config_path("goals", goals)).absolute()
+    return goal_file_path(goals).absolute()
 
 
 def is_path_of_places(task: Task) -> bool:

@@ -219,8 +219,16 @@ def load_goal_file(name: str) -> GoalFile | Torques:
     Raises:
         ConfigError: Unknown name, or a mistake in the file.
     """
-    path = Path(name) if name.endswith(".yaml") else config_path("goals", name)
-    return cast(GoalFile | Torques, load_config(GoalFile | Torques, path))  # type: ignore[arg-type]
+    return cast(GoalFile | Torques, load_config(GoalFile | Torques, goal_file_path(name)))  # type: ignore[arg-type]
+
+
+def goal_file_path(name: str) -> Path:
+    """Where the goals of a name are; argument as of `load_goal_file`.
+
+    Raises:
+        ConfigError: Unknown name.
+    """
+    return Path(name) if name.endswith(".yaml") else config_path("goals", name)
 
 
 def load_goals(name: str) -> GoalFile:

@@ -83,8 +83,8 @@ def cameras_of(
         known = [(file.width, file.height, camera.fov_deg) for file, camera in zip(opened, its, strict=False)]
     else:
         bag = open_bag(sources[0])
-        count = sum(bool(len(bag.of(wire))) for wire in WIRES.values())
-        known = [(camera.width, camera.height, camera.fov_deg) for camera in its[: max(count, 1)]]
+        count = 2 if len(bag.of(EVENTS_2)) else 1
+        known = [(camera.width, camera.height, camera.fov_deg) for camera in its[:count]]
         known = [tuple(each) for each in (bag.info or {}).get(CAMERAS, known)]
         known = [(*size, wide) for _, _, wide in known] if size else known
     return tuple(

@@ -24,6 +24,7 @@ ROBOT_HELP = "Satellite whose event cameras it was: their field of view and how 
 SIZE_HELP = "Pixels of the camera, for files that do not say it."
 FOV_HELP = "Field of view of the camera, across its width; the robot's by default."
 ESTIMATOR_HELP = "A name from configs/estimators of kind event_rate, or a .yaml file."
+BYTES_AN_EVENT = 5.0  # of compressed recordings, about
 BAG_HELP = "Write the packets into a bag too, for `fulmar bag play` to feed a live estimator with."
 
 
@@ -72,9 +73,6 @@ def rates(
     print_result(found.document(), _print, as_json=as_json)
     if not len(found.times_s):
         raise typer.Exit(FAILED)
-
-
-BYTES_AN_EVENT = 5.0  # of compressed recordings, about
 
 
 def _modules(sources: list[Path], plot: Path | None) -> list[str]:

@@ -169,7 +169,7 @@ def _epoch(live: LiveSystem, since_s: float) -> tuple[str, str]:
     statuses = [
         status
         for status in live.observer.statuses_since(since_s)
-        if "mode" in status.values and "epoch" in status.values
+        if status.who == "controller" and "epoch" in status.values
     ]
     return (statuses[-1].values["epoch"], statuses[-1].values["mode"]) if statuses else ("", "silent")
 
