@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_core.batch_dynamics import dynamics_of
+from fulmar_core.dynamics_of import dynamics_of
 from fulmar_core.counter_rng import uniform_from, words, world_keys
 from fulmar_core.episode import Episode
 from fulmar_core.motion import actuation_of

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from fulmar_core.attitude import normalised, plus, product, turn
-from fulmar_core.batch_dynamics import dynamics_of
+from fulmar_core.dynamics_of import dynamics_of
 from fulmar_core.counter_rng import Draws
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.dynamics.contact import outline_of

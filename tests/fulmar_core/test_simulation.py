@@ -225,7 +225,7 @@ def test_observations_are_those_of_the_observer_and_show_commands_where_actuator
     np.testing.assert_array_equal(simulation.observe(), seen)
     assert seen.shape == (5, len(observer.names))
     remembered = [name for name in observer.names if name.startswith("previous_")]
-    assert len(remembered) == (len(robot.actuators.names) if robot.actuators.response.remembers else 0)
+    assert len(remembered) == (len(robot.actuators.names) if robot.actuators.remembers else 0)
     if remembered:
         share = simulation.command / robot.actuators.scale
         np.testing.assert_allclose(seen[:, -len(remembered) :], share, rtol=0, atol=1e-6)

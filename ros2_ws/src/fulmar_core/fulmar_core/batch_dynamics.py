@@ -345,12 +345,3 @@ def _on_wheels(
     if not wheels.has_friction:
         return motors
     return tuple(motor + wheels.friction_torque(speed) for motor, speed in zip(motors, speeds, strict=True))
-
-
-def dynamics_of(robot: Robot, *, orbits: bool = True) -> Dynamics[Any, Any]:
-    """The dynamics of a robot's kind; `orbits`: whether some world may have an `orbit_rate`."""
-    if robot.actuators.turns_only:
-        return GyrostatDynamics(robot)
-    return (
-        SpatialDynamics(robot, orbits=orbits) if robot.state_type is SpatialState else PlanarDynamics(robot)
-    )

@@ -10,7 +10,7 @@ from typing import Generic
 
 import numpy as np
 
-from fulmar_core.batch_dynamics import dynamics_of
+from fulmar_core.dynamics_of import dynamics_of
 from fulmar_core.counter_rng import START, WORLD, Draws
 from fulmar_core.disturbances.scenario import Scenario
 from fulmar_core.disturbances.world import World

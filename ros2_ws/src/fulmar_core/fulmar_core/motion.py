@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 
 from fulmar_core.actuators.actuation import ActuationState
+from fulmar_core.actuators.control_surfaces import ControlSurfaces
+from fulmar_core.actuators.flight_actuation import FlightActuation
 from fulmar_core.actuators.pushing import Pushing
 from fulmar_core.actuators.reaction_wheels import ReactionWheels
 from fulmar_core.actuators.rolling import Rolling
@@ -40,6 +42,8 @@ def actuation_of(robot: Robot, safe: Array, *, opens_late: bool = True) -> Actua
         "safe": safe,
         "opens_late": opens_late,
     }
+    if isinstance(robot.actuators, ControlSurfaces):
+        return FlightActuation(robot.actuators, safe)
     if isinstance(robot.actuators, ReactionWheels):
         return WheelActuation(response, count=robot.actuators.count, **usual)
     return ActuationState(response, **usual)

@@ -22,7 +22,7 @@ class Observer:
 
     def __init__(self, robot: Robot, task: Task) -> None:
         self._task = task
-        self._remembers = robot.actuators.response.remembers
+        self._remembers = robot.actuators.remembers
         self._scale = robot.actuators.scale
         own = tuple(f"previous_{name}" for name in robot.actuators.names) if self._remembers else ()
         self.names: tuple[str, ...] = (*task.observation_names, *own)

@@ -17,6 +17,7 @@ from fulmar_core.calibration import VARIABLE, calibrated, calibration_in_use, lo
 from fulmar_core.config import Kinds, load_config
 from fulmar_core.dynamics.hydrodynamics import Hydrodynamics
 from fulmar_core.errors import ConfigError, ImplausibleError
+from fulmar_core.flight.airframe import Airframe
 from fulmar_core.paths import config_path
 from fulmar_core.planar import PlanarState
 from fulmar_core.plausibility import check_plausible
@@ -45,6 +46,7 @@ class Body:
     footprint: tuple[float, float] | None = None  # length and width of a box; None: a disc of `radius` [m]
     footprint_x: float = 0.0  # of the box's centre, ahead of the body's origin [m]
     center_of_mass: tuple[float, ...] = (0.0, 0.0)  # ahead of the body's origin, to its left, and above [m]
+    as_printed: bool = False  # the inertia is a source's, though no body has such moments
 
     def __post_init__(self) -> None:
         if len(self.inertia) not in (3, 6) or len(self.center_of_mass) not in (2, 3):
@@ -57,7 +59,8 @@ class Body:
         if sum(part * part for part in self.center_of_mass) > self.radius**2:
             raise ValueError(f"'center_of_mass' = {list(self.center_of_mass)} lies outside of the outline.")
         moments = np.linalg.eigvalsh(self.inertia_matrix)
-        if moments[0] <= 0.0 or 2.0 * moments[2] > moments.sum() * (1.0 + 1e-9):
+        impossible = 2.0 * moments[2] > moments.sum() * (1.0 + 1e-9) and not self.as_printed
+        if moments[0] <= 0.0 or impossible:
             found = ", ".join(f"{moment:.4g}" for moment in moments)
             raise ValueError(
                 f"'inertia' = {list(self.inertia)} has principal moments of {found} kg·m²: no body has a moment beyond "
@@ -223,13 +226,19 @@ class Robot:
     sensors: Sensors
     limits: Limits
     hydrodynamics: Hydrodynamics | None = None  # of a hull that swims
+    airframe: Airframe | None = None  # of an aircraft
     event_cameras: tuple[EventCamera, ...] = ()  # that look at the stars, at most two
     air_bearing: bool = False  # it floats on air that `air_bearing/enable` switches
 
     @property
     def state_type(self) -> type[State]:
         """Form of its states: in the plane, or, of bodies that neither the floor nor water carries, in space."""
-        return SpatialState if self.drifts and not self.body.planar else PlanarState
+        return SpatialState if (self.drifts or self.flies) and not self.body.planar else PlanarState
+
+    @property
+    def flies(self) -> bool:
+        """Whether it is an aircraft: it cannot stop."""
+        return self.actuators.flies
 
     @property
     def drifts(self) -> bool:
@@ -252,6 +261,8 @@ class Robot:
     @property
     def recipe(self) -> str:
         """Training settings where a robot and task have none of their own: a file of `configs/training`."""
+        if self.flies:
+            return "aircraft"
         return self.actuators.recipe if self.state_type is PlanarState else "free_flyer"
 
     def __post_init__(self) -> None:
@@ -262,6 +273,11 @@ class Robot:
             raise ValueError(
                 f"{self.actuators.kind} only turn a body: it needs 'planar: false', its centre of mass at its origin, "
                 "and in 'performance' 0 for all but torque and yaw_rate."
+            )
+        if self.flies is not (self.airframe is not None) or (self.flies and (self.body.planar or any(self.body.com))):
+            raise ValueError(
+                "control_surfaces and 'airframe' need one another, with 'planar: false' and the centre of mass at the "
+                "body's origin."
             )
         if self.state_type is PlanarState and (len(self.body.inertia), len(self.body.center_of_mass)) != (
             3,

@@ -11,7 +11,8 @@ from array_api_compat import is_numpy_namespace
 
 from fulmar_core.actuators.wheel_actuation import WheelActuation
 from fulmar_core.arrays import array_namespace
-from fulmar_core.batch_dynamics import Dynamics, dynamics_of
+from fulmar_core.batch_dynamics import Dynamics
+from fulmar_core.dynamics_of import dynamics_of
 from fulmar_core.counter_rng import Keys, keys_at, uniform_from, words, world_keys, write_keys
 from fulmar_core.disturbances.scenario import Scenario, longest_delay
 from fulmar_core.disturbances.world import World
@@ -91,7 +92,7 @@ class BatchSimulation(MutableState, Generic[S]):
         self._repeats = self._whole(np.zeros(worlds))
         self._steps = self._whole(np.zeros(worlds))
         self._noise_keys = self._actuator_keys(self._numbers, self._repeats)
-        self._dynamics: Dynamics[Any, S] = dynamics_of(robot, orbits=scenario.orbit_rate > 0.0)
+        self._dynamics: Dynamics[Any, S] = dynamics_of(robot, scenario)
         self._latest_s = longest_delay(robot, scenario)
         self._off_centre = may_be_off_centre(robot, scenario)
         self._noisy = scenario.actuation.noise > 0.0

@@ -108,6 +108,17 @@ class ActuationState(MutableState):
         Returns:
             What each actuator does during that time, shape (n, worlds).
         """
+        target = self._target(dt, latest_s=latest_s)
+        if self._slew is not None:
+            most = self._slew * dt
+            target = self.applied + clip(target - self.applied, -most, most)
+        if self._response.lag_s > 0.0 and self._slew is None:
+            target = self.applied + (target - self.applied) * min(1.0, dt / self._response.lag_s)
+        self.applied = target
+        return target
+
+    def _target(self, dt: float, *, latest_s: float) -> Array:
+        """The command that acts while time passes, shape (n, worlds); arguments as of `advance`."""
         target = self._wanted
         xp = array_namespace(target)
         now_s = self._since_s + 0.5 * dt
@@ -116,10 +127,4 @@ class ActuationState(MutableState):
                 target = xp.where(now_s < self._open_late, xp.minimum(self._before, target), target)
             target = xp.where(now_s < self._late, self._before, target)
         self._since_s += dt
-        if self._slew is not None:
-            most = self._slew * dt
-            target = self.applied + clip(target - self.applied, -most, most)
-        if self._response.lag_s > 0.0 and self._slew is None:
-            target = self.applied + (target - self.applied) * min(1.0, dt / self._response.lag_s)
-        self.applied = target
         return target

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fulmar_core.actuators.ackermann import Ackermann
+from fulmar_core.actuators.control_surfaces import ControlSurfaces
 from fulmar_core.actuators.differential_drive import DifferentialDrive
 from fulmar_core.actuators.family import Actuators
 from fulmar_core.actuators.fans import Fans
@@ -17,4 +18,5 @@ FAMILIES: dict[str, type[Actuators]] = {
     "ackermann": Ackermann,
     "fans": Fans,
     "reaction_wheels": ReactionWheels,
+    "control_surfaces": ControlSurfaces,
 }

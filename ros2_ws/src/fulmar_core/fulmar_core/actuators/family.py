@@ -31,6 +31,7 @@ class Actuators(ABC):
         one_way: Commands go from 0 to `scale`; else from -scale to scale.
         opens_late: Actuators may take longer to begin than to end, as valves do.
         turns_only: Commands turn the body and push it nowhere.
+        flies: Commands steer an aircraft, which the robot's `airframe` describes.
         takes_velocity: A command is (speed, turn rate) of the body, which ROS has a message of its own for.
         plausible: Ranges of the family's own keys, beside those of `plausible_ranges.ROBOT`.
     """
@@ -45,6 +46,7 @@ class Actuators(ABC):
     opens_late: ClassVar[bool] = False
     turns_only: ClassVar[bool] = False
     takes_velocity: ClassVar[bool] = False
+    flies: ClassVar[bool] = False
     plausible: ClassVar[tuple[Plausible, ...]] = ()
 
     @property
@@ -60,6 +62,16 @@ class Actuators(ABC):
     @abstractmethod
     def limited(self, command: Array) -> Array:
         """Nearest command that the hardware can carry out, shape (..., n)."""
+
+    @property
+    def positions(self) -> int:
+        """How many of the actuators, the first ones, are commanded by a position: surfaces on servos."""
+        return 0
+
+    @property
+    def remembers(self) -> bool:
+        """Whether what an actuator does depends on more than the newest command."""
+        return self.response.remembers
 
     @property
     def binary(self) -> bool:

@@ -16,7 +16,7 @@ from fulmar_core.actuators.actuation import ActuationState
 from fulmar_core.actuators.excitation import Excitation
 from fulmar_core.actuators.families import FAMILIES
 from fulmar_core.attitude import length, minus, plus, scaled
-from fulmar_core.batch_dynamics import dynamics_of
+from fulmar_core.dynamics_of import dynamics_of
 from fulmar_core.controllers.body_frame import BodyFrame
 from fulmar_core.controllers.controller import Inputs
 from fulmar_core.controllers.excite_wheels import TASKS as TURNING
@@ -155,7 +155,7 @@ class ExciteInSpace(Excite):
 
     def bind(self) -> None:
         """See `Law.bind`."""
-        self._dynamics = dynamics_of(self.robot, orbits=False)
+        self._dynamics = dynamics_of(self.robot, CALM)
         self._world = nominal_worlds(self.robot, 1)
 
     def _distance(self, inputs: Inputs) -> np.ndarray:

@@ -93,6 +93,21 @@ class Solar:
 
 
 @dataclass(frozen=True)
+class Air:
+    """The air around an aircraft."""
+
+    wind: Range = (0.0, 0.0)  # steady, level, from anywhere [m/s]
+    turbulence: float = 0.0  # wind at 20 ft that it comes from: 7.7 light, 15.4 moderate, 23.1 severe [m/s]
+    altitude: float = 0.0  # of the ground or the water above mean sea level [m]
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.wind[0] <= self.wind[1] or self.turbulence < 0.0:
+            raise ValueError("'wind' must be [low, high] with 0 <= low <= high, 'turbulence' not negative.")
+        if not -500.0 <= self.altitude <= 10_000.0:
+            raise ValueError(f"'altitude' = {self.altitude:g} m must lie between -500 and 10000.")
+
+
+@dataclass(frozen=True)
 class InertiaChange:
     """How the inertia of a satellite changes in an episode, all of it by one factor (arXiv 2510.16738)."""
 

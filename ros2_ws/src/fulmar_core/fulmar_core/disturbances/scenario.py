@@ -15,6 +15,7 @@ from fulmar_core.config import load_config
 from fulmar_core.counter_rng import Draws
 from fulmar_core.disturbances.parts import (
     Actuation,
+    Air,
     InertiaChange,
     Kick,
     Push,
@@ -57,6 +58,7 @@ class Scenario:
     # Mean motion √(μ/r³) of a circular orbit whose gravity gradient turns bodies in space; 0: none [rad/s].
     orbit_rate: float = 0.0
     solar: Solar = Solar()
+    air: Air = Air()
     inertia: InertiaChange = InertiaChange()
     actuation: Actuation = Actuation()
     sensing: Sensing = Sensing()

@@ -15,7 +15,7 @@ import numpy as np
 
 from fulmar_core.actuators.rolling import Rolling
 from fulmar_core.attitude import Vector, exponential, minus, plus, product, rotation_error, turn, turn_back
-from fulmar_core.batch_dynamics import dynamics_of
+from fulmar_core.dynamics_of import dynamics_of
 from fulmar_core.counter_rng import Draws
 from fulmar_core.disturbances.scenario import Scenario
 from fulmar_core.dynamics.free_body import free_body_step

@@ -23,6 +23,7 @@ class Truth:
         None  # (3,) acceleration minus gravity, in the body; None: not computed [m/s²]
     )
     wheels: Any = None  # `sensors.wheels.WheelSpeeds` of a robot with reaction wheels
+    air: Any = None  # `sensors.air_data.AirData` of an aircraft
 
 
 class SimulatedSensor(Protocol):

@@ -14,6 +14,7 @@ from fulmar_core.own_class import is_own
 from fulmar_core.paths import config_path
 from fulmar_core.plausibility import check_plausible
 from fulmar_core.plausible_ranges import TASK
+from fulmar_core.tasks.follow_reference import FollowReference
 from fulmar_core.tasks.go_to_pose import GoToPose
 from fulmar_core.tasks.go_to_pose_3d import GoToPose3d
 from fulmar_core.tasks.go_to_position import GoToPosition
@@ -48,6 +49,7 @@ ShippedTask = (  # what a file of `configs/tasks` can be
     | GoThroughPositions3d
     | GoThroughPoses3d
     | Point
+    | FollowReference
 )
 _asked_for: set[str] = set()  # dotted paths that this process was given, in the place of what a bag names
 

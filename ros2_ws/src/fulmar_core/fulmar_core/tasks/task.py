@@ -31,6 +31,7 @@ class Task(ABC, Generic[S]):
         required: Targets that make an episode a success; None where a closing window does.
         state_type: Form of the states that its methods take.
         turns_only: It is for robots that turn and push nowhere; all others are for robots that move.
+        flies: It is for aircraft, and no other one is.
     """
 
     kind: str
@@ -41,6 +42,7 @@ class Task(ABC, Generic[S]):
     required: int | None = None
     state_type: type[State] = PlanarState
     turns_only: ClassVar[bool] = False
+    flies: ClassVar[bool] = False
 
     # A class, a property or a field has these two: dataclasses would take a property of this class for a default.
     if TYPE_CHECKING:
@@ -101,6 +103,12 @@ class Task(ABC, Generic[S]):
             raise ConfigError(
                 f"task '{self.name}' is about motion in {self.state_type.WORLD}, and robot '{robot.name}' moves in "
                 f"{robot.state_type.WORLD}. {hint} Names of tasks that move a body in space end in {mine or its}."
+            )
+        if robot.flies is not self.flies:
+            what = "is for aircraft" if self.flies else "is not for aircraft, which cannot stop"
+            raise ConfigError(
+                f"task '{self.name}' {what}, and '{robot.name}' has {robot.actuators.kind}. `fulmar list tasks` shows "
+                "others; those whose names begin with fly_ are for aircraft."
             )
         if robot.actuators.turns_only is not self.turns_only:
             what = "only turns" if self.turns_only else "moves"

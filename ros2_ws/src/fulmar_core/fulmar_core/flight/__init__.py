@@ -1,0 +1,1 @@
+"""Aircraft: air, coefficients, ground effect, propulsion, turbulence, trim and modes."""

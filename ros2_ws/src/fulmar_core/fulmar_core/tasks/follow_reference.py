@@ -1,0 +1,255 @@
+"""Fly along a reference: hold a height, or follow a path that changes height and place to the side over time."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import ClassVar, Literal
+
+import numpy as np
+
+from fulmar_core.arrays import array_namespace, clip
+from fulmar_core.attitude import euler_of, exponential, length, product, scaled, uniform_direction
+from fulmar_core.counter_rng import Draws
+from fulmar_core.errors import ConfigError
+from fulmar_core.flight.trim import find_trim
+from fulmar_core.goal import Goal, no_obstacles
+from fulmar_core.references.flight_paths import PATHS
+from fulmar_core.robot import Robot
+from fulmar_core.rotation import Array
+from fulmar_core.spatial import SpatialState
+from fulmar_core.tasks.task import Task
+from fulmar_core.tasks.terms import Errors, Tolerance, weighted_sum
+
+Range = tuple[float, float]
+NOW = "reference"  # among the things of a goal: time [s]; place y, z [m] and its rate [m/s] now, five numbers
+TERMS = (
+    "height_error", "fine_height_error", "finest_height_error", "side_error", "fine_side_error",
+    "climb_error", "drift_error", "reference_climb", "reference_drift", "reference_height", "speed_error",
+    "angle_of_attack", "sideslip", "roll", "pitch", "heading", "roll_rate", "pitch_rate", "yaw_rate",
+)  # fmt: skip
+COARSE, FINE, FINEST = 1.0, 0.3, 0.05  # where errors saturate [m]
+FAST, QUICK = 1.0, 0.2  # scales of climb rates [m/s] and turn rates [rad/s]
+
+
+@dataclass(frozen=True)
+class FlightStart:
+    """How episodes begin: in level flight at the reference's first place, and off it by so much."""
+
+    height: Range = (0.0, 0.0)  # above the reference [m]
+    training_height: Range = (0.0, 0.0)  # same, in training [m]
+    side: float = 0.0  # largest way to either side [m]
+    tilt_deg: Range = (0.0, 0.0)  # turned about any axis from the attitude of level flight [deg]
+
+    def __post_init__(self) -> None:
+        for name in ("height", "training_height", "tilt_deg"):
+            low, high = getattr(self, name)
+            if low > high:
+                raise ValueError(f"'{name}' must be [low, high] with low <= high, found [{low}, {high}].")
+        if self.side < 0.0 or self.tilt_deg[0] < 0.0:
+            raise ValueError("'side' and 'tilt_deg' must not be negative.")
+
+
+@dataclass(frozen=True)
+class FlightReward:
+    """Weights of the reward, per control step; e is the distance from the reference."""
+
+    near: float  # times exp(-e / 0.5 m)
+    nearer: float  # times exp(-e / 0.08 m)
+    speed: float  # times exp(-|speed error| / 2 m/s)
+    upright: float  # times cos(roll)
+    turning: float  # times -|turn rate|
+    crash: float  # once, subtracted, when the craft is lost
+
+
+@dataclass(frozen=True)
+class FollowReference(Task[SpatialState]):
+    """Follow places that lie `spacing_s` apart in time, all of them known from the start (`goal_path`).
+
+    Errors are across the flight: to the side and in height. How far along x the craft is does not count.
+    """
+
+    kind: Literal["follow_reference"]
+    name: str
+    title: str
+    episode_s: float  # length of an episode [s]
+    start: FlightStart
+    tolerance: Tolerance
+    reward_weights: FlightReward
+    reference: Literal["hold", "a", "b", "c", "d", "e", "f"] = "hold"  # of `references.flight_paths.PATHS`
+    height: Range = (1.0, 1.0)  # that `hold` draws from [m]
+    spacing_s: float = 0.1  # between two places of the path [s]
+
+    goal_topic: ClassVar[str] = "goal_path"
+    state_type = SpatialState
+    flies: ClassVar[bool] = True
+    observation_names: ClassVar[tuple[str, ...]] = TERMS
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.height[0] <= self.height[1]:
+            raise ValueError(f"'height' must be [low, high] with 0 < low <= high, found {list(self.height)}.")
+        if self.spacing_s <= 0.0 or self.episode_s <= 0.0:
+            raise ValueError("spacing_s and episode_s must be greater than 0.")
+
+    def farthest_start(self, *, training: bool) -> tuple[str, float]:
+        """See `Task.farthest_start`."""
+        name = "training_height" if training else "height"
+        return f"start.{name}", max(abs(edge) for edge in getattr(self.start, name))
+
+    def check(self, robot: Robot) -> None:
+        """See `Task.check`; and the reference lies where the craft can be.
+
+        Raises:
+            ConfigError: As of `Task.check`, or the lowest start lies in the water.
+        """
+        super().check(robot)
+        lowest = self.height[0] + self.start.height[0]
+        if self.reference == "hold" and lowest + robot.hull_span[0] <= 0.0:
+            raise ConfigError(
+                f"task '{self.name}' starts at {lowest:g} m, where the hull of '{robot.name}' touches the ground. Its "
+                f"origin is {-robot.hull_span[0]:g} m above its lowest point."
+            )
+
+    def draw(self, draws: Draws, robot: Robot, *, training: bool) -> tuple[SpatialState, Goal]:
+        """Draw starts and goals; see `Task.draw`."""
+        assert robot.airframe is not None  # as of `check`
+        held = draws.uniform(*self.height)
+        low, high = self.start.training_height if training else self.start.height
+        above, aside = draws.uniform(low, high), draws.uniform(-self.start.side, self.start.side)
+        tilt = draws.uniform(*self.start.tilt_deg)
+        about = uniform_direction(draws.uniform(0.0, 1.0), draws.uniform(0.0, 1.0))
+        xp = array_namespace(held)
+        goal = self._goal(held, robot.airframe.speed)
+        first = goal.targets[:, 0]
+        mean = float(xp.mean(first[:, 2]))
+        trim = find_trim(robot, robot.airframe.speed, max(mean, 0.1 * robot.airframe.span)).state
+        zero = xp.zeros_like(held)
+        level = trim.mapped(lambda part: zero + float(part))
+        turned = exponential(scaled(math.pi / 180.0 * tilt, about))
+        return (
+            SpatialState(
+                zero, first[:, 1] + aside, first[:, 2] + above, *product(level.quat, turned), *level.velocity, zero, zero,
+                zero,
+            ),
+            goal,
+        )  # fmt: skip
+
+    def _goal(self, held: Array, speed: float) -> Goal:
+        """Places along the reference; of a held height one is enough."""
+        xp, worlds = array_namespace(held), len(held)
+        count = 1 if self.reference == "hold" else 2 + math.ceil(self.episode_s / self.spacing_s)
+        times = self.spacing_s * np.arange(count)
+        targets = np.zeros((worlds, count, 7))
+        targets[..., 0], targets[..., 6] = speed * times, 1.0
+        if self.reference == "hold":
+            targets[:, :, 2] = np.asarray(held)[:, None]
+        else:
+            side, above = PATHS[self.reference]
+            targets[..., 1], targets[..., 2] = side(times), above(times)
+        goal = Goal(xp.asarray(targets), xp.zeros_like(held), no_obstacles(worlds))
+        return self.begun(goal, None)
+
+    def begun(self, goal: Goal, state: SpatialState | None) -> Goal:
+        """The reference at its first place; see `Task.begun`."""
+        zero = 0.0 * goal.targets[..., 0, 0]
+        return replace(goal, things={**goal.things, NOW: self._now(goal, zero)})
+
+    def _now(self, goal: Goal, time_s: Array) -> Array:
+        """Time, place and rate of the reference, between its places in a straight line, shape (..., 5)."""
+        targets = goal.targets
+        xp, last = array_namespace(targets), targets.shape[-2] - 1
+        here = targets[..., 0, :]
+        zero = 0.0 * here[..., 0]
+        time = time_s + zero
+        if last == 0:
+            return xp.stack((time, here[..., 1], here[..., 2], zero, zero), axis=-1)
+        share = clip(time / self.spacing_s, 0.0, float(last))
+        before = clip(xp.floor(share + 1e-6), 0.0, last - 1.0)
+        which = xp.astype(before, xp.int64)[..., None, None]
+        low = xp.take_along_axis(targets, which, axis=-2)[..., 0, :]
+        high = xp.take_along_axis(targets, which + 1, axis=-2)[..., 0, :]
+        part, going = share - before, xp.astype(time < last * self.spacing_s, targets.dtype)
+        y, z = (low[..., i] + part * (high[..., i] - low[..., i]) for i in (1, 2))
+        vy, vz = (going * (high[..., i] - low[..., i]) / self.spacing_s for i in (1, 2))
+        return xp.stack((time, y, z, vy, vz), axis=-1)
+
+    def advance(self, goal: Goal, state: SpatialState, time_s: Array) -> Goal:
+        """The reference moves on; see `Task.advance`."""
+        now = self._now(goal, time_s)
+        xp, last = array_namespace(now), goal.targets.shape[-2] - 1
+        done = clip(xp.floor(now[..., 0] / self.spacing_s + 1e-6), 0.0, float(last))
+        return replace(goal, done=xp.astype(done, goal.done.dtype), things={**goal.things, NOW: now})
+
+    def distance_from_goal(self, state: SpatialState, goal: Goal) -> Array | None:
+        """Distance across the flight; see `Task.distance_from_goal`."""
+        return self.errors(state, goal).position
+
+    def errors(self, state: SpatialState, goal: Goal) -> Errors:
+        """Distance from the reference across the flight."""
+        side, above = off_reference(state, goal)
+        return Errors(position=array_namespace(side).sqrt(side * side + above * above))
+
+    def observe(self, state: SpatialState, goal: Goal) -> tuple[Array, ...]:
+        """What every controller of this task sees, all of it near 1; see `Task.observe`.
+
+        Angles of attack and sideslip are against still air.
+        """
+        side, above = off_reference(state, goal)
+        now = goal.things[NOW]
+        climb, drift = now[..., 4] - state.vz, now[..., 3] - state.vy
+        ahead, left, up = state.velocity_in_body
+        xp = array_namespace(ahead)
+        roll, pitch, yaw = euler_of(state.quat)
+        speed = length(state.velocity)
+        return (
+            clip(above / COARSE, -3.0, 3.0), clip(above / FINE, -1.0, 1.0), clip(above / FINEST, -1.0, 1.0),
+            clip(side / COARSE, -3.0, 3.0), clip(side / FINE, -1.0, 1.0),
+            climb / FAST, drift / FAST, now[..., 4] / FAST, now[..., 3] / FAST, 0.2 * now[..., 2],
+            0.1 * (self.speed_of(goal) - speed), 10.0 * xp.atan2(-up, ahead), 10.0 * left / clip(speed, 1.0, None),
+            2.0 * roll, 5.0 * pitch, 5.0 * yaw, *(rate / QUICK for rate in state.rate),
+        )  # fmt: skip
+
+    def speed_of(self, goal: Goal) -> Array:
+        """Speed along x that a path asks for; that of the craft where it is one place [m/s]."""
+        if goal.targets.shape[-2] == 1:
+            return goal.targets[..., 0, 0] + self.cruise
+        return (goal.targets[..., 1, 0] - goal.targets[..., 0, 0]) / self.spacing_s
+
+    cruise: float = 0.0  # of the craft, as of `fitted`; 0 in a file [m/s]
+
+    def fitted(self, robot: Robot) -> FollowReference:
+        """The task with the cruising speed of a craft; see `Task.fitted`."""
+        return replace(self, cruise=robot.airframe.speed) if robot.airframe is not None else self
+
+    def reward(self, before: SpatialState, after: SpatialState, goal: Goal, ended: Goal) -> Array:
+        """Reward of one control step; see `Task.reward`."""
+        xp, w = array_namespace(after.x), self.reward_weights
+        e = self.errors(after, ended).position
+        slow = xp.abs(self.speed_of(ended) - length(after.velocity))
+        return weighted_sum(
+            (w.near, lambda: xp.exp(-e / 0.5)),
+            (w.nearer, lambda: xp.exp(-e / 0.08)),
+            (w.speed, lambda: xp.exp(-slow / 2.0)),
+            (w.upright, lambda: xp.cos(euler_of(after.quat)[0])),
+            (-w.turning, lambda: length(after.rate)),
+            zero=xp.zeros_like(e),
+        )
+
+    def collides(self, state: SpatialState, goal: Goal, robot: Robot) -> Array | None:
+        """Whether the hull touches the water, or the craft is stalled beyond recovery; see `Task.collides`."""
+        assert robot.airframe is not None  # as of `check`
+        ahead, _, up = state.velocity_in_body
+        xp = array_namespace(ahead)
+        lost = xp.abs(xp.atan2(-up, ahead)) > math.radians(robot.airframe.lost_deg)
+        return (state.z + robot.hull_span[0] <= 0.0) | lost | ~xp.isfinite(state.z)
+
+    def penalty(self, state: SpatialState, goal: Goal, robot: Robot) -> Array | None:
+        """What the loss of the craft costs a learner; see `Task.penalty`."""
+        touching = self.collides(state, goal, robot)
+        return self.reward_weights.crash * array_namespace(state.z).astype(touching, state.z.dtype)
+
+
+def off_reference(state: SpatialState, goal: Goal) -> tuple[Array, Array]:
+    """Way to the reference, to the left and up, shapes (...,) [m]."""
+    now = goal.things[NOW]
+    return now[..., 1] - state.y, now[..., 2] - state.z
