@@ -111,6 +111,7 @@ CONTROLLERS = {
         "a learned policy bundle", _load_policy, _any_pair, ("onnxruntime",), runs_bundle=True
     ),
     "lqr": _law("linear-quadratic regulator with valve allocation", "lqr"),
+    "lqi": _law("linear-quadratic regulator of aircraft with integral action", "lqi"),
     "pd": _law("proportional-derivative control of bodies in space and satellites", "pd"),
     "adaptive": _law("control of a satellite's attitude with its estimated inertia", "adaptive"),
     "mpc": _law("predictive control that tries combinations of valves", "mpc"),

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from fulmar_core.backend import Sample
 from fulmar_core.episode import Episode
+from fulmar_core.flight.dynamics import FlightDynamics
 from fulmar_core.motion import wheel_speeds_of
 from fulmar_core.robot import Robot
+from fulmar_core.sensors.air_data import AirData
 from fulmar_core.sensors.kind import Truth
 from fulmar_core.sensors.reading import Reading
 from fulmar_core.sensors.simulated import SimulatedSensors
+from fulmar_core.spatial import SpatialState
 from fulmar_core.state import State
 from fulmar_core.things import Poses, Thing
 from sim_nodes.one_world import OneWorld
@@ -64,12 +69,19 @@ class MockBackend:
     def close(self) -> None:
         """Nothing to release."""
 
+    def _air(self) -> AirData | None:
+        dynamics = self._world.dynamics
+        world: Any = self._world.world
+        if not isinstance(dynamics, FlightDynamics) or not isinstance(self._state, SpatialState):
+            return None
+        return dynamics.air_data(self._state, None, world)
+
     def _sample(self, ticks: int = 0) -> Sample:
         self._ticks += ticks
         truth = self._state[0].to_rigid()
         wheels = wheel_speeds_of(self.robot, self._world.actuation)
         others = self._sensors.measure(
-            Truth(truth, wheels=wheels), self._ticks * self.robot.timing.physics_dt
+            Truth(truth, wheels=wheels, air=self._air()), self._ticks * self.robot.timing.physics_dt
         )
         things = {name: pose[0] for name, pose in self._poses.items()}
         return Sample({"odometry": Reading(truth), **others}, truth, things)

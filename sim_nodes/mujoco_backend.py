@@ -20,6 +20,7 @@ from fulmar_core.state import RigidBodyState
 from fulmar_core.tasks import Task
 from fulmar_core.things import Thing
 from sim_nodes.mujoco_model import Scene
+from sim_nodes.mujoco_model.aircraft import Aircraft
 from sim_nodes.mujoco_model.objects import radii_for
 from sim_nodes.one_world import OneWorld
 
@@ -67,8 +68,11 @@ class MujocoBackend:
             self._use(Scene(self.robot, radii_for(obstacles), self._things))
         self._scene.begin(episode)
         self._sensors.reset(seed, number)
+        self._world.begin_episode(episode)
+        if isinstance(self._scene.robot_model, Aircraft):
+            self._scene.robot_model.fly_in(self._world.world, self._world.actuation)
         truth = self._read()
-        return self._sample(truth, self._world.reset(episode, truth.state, seed=seed, number=number))
+        return self._sample(truth, self._world.first_measurement(truth.state, seed=seed, number=number))
 
     def step(self, command: np.ndarray, ticks: int = 1, *, begins: int | None = None) -> Sample:
         """Apply a command; see `Backend.step`.
@@ -83,7 +87,12 @@ class MujocoBackend:
         last = None
         for _ in range(ticks):
             applied = world.actuation.advance(dt, latest_s=world.latest_s)
-            if applied is not last or not robot_model.steady:
+            if not robot_model.steady:
+                for _ in range(robot_model.steps_per_tick):
+                    robot_model.drive(model, data, applied[:, 0], world.actuation.gain[:, 0], outside)
+                    mujoco.mj_step(model, data)
+                continue
+            if applied is not last:
                 robot_model.drive(model, data, applied[:, 0], world.actuation.gain[:, 0], outside)
                 last = applied
             mujoco.mj_step(model, data, robot_model.steps_per_tick)
@@ -130,7 +139,7 @@ class MujocoBackend:
         position[2] -= self._scene.robot_model.rest_height
         w, x, y, z = read["attitude"]
         state = RigidBodyState(position, np.array([x, y, z, w]), read["velocity"], read["gyroscope"])
-        return Truth(state, read["accelerometer"], self._scene.robot_model.wheel_speeds(self.data))
+        return Truth(state, read["accelerometer"], **self._scene.robot_model.own_truth(self.data))
 
     def _sample(self, truth: Truth, odometry: RigidBodyState) -> Sample:
         self._truth = truth.state

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_core.dynamics_of import dynamics_of
 from fulmar_core.counter_rng import uniform_from, words, world_keys
+from fulmar_core.dynamics_of import dynamics_of
 from fulmar_core.episode import Episode
 from fulmar_core.motion import actuation_of
 from fulmar_core.robot import Robot
@@ -35,17 +35,12 @@ class OneWorld:
         self._safe = np.array(robot.actuators.safe_command)[:, None]
 
     def reset(self, episode: Episode, truth: RigidBodyState, *, seed: int, number: int) -> RigidBodyState:
-        """Begin anew.
+        """Begin anew, and measure; arguments as of `begin_episode` and `first_measurement`."""
+        self.begin_episode(episode)
+        return self.first_measurement(truth, seed=seed, number=number)
 
-        Args:
-            episode: Without a batch axis.
-            truth: Where the robot is.
-            seed: Of the noise.
-            number: Of the episode.
-
-        Returns:
-            First measurement.
-        """
+    def begin_episode(self, episode: Episode) -> None:
+        """Take the world of an episode, without a batch axis; actuators begin as its start has them."""
         self.world = episode.world.mapped(lambda part: np.asarray(part, dtype=float)[..., None])
         self.actuation = actuation_of(self._robot, self._safe)
         late = self.world.action_delay[0] + self.world.opening_delay[0]
@@ -54,6 +49,15 @@ class OneWorld:
         self.outside: Any = None  # before the first command
         self._constant_push = self.dynamics.push_is_constant(self.world)
         self._blurred = self.dynamics.blurs(self.world)
+
+    def first_measurement(self, truth: RigidBodyState, *, seed: int, number: int) -> RigidBodyState:
+        """Measure for the first time.
+
+        Args:
+            truth: Where the robot is.
+            seed: Of the noise.
+            number: Of the episode.
+        """
         self._seed, self._numbers, self._repeats = seed, np.array([number]), np.array([0])
         self._ticks = 0
         self._begun = 0  # control steps

@@ -44,6 +44,13 @@ ALIKE = {
     "microsat": "cubesat_wheels",
     "smallsat": "cubesat_wheels",
     "jetbot": "turtlebot2",
+    "a0s": "airship_v7",
+    "volantex_ranger": "airship_v7",
+    "navion": "airship_v7",
+    "navion_falcon": "airship_v7",
+    "cessna_182": "airship_v7",
+    "skywalker_x8": "airship_v7",
+    "sr22": "airship_v7",
     "floating_platform_roboran": "floating_platform",
 }
 

@@ -93,8 +93,9 @@ class Floater:
         if self.water is not None:
             self.water.take_world(world, model.body_inertia[self._body])
 
-    def wheel_speeds(self, data: mujoco.MjData) -> None:
-        """None: see `RobotModel.wheel_speeds`."""
+    def own_truth(self, data: mujoco.MjData) -> dict[str, Any]:
+        """Nothing: see `RobotModel.own_truth`."""
+        return {}
 
     def place(self, model: mujoco.MjModel, data: mujoco.MjData, start: Any) -> None:
         """Put the body where it starts, upright and at rest height."""

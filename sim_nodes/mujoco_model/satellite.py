@@ -6,6 +6,8 @@ that the body that carries them has a fixed inertia of its own.
 
 from __future__ import annotations
 
+from typing import Any
+
 import mujoco
 import numpy as np
 
@@ -102,8 +104,12 @@ class Satellite:
         data.qpos[:7] = *start.position, w, x, y, z
         data.qvel[:6] = *start.velocity, *start.rate
 
+    def own_truth(self, data: mujoco.MjData) -> dict[str, Any]:
+        """Speeds of the wheels."""
+        return {"wheels": self.wheel_speeds(data)}
+
     def wheel_speeds(self, data: mujoco.MjData) -> WheelSpeeds:
-        """See `RobotModel.wheel_speeds`."""
+        """Of each wheel relative to the body."""
         return WheelSpeeds(self._wheels.wheel_names, np.array(data.qvel[self._spins]))
 
     def drive(

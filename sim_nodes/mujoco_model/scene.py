@@ -13,9 +13,9 @@ from fulmar_core.actuators.reaction_wheels import ReactionWheels
 from fulmar_core.episode import Episode
 from fulmar_core.errors import ConfigError
 from fulmar_core.robot import Robot
-from fulmar_core.sensors.wheels import WheelSpeeds
 from fulmar_core.spatial import SpatialState
 from fulmar_core.things import Thing
+from sim_nodes.mujoco_model.aircraft import Aircraft
 from sim_nodes.mujoco_model.car import Car
 from sim_nodes.mujoco_model.differential_base import DifferentialBase
 from sim_nodes.mujoco_model.floater import Floater
@@ -168,8 +168,8 @@ class RobotModel(Protocol):
         """
         ...
 
-    def wheel_speeds(self, data: mujoco.MjData) -> WheelSpeeds | None:
-        """True speeds of reaction wheels; None of robots that have none."""
+    def own_truth(self, data: mujoco.MjData) -> dict[str, Any]:
+        """What is true of robots of this family alone, by the names of `sensors.kind.Truth`."""
         ...
 
     @property
@@ -184,6 +184,8 @@ def robot_model_of(robot: Robot) -> RobotModel:
     Raises:
         ConfigError: The family has none.
     """
+    if robot.flies:
+        return Aircraft(robot)
     if isinstance(robot.actuators, ReactionWheels):
         return Satellite(robot)
     if isinstance(robot.actuators, Pushing):

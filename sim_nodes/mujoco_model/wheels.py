@@ -5,6 +5,8 @@ The body's frame lies at the height of the wheels' axles, its origin above the m
 
 from __future__ import annotations
 
+from typing import Any
+
 import mujoco
 import numpy as np
 
@@ -169,8 +171,9 @@ class Chassis:
         model.body_ipos[self._body] = place
         model.body_inertia[self._body] = inertia
 
-    def wheel_speeds(self, data: mujoco.MjData) -> None:
-        """None: see `RobotModel.wheel_speeds`."""
+    def own_truth(self, data: mujoco.MjData) -> dict[str, Any]:
+        """Nothing: see `RobotModel.own_truth`."""
+        return {}
 
     def place(self, model: mujoco.MjModel, data: mujoco.MjData, start: PlanarState) -> None:
         """Put the robot where it starts, as it stands at rest, with its wheels turning as it rolls."""

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from fulmar_core.attitude import normalised, plus, product, turn
-from fulmar_core.dynamics_of import dynamics_of
 from fulmar_core.counter_rng import Draws
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.dynamics.contact import outline_of
+from fulmar_core.dynamics_of import dynamics_of
 from fulmar_core.goal import Goal
 from fulmar_core.observation import Observer
 from fulmar_core.paths import config_names

@@ -76,8 +76,7 @@ def main() -> None:
         "free": {"CL": free_lift, "CDi": free_drag},
         "columns": ["height over span", "lift ratio", "induced drag ratio"], "rows": rows,
     }  # fmt: skip
-    json.dump(table, sys.stdout, indent=1)
-    print()
+    sys.stdout.write(json.dumps(table, indent=1) + "\n")
 
 
 if __name__ == "__main__":

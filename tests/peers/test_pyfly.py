@@ -37,9 +37,7 @@ def ours(trim, after: np.ndarray) -> np.ndarray:
 
 @pytest.mark.slow
 @pytest.mark.timeout(300)
-@pytest.mark.parametrize(
-    "step", [(0.03, 0.0, 0.0), (0.0, 0.02, 0.0), (0.0, 0.0, 0.2), (-0.02, 0.01, 0.1)]
-)
+@pytest.mark.parametrize("step", [(0.03, 0.0, 0.0), (0.0, 0.02, 0.0), (0.0, 0.0, 0.2), (-0.02, 0.01, 0.1)])
 def test_rates_after_a_step_are_those_of_pyfly_for_two_seconds(pytestconfig, tmp_path, step):
     trim = find_trim(X8, 18.0, height=100.0, altitude=-100.0)  # in the air of sea level, as theirs
     after = trim.command + np.array(step)

@@ -46,6 +46,11 @@ ALIKE = {
     "race_wayposes",
     "point_inertial",
     "slew",
+    "fly_b",
+    "fly_c",
+    "fly_d",
+    "fly_e",
+    "fly_f",
 }
 ROBOTS, TASKS = (
     [pytest.param(name, marks=pytest.mark.slow if name in ALIKE else ()) for name in config_names(kind)]

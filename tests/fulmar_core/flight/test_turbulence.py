@@ -14,7 +14,11 @@ def gusts(height, *, dt, seconds, craft=64, wind=CLASSES["light"]):
     """Gusts of many craft, shape (steps, 6, craft)."""
     keys = np.stack((np.arange(craft), 7 + 3 * np.arange(craft))).astype(float)
     filters, steps = np.full((FILTERS, craft), np.nan), np.zeros(craft, dtype=np.int64)
-    still = {"airspeed": np.full(craft, SPEED), "height": np.full(craft, height), "wind": np.full(craft, wind)}
+    still = {
+        "airspeed": np.full(craft, SPEED),
+        "height": np.full(craft, height),
+        "wind": np.full(craft, wind),
+    }
     found = []
     filters = np.zeros((FILTERS, craft))
     for _ in range(round(seconds / dt)):

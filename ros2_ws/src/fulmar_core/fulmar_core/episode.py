@@ -10,10 +10,10 @@ from typing import Generic
 
 import numpy as np
 
-from fulmar_core.dynamics_of import dynamics_of
 from fulmar_core.counter_rng import START, WORLD, Draws
 from fulmar_core.disturbances.scenario import Scenario
 from fulmar_core.disturbances.world import World
+from fulmar_core.dynamics_of import dynamics_of
 from fulmar_core.errors import ConfigError
 from fulmar_core.goal import Goal
 from fulmar_core.robot import Robot

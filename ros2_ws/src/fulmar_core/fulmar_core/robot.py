@@ -274,7 +274,9 @@ class Robot:
                 f"{self.actuators.kind} only turn a body: it needs 'planar: false', its centre of mass at its origin, "
                 "and in 'performance' 0 for all but torque and yaw_rate."
             )
-        if self.flies is not (self.airframe is not None) or (self.flies and (self.body.planar or any(self.body.com))):
+        if self.flies is not (self.airframe is not None) or (
+            self.flies and (self.body.planar or any(self.body.com))
+        ):
             raise ValueError(
                 "control_surfaces and 'airframe' need one another, with 'planar: false' and the centre of mass at the "
                 "body's origin."

@@ -12,10 +12,10 @@ from array_api_compat import is_numpy_namespace
 from fulmar_core.actuators.wheel_actuation import WheelActuation
 from fulmar_core.arrays import array_namespace
 from fulmar_core.batch_dynamics import Dynamics
-from fulmar_core.dynamics_of import dynamics_of
 from fulmar_core.counter_rng import Keys, keys_at, uniform_from, words, world_keys, write_keys
 from fulmar_core.disturbances.scenario import Scenario, longest_delay
 from fulmar_core.disturbances.world import World
+from fulmar_core.dynamics_of import dynamics_of
 from fulmar_core.episode import draw_episodes
 from fulmar_core.episode_prefetch import Beginning, UpcomingEpisodes
 from fulmar_core.goal import Goal

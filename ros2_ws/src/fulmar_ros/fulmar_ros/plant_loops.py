@@ -95,7 +95,7 @@ class LockstepLoop:
                 # The first messages can get lost while endpoints still find each other.
                 self._wires.publish_sample(sample, stamp, resend=True)
             # The very command that answered: how long its answer or this thread took does not matter here.
-            command = self._guard.answer(time.monotonic_ns())
+            command = self._guard.answer(time.monotonic_ns(), sample.odometry)
         if grounded:
             command = self._backend.robot.actuators.safe_command  # what the backend does with any other
         self._wires.publish_applied(command, stamp)
@@ -150,7 +150,7 @@ class ChainLoop(LockstepLoop):
                     raise LockstepError(self._silence(stamp, waited, before))
                 wires.repeat_period()
             self._commanded = wires.answered_ns == stamp
-            command = self._guard.answer(time.monotonic_ns())
+            command = self._guard.answer(time.monotonic_ns(), sample.odometry)
         if grounded:
             command = self._backend.robot.actuators.safe_command
         wires.begin_period()

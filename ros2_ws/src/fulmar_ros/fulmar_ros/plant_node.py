@@ -13,6 +13,7 @@ from fulmar_core.backend import AirBearing, Backend
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import Episode
 from fulmar_core.errors import BAD_USAGE, FAILED, ConfigError, FulmarError
+from fulmar_core.flight.refuge import refuge_of
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.safety.actuator_guard import ActuatorGuard
 from fulmar_core.safety.estop import EstopMonitor
@@ -91,6 +92,7 @@ class PlantNode(LifecycleNode):
             estop=EstopMonitor(required=self.settings.estop),
             control_dt=1.0 / self.settings.control_rate(self.robot),
             lockstep=self.settings.lockstep,
+            refuge=refuge_of(self.robot),
         )
         self.clock = SimulatedTime() if simulated else WallTime()
         if self.settings.autostart:

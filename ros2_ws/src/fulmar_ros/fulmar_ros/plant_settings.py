@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import Episode, draw_episode
 from fulmar_core.errors import ConfigError
+from fulmar_core.flight.trim import flying_at
 from fulmar_core.robot import Robot
 from fulmar_core.safety.watchdog import checked_timeout, default_timeout
 from fulmar_core.tasks import load_task
@@ -111,4 +112,6 @@ def first_episode(robot: Robot, settings: PlantSettings) -> Episode:
     if task.state_type is not form:
         task.check(robot)
     episode = draw_episode(robot, task, scenario, seed=settings.seed, number=0)
-    return Episode(form.resting(form.target_at(settings.start)), episode.goal, episode.world)
+    pose = form.target_at(settings.start)
+    start = flying_at(robot, pose) if robot.flies else form.resting(pose)
+    return Episode(start, episode.goal, episode.world)

@@ -51,7 +51,9 @@ class Motor:
 
     def __post_init__(self) -> None:
         if not self.name.startswith("throttle"):
-            raise ValueError(f"motor '{self.name}': its name must begin with 'throttle', as in throttle_left.")
+            raise ValueError(
+                f"motor '{self.name}': its name must begin with 'throttle', as in throttle_left."
+            )
         if self.lag_s < 0.0:
             raise ValueError(f"motor '{self.name}': 'lag_s' must not be negative.")
 
@@ -72,14 +74,18 @@ class ControlSurfaces(Actuators):
 
     def __post_init__(self) -> None:
         if len(set(self.names)) != len(self.names) or not self.surfaces:
-            raise ValueError("'surfaces' must not be empty, and each surface and motor needs a name of its own.")
+            raise ValueError(
+                "'surfaces' must not be empty, and each surface and motor needs a name of its own."
+            )
         order = [SURFACES.index(surface.name) for surface in self.surfaces]
         if order != sorted(order):
             raise ValueError(f"'surfaces' must be in the order {', '.join(SURFACES)}.")
         if min(self.servo_rate, self.servo_damping) <= 0.0:
             raise ValueError("servo_rate and servo_damping must be greater than 0.")
         if self.response.slew or self.response.lag_s:
-            raise ValueError("'response' takes neither slew nor lag_s here: give servo_rate, rate_deg and lag_s of motors.")
+            raise ValueError(
+                "'response' takes neither slew nor lag_s here: give servo_rate, rate_deg, and lag_s of motors."
+            )
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -80,7 +80,9 @@ class FlightActuation(ActuationState):
         self.applied = xp.concat((stopped, xp.stack(levels))) if levels else stopped
         return 0.5 * (before + self.applied)
 
-    def blow(self, keys: Array, wind: Array, *, airspeed: Array, height: Array, span: float, dt: float) -> Gust:
+    def blow(
+        self, keys: Array, wind: Array, *, airspeed: Array, height: Array, span: float, dt: float
+    ) -> Gust:
         """Let the air move past for a time step; arguments and result as of `turbulence.gust_step`."""
         self.gusts, gust = gust_step(
             self.gusts, keys, self.gust_steps, airspeed=airspeed, height=height, wind=wind, span=span, dt=dt

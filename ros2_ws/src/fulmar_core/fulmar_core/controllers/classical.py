@@ -28,6 +28,13 @@ from fulmar_core.controllers.default_gains import (
     pure_pursuit_gains,
     rounded,
 )
+from fulmar_core.controllers.flight_lqi import (
+    FlightLqi,
+    FlightLqr,
+    FlightWeights,
+    flight_lqi_weights,
+    flight_lqr_weights,
+)
 from fulmar_core.controllers.law import Law
 from fulmar_core.controllers.line_of_sight import LineOfSight, LineOfSightGains
 from fulmar_core.controllers.lqr import Lqr, LqrWeights
@@ -89,11 +96,17 @@ ATTITUDE_LAWS = {
     "pd": Entry(AttitudePd, AttitudePdGains, ("point",), attitude_pd_gains),
     "adaptive": Entry(AdaptiveAttitude, AttitudePdGains, ("point",), attitude_pd_gains),
 }
+# Laws of aircraft; the first one is that of the family.
+FLIGHT_LAWS = {
+    "lqi": Entry(FlightLqi, FlightWeights, ("follow_reference",), flight_lqi_weights),
+    "lqr": Entry(FlightLqr, FlightWeights, ("follow_reference",), flight_lqr_weights),
+}
+FLYING_FAMILIES = tuple(kind for kind, each in FAMILIES.items() if each.flies)
 TURNING_FAMILIES = tuple(kind for kind, each in FAMILIES.items() if each.turns_only)
 SPACE_FAMILIES = tuple(kind for kind, each in FAMILIES.items() if issubclass(each, Pushing) and each.one_way)
 
 
-BEYOND_PLANE = {**SPACE_LAWS, **ATTITUDE_LAWS}  # names of laws for bodies in space
+BEYOND_PLANE = {**FLIGHT_LAWS, **SPACE_LAWS, **ATTITUDE_LAWS}  # names of laws for bodies in space
 
 
 def is_in_space(robot: Robot) -> bool:
@@ -102,7 +115,9 @@ def is_in_space(robot: Robot) -> bool:
 
 
 def laws_in_space(robot: Robot) -> dict[str, Entry]:
-    """Laws of a body in space: those that push it, or those that only turn it."""
+    """Laws of a body in space: those that fly it, that push it, or that only turn it."""
+    if robot.flies:
+        return FLIGHT_LAWS
     return ATTITUDE_LAWS if robot.actuators.turns_only else SPACE_LAWS
 
 
@@ -111,8 +126,17 @@ def families_of(law: str | None) -> tuple[str, ...]:
     if law in OTHERS:
         return (OTHERS[law][0],)
     if law in BEYOND_PLANE and law not in LAWS:
-        return (*(SPACE_FAMILIES if law in SPACE_LAWS else ()), *TURNING_FAMILIES)
-    return tuple(kind for kind, each in FAMILIES.items() if each.law and law in (None, each.law))
+        tables = (
+            (SPACE_LAWS, SPACE_FAMILIES),
+            (ATTITUDE_LAWS, TURNING_FAMILIES),
+            (FLIGHT_LAWS, FLYING_FAMILIES),
+        )
+        return tuple(family for laws, families in tables if law in laws for family in families)
+    flying = FLYING_FAMILIES if law in FLIGHT_LAWS else ()
+    return (
+        *(kind for kind, each in FAMILIES.items() if each.law and law in (None, each.law) and not each.flies),
+        *flying,
+    )
 
 
 def entry_of(robot: Robot, law: str | None) -> Entry:
@@ -123,7 +147,7 @@ def entry_of(robot: Robot, law: str | None) -> Entry:
     """
     if is_in_space(robot):
         laws = laws_in_space(robot)
-        return laws.get(law or "", laws["lqr"])
+        return laws.get(law or "", next(iter(laws.values())))
     if law in OTHERS:
         return OTHERS[law][1]
     if law in BEYOND_PLANE and law not in LAWS:
@@ -181,7 +205,9 @@ def _check_space(robot: Robot, law: str | None) -> None:
     fitting = laws_in_space(robot) if space else in_plane
     if law in fitting or law not in (*in_plane, *BEYOND_PLANE):
         return
-    here, there = ("floats in space", "in the plane") if space else ("moves in the plane", "in space")
+    here, there = ("flies", "elsewhere") if robot.flies else ("floats in space", "in the plane")
+    if not space:
+        here, there = "moves in the plane", "in space"
     raise ConfigError(
         f"controller '{law}' is for robots with {' or '.join(families_of(law))} {there}; '{robot.name}' {here}. "
         f"Use --controller {' or '.join(fitting) if space else 'classical'}."
@@ -191,8 +217,9 @@ def _check_space(robot: Robot, law: str | None) -> None:
 def has_law(robot: Robot, task: Task) -> bool:
     """Whether there is a classical law for a pair."""
     if is_in_space(robot):
-        families = TURNING_FAMILIES if robot.actuators.turns_only else SPACE_FAMILIES
-        return task.kind in laws_in_space(robot)["lqr"].tasks and robot.actuators.kind in families
+        families = (*FLYING_FAMILIES, *TURNING_FAMILIES, *SPACE_FAMILIES)
+        first = next(iter(laws_in_space(robot).values()))
+        return task.kind in first.tasks and robot.actuators.kind in families
     entry = LAWS.get(robot.actuators.law)
     return entry is not None and task.kind in entry.tasks
 

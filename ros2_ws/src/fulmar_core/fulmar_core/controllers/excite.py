@@ -16,13 +16,13 @@ from fulmar_core.actuators.actuation import ActuationState
 from fulmar_core.actuators.excitation import Excitation
 from fulmar_core.actuators.families import FAMILIES
 from fulmar_core.attitude import length, minus, plus, scaled
-from fulmar_core.dynamics_of import dynamics_of
 from fulmar_core.controllers.body_frame import BodyFrame
 from fulmar_core.controllers.controller import Inputs
 from fulmar_core.controllers.excite_wheels import TASKS as TURNING
 from fulmar_core.controllers.excite_wheels import ExciteWheels
 from fulmar_core.controllers.law import Law
-from fulmar_core.dynamics.linear_model import nominal_worlds
+from fulmar_core.dynamics.linear_model import calm, nominal_worlds
+from fulmar_core.dynamics_of import dynamics_of
 from fulmar_core.excitation.settings import Torques
 from fulmar_core.identification.model import nominal_world
 from fulmar_core.motion import actuation_of, move
@@ -155,7 +155,7 @@ class ExciteInSpace(Excite):
 
     def bind(self) -> None:
         """See `Law.bind`."""
-        self._dynamics = dynamics_of(self.robot, CALM)
+        self._dynamics = dynamics_of(self.robot, calm())
         self._world = nominal_worlds(self.robot, 1)
 
     def _distance(self, inputs: Inputs) -> np.ndarray:

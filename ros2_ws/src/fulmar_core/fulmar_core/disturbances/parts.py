@@ -103,8 +103,8 @@ class Air:
     def __post_init__(self) -> None:
         if not 0.0 <= self.wind[0] <= self.wind[1] or self.turbulence < 0.0:
             raise ValueError("'wind' must be [low, high] with 0 <= low <= high, 'turbulence' not negative.")
-        if not -500.0 <= self.altitude <= 10_000.0:
-            raise ValueError(f"'altitude' = {self.altitude:g} m must lie between -500 and 10000.")
+        if not -1000.0 <= self.altitude <= 11_000.0:
+            raise ValueError(f"'altitude' = {self.altitude:g} m must lie between -1000 and 11000.")
 
 
 @dataclass(frozen=True)
@@ -169,6 +169,7 @@ class Sensing:
     bias: float = 1.0  # factor on the robot's own biases and errors of scale [-]
     # Largest delay beyond the robot's own. It counts in whole readings: in training half a control step is none [s].
     delay_s: float = 0.0
+    least_delay: float = 0.0  # smallest of these, as a share of the largest [-]
     dropout: float = 0.0  # largest chance that a measurement is lost [-]
     # Beside the noise of the robot's own sensors, and where these are perfect too; uniform, anew each time.
     velocity_noise: Range = (0.0, 0.0)  # largest error of each measured velocity, for a whole episode [m/s]
@@ -180,6 +181,8 @@ class Sensing:
     def __post_init__(self) -> None:
         if min(self.noise, self.bias, self.delay_s, self.dropout) < 0.0 or self.dropout > 1.0:
             raise ValueError("noise, bias, delay and dropout must not be negative, 'dropout' at most 1.")
+        if not 0.0 <= self.least_delay <= 1.0:
+            raise ValueError(f"'least_delay' = {self.least_delay:g} must lie in [0, 1].")
         if min(self.gyroscope, self.gyroscope_dies_s or 0.0) < 0.0:
             raise ValueError("gyroscope and gyroscope_dies_s must not be negative.")
         for low, high in (self.velocity_noise, self.yaw_rate_noise):

@@ -195,7 +195,7 @@ def draw_world(robot: Robot, scenario: Scenario, draws: Draws) -> World:
     chances = draws.uniform(0.0, 1.0, count)
     delay, noise = draws.uniform(0.0, 1.0), draws.uniform(faults.least_noise, 1.0)
     bias, scale = draws.normal(1.0, 6), draws.normal(1.0, 6)
-    sensor_delay, dropout = draws.uniform(0.0, 1.0), draws.uniform(0.0, 1.0)
+    sensor_delay, dropout = draws.uniform(sensing.least_delay, 1.0), draws.uniform(0.0, 1.0)
     tether, slope = scenario.tether, scenario.slope
     stiffness = draws.uniform(*tether.stiffness)
     reach, anchor_bearing = draws.uniform(0.0, tether.reach), draws.uniform(-math.pi, math.pi)

@@ -161,7 +161,7 @@ def draw_spatial_world(robot: Robot, scenario: Scenario, draws: Draws) -> Spatia
     delay, noise = draws.uniform(0.0, 1.0), draws.uniform(faults.least_noise, 1.0)
     opening = draws.uniform(*faults.opening_delay_s)
     bias, scale = draws.normal(1.0, SENSED), draws.normal(1.0, SENSED)
-    sensor_delay, dropout = draws.uniform(0.0, 1.0), draws.uniform(0.0, 1.0)
+    sensor_delay, dropout = draws.uniform(sensing.least_delay, 1.0), draws.uniform(0.0, 1.0)
     velocity_noise, rate_noise = (
         draws.uniform(*sensing.velocity_noise),
         draws.uniform(*sensing.yaw_rate_noise),

@@ -15,11 +15,11 @@ import numpy as np
 
 from fulmar_core.actuators.rolling import Rolling
 from fulmar_core.attitude import Vector, exponential, minus, plus, product, rotation_error, turn, turn_back
-from fulmar_core.dynamics_of import dynamics_of
 from fulmar_core.counter_rng import Draws
 from fulmar_core.disturbances.scenario import Scenario
 from fulmar_core.dynamics.free_body import free_body_step
 from fulmar_core.dynamics.rigid_body import inertia_of, rigid_body_step
+from fulmar_core.dynamics_of import dynamics_of
 from fulmar_core.errors import ConfigError
 from fulmar_core.motion import actuation_of
 from fulmar_core.planar import PlanarState
@@ -39,7 +39,13 @@ class LinearModel:
     b: np.ndarray  # (n, m)
 
 
-def linearise(robot: Robot, state: State, command: np.ndarray, dt: float) -> LinearModel:
+def linearise(
+    robot: Robot,
+    state: State,
+    command: np.ndarray,
+    dt: float,
+    worlds: Callable[[Robot, int], Any] | None = None,
+) -> LinearModel:
     """Model of one control step, with commands as inputs, for every family.
 
     Commands count as applied: delay, slew and lag are of actuators that remember, and x has no room for what they do.
@@ -50,6 +56,7 @@ def linearise(robot: Robot, state: State, command: np.ndarray, dt: float) -> Lin
         state: Where to linearise, shapes ().
         command: Held there, within the limits, shape (n,).
         dt: Time of one control step, a multiple of the physics step [s].
+        worlds: So many worlds of the robot; `nominal_worlds` by default.
 
     Returns:
         A and B, the latter per unit of command.
@@ -62,7 +69,7 @@ def linearise(robot: Robot, state: State, command: np.ndarray, dt: float) -> Lin
 
     def moved(states: Any, commands: np.ndarray) -> Any:
         count = commands.shape[1]
-        world, still = nominal_worlds(robot, count), (np.zeros(count),) * 3
+        world, still = (worlds or nominal_worlds)(robot, count), (np.zeros(count),) * 3
         actuation = actuation_of(robot, commands)
         actuation.begin(commands, world, None)
         return dynamics.move(
@@ -209,5 +216,9 @@ def _columns(state: PlanarState) -> np.ndarray:
 
 def nominal_worlds(robot: Robot, count: int) -> Any:
     """Worlds of the robot's dynamics without any disturbance."""
-    calm = Scenario("calm", sensor_noise=False, body="nominal")
-    return dynamics_of(robot).draw_world(calm, Draws(0, np.zeros(count), np.zeros(count)))
+    return dynamics_of(robot, calm()).draw_world(calm(), Draws(0, np.zeros(count), np.zeros(count)))
+
+
+def calm() -> Scenario:
+    """A scenario in which nothing disturbs a nominal body, and sensors are perfect."""
+    return Scenario("calm", sensor_noise=False, body="nominal")

@@ -34,8 +34,8 @@ class Airframe:
     stall_deg: float  # angle of attack beyond which the coefficients say nothing [deg]
     aerodynamics: Coefficients
     ground_effect: GroundEffect | None = None  # None: free air at every height
-    # mirrored: lift and drag are turned into the body with the sign of the sideslip reversed, as PyFly and FALCON-S have it
-    # by mistake; for an aircraft whose flights are to be theirs.
+    # mirrored: lift and drag are turned into the body with the sign of the sideslip reversed, as PyFly and FALCON-S
+    # have it by mistake; for an aircraft whose flights are to be theirs.
     wind_axes: Literal["standard", "mirrored"] = "standard"
     estimated: bool = False  # True: the source has gaps, and numbers here are no figures to compare with
 
@@ -47,8 +47,8 @@ class Airframe:
             raise ValueError(f"'taper' = {self.taper:g} must lie in (0, 1].")
         if self.chord > 2.0 * self.area / self.span:
             raise ValueError(
-                f"'chord' = {self.chord:g} m is more than twice area / span = {self.area / self.span:.3g} m: no wing has "
-                "such a mean chord. Take the three from one source."
+                f"'chord' = {self.chord:g} m is more than twice area / span = {self.area / self.span:.3g} m: no wing "
+                "has such a mean chord. Take the three from one source."
             )
 
     @property

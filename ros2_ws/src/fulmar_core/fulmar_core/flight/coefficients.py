@@ -92,7 +92,9 @@ class Coefficients:
     @property
     def uses_alphadot(self) -> bool:
         """Whether any coefficient depends on how fast the angle of attack changes."""
-        return any(name == "alphadot" for each in self.parsed.values() for _, powers in each for name, _ in powers)
+        return any(
+            name == "alphadot" for each in self.parsed.values() for _, powers in each for name, _ in powers
+        )
 
     def scaled_flow(self, flow: Flow) -> dict[str, Array]:
         """Factors in the file's unit, signs and origin; those that are missing count as 0."""
@@ -168,8 +170,8 @@ def _powers(words: str) -> tuple[tuple[str, int], ...]:
         name, hat, power = word.partition("^")
         if name not in FACTORS:
             raise ValueError(
-                f"factor '{name}' of the term '{words}' is not known. Known: {', '.join(FACTORS)}, and '1' for a number "
-                f"alone.{did_you_mean(name, FACTORS)}"
+                f"factor '{name}' of the term '{words}' is not known. Known: {', '.join(FACTORS)}, and '1' for a "
+                f"number alone.{did_you_mean(name, FACTORS)}"
             )
         if hat and (not power.isdigit() or int(power) < 1):
             raise ValueError(f"the term '{words}': a power must be a whole number of 1 or more.")

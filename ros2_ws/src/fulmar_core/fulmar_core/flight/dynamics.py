@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+
+import numpy as np
 
 from fulmar_core.actuators.actuation import ActuationState
 from fulmar_core.actuators.control_surfaces import ControlSurfaces
 from fulmar_core.actuators.flight_actuation import FlightActuation
 from fulmar_core.arrays import array_namespace
-from fulmar_core.attitude import Vector, cross, minus, normalised, plus, product, scaled, turn, turn_back
+from fulmar_core.attitude import Vector, cross, dot, minus, normalised, plus, product, scaled, turn, turn_back
 from fulmar_core.batch_dynamics import SpatialDynamics
 from fulmar_core.counter_rng import Draws
 from fulmar_core.disturbances.scenario import Scenario
@@ -21,8 +24,10 @@ from fulmar_core.flight.atmosphere import air_density
 from fulmar_core.flight.turbulence import Gust
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
+from fulmar_core.sensors.air_data import AirData, AirDataSpec
 from fulmar_core.spatial import SpatialState
 
+FASTEST_TUMBLE = 20.0  # of an aircraft [rad/s]
 KEYS = 2**24  # gusts hang on two whole numbers below this, which float32 holds exactly
 
 
@@ -42,7 +47,9 @@ class FlightDynamics(SpatialDynamics):
     def __init__(self, robot: Robot, *, turbulent: bool = True) -> None:
         """Prepare; `turbulent`: some world may have turbulence."""
         super().__init__(robot, orbits=False)
-        assert isinstance(robot.actuators, ControlSurfaces) and robot.airframe is not None  # as of `dynamics_of`
+        assert (
+            isinstance(robot.actuators, ControlSurfaces) and robot.airframe is not None
+        )  # as of `dynamics_of`
         self._craft, self.airframe, self._turbulent = robot.actuators, robot.airframe, turbulent
 
     def draw_world(self, scenario: Scenario, draws: Draws) -> FlightWorld:
@@ -52,15 +59,14 @@ class FlightDynamics(SpatialDynamics):
         speed, bearing = draws.uniform(*air.wind), draws.uniform(-xp.pi, xp.pi)
         keys = xp.floor(draws.uniform(0.0, KEYS, 2)).T
         zero = xp.zeros_like(body.mass)
-        return FlightWorld(
-            *body.parts(),
-            wind=xp.stack((speed * xp.cos(bearing), speed * xp.sin(bearing), zero)),
-            turbulence=zero + air.turbulence,
-            gust_keys=keys,
-            altitude=zero + air.altitude,
-        )
+        wind = xp.stack((speed * xp.cos(bearing), speed * xp.sin(bearing), zero))
+        around = {"wind": wind, "turbulence": zero + air.turbulence, "gust_keys": keys}
+        own = dict(zip(SpatialWorld.names(), body.parts(), strict=True))
+        return FlightWorld(**own, **around, altitude=zero + air.altitude)
 
-    def outside(self, state: SpatialState, world: SpatialWorld, time_s: Array, control_dt: float) -> tuple[Array, ...]:
+    def outside(
+        self, state: SpatialState, world: SpatialWorld, time_s: Array, control_dt: float
+    ) -> tuple[Array, ...]:
         """Force of kicks along the world's axes [N]; see `Dynamics.outside`."""
         return push_in_world(world, time_s, control_dt)
 
@@ -87,10 +93,23 @@ class FlightDynamics(SpatialDynamics):
         for _ in range(substeps):
             applied = actuation.advance(dt, latest_s=latest_s) * actuation.gain
             gust = self.gust(state, actuation, world, dt)
-            state = self._step(state, applied, gust, world, inertia, push, dt)
+            state = self._where_it_flies(state, self._step(state, applied, gust, world, inertia, push, dt))
         return state
 
-    def gust(self, state: SpatialState, actuation: ActuationState, world: FlightWorld, dt: float) -> Gust | None:
+    def _where_it_flies(self, before: SpatialState, after: SpatialState) -> SpatialState:
+        """The state after a step, or, of a craft that is lost, where it was, at rest.
+
+        Lost is one whose hull touches the ground, or that tumbles faster than any model of the air holds for.
+        """
+        xp = array_namespace(after.x)
+        flying = (after.z + self.robot.hull_span[0] > 0.0) & (dot(after.rate, after.rate) < FASTEST_TUMBLE**2)
+        stopped = before.stopped()
+        columns = zip(after.columns(), stopped.columns(), strict=True)
+        return SpatialState(*(xp.where(flying, new, old) for new, old in columns))
+
+    def gust(
+        self, state: SpatialState, actuation: ActuationState, world: FlightWorld, dt: float
+    ) -> Gust | None:
         """The gust of a time step, which the actuation remembers; None where no world has turbulence."""
         assert isinstance(actuation, FlightActuation)
         if not self._turbulent:
@@ -113,23 +132,34 @@ class FlightDynamics(SpatialDynamics):
             world: Body and air.
             inertia: Of the body.
         """
-        craft = self._craft
-        through = minus(state.velocity, (world.wind[0], world.wind[1], world.wind[2]))
-        ahead, left, up = turn_back(state.quat, through)
-        velocity, rate = (ahead, -left, -up), (state.wx, -state.wy, -state.wz)
-        if gust is not None:
-            velocity, turning = minus(velocity, gust[:3]), minus(rate, gust[3:])
-        else:
-            turning = rate
+        craft, velocity = self._craft, self.through_the_air(state, gust, world)
+        rate = flipped(state.rate)
+        turning = rate if gust is None else minus(rate, gust[3:])
         air = flow_past(velocity, turning, surfaces_of(craft, applied), self.airframe)
         density = self.density(state, world)
         coefficients = self.airframe.coefficients(air, state.z)
         thrust, torque = self.propellers(applied[craft.positions :], air.speed, density)
         if self.airframe.slow_terms:
             force, _ = self.airframe.loads(coefficients, air, density)
-            self._add_slow_terms(coefficients, air, density, velocity, rate, state, plus(force, flipped(thrust)), world)
+            self._add_slow_terms(
+                coefficients, air, density, velocity, rate, state, plus(force, flipped(thrust)), world
+            )
         force, moment = self.airframe.loads(coefficients, air, density)
         return plus(flipped(force), thrust), plus(flipped(moment), torque)
+
+    @staticmethod
+    def through_the_air(state: SpatialState, gust: Gust | None, world: FlightWorld) -> Vector:
+        """Velocity of an aircraft relative to the air, x ahead, y right, z down [m/s]."""
+        through = minus(state.velocity, (world.wind[0], world.wind[1], world.wind[2]))
+        velocity = flipped(turn_back(state.quat, through))
+        return velocity if gust is None else minus(velocity, gust[:3])
+
+    def air_data(self, state: SpatialState, gust: Gust | None, world: FlightWorld) -> AirData:
+        """What air probes without errors measure, of a batch of one."""
+        u, v, w = (float(part[0]) for part in self.through_the_air(state, gust, world))
+        speed = math.sqrt(u * u + v * v + w * w)
+        side = math.asin(v / speed) if speed else 0.0
+        return AirData(AirDataSpec.NAMES, np.array([speed, math.atan2(w, u), side, float(state.z[0])]))
 
     @staticmethod
     def density(state: SpatialState, world: FlightWorld) -> Array:
@@ -198,7 +228,8 @@ class FlightDynamics(SpatialDynamics):
             for value, a, b, c, d in zip(state.columns(), k1, k2, k3, k4, strict=True)
         ]
         quat = normalised((columns[3], columns[4], columns[5], columns[6]))
-        return SpatialState(*columns[:3], *quat, *columns[7:])
+        columns[3:7] = quat
+        return SpatialState(*columns)
 
 
 def _along(state: SpatialState, dt: float, slopes: tuple[Array, ...]) -> SpatialState:

@@ -23,7 +23,9 @@ HIGHEST = 4.0  # from which on it is free air to 1e-3 [spans]
 class GroundEffect:
     """Which part of the drag the ground lessens, and the wing that it is about."""
 
-    drag: Literal["induced", "total"] = "induced"  # total: as the thesis has it (eq. 5.5), which overstates it
+    drag: Literal["induced", "total"] = (
+        "induced"  # total: as the thesis has it (eq. 5.5), which overstates it
+    )
     wing_height: float = 0.0  # of the wing above the centre of mass [m]
     efficiency: float = 0.9  # Oswald's, of the induced part of the drag in free air [-]
 
@@ -56,7 +58,14 @@ def induced_drag_ratio(height: Array, aspect_ratio: float, taper: float) -> Arra
 
 
 def near_ground(
-    lift: Array, drag: Array, height: Array, *, effect: GroundEffect, aspect_ratio: float, taper: float, span: float
+    lift: Array,
+    drag: Array,
+    height: Array,
+    *,
+    effect: GroundEffect,
+    aspect_ratio: float,
+    taper: float,
+    span: float,
 ) -> tuple[Array, Array]:
     """Coefficients of lift and drag near the ground.
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from scipy.linalg import logm
 
 from fulmar_core.dynamics.linear_model import linearise
-from fulmar_core.flight.trim import Trim, free_air
+from fulmar_core.flight.trim import Trim, free_air, still_air
 from fulmar_core.robot import Robot
 
 # Of a departure in space (`linear_model`): position, rotation, velocity and turn rate, three each, y left and z up.
@@ -55,7 +56,7 @@ def continuous_model(robot: Robot, trim: Trim) -> tuple[np.ndarray, np.ndarray]:
     """
     craft = robot if trim.height is not None else free_air(robot)
     dt = robot.timing.physics_dt
-    model = linearise(craft, trim.state, trim.command, dt)
+    model = linearise(craft, trim.state, trim.command, dt, partial(still_air, altitude=trim.ground))
     count, inputs = model.b.shape
     joint = np.eye(count + inputs)
     joint[:count, :count], joint[:count, count:] = model.a, model.b

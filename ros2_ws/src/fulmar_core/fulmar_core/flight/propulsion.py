@@ -57,7 +57,9 @@ class PistonEngine:
 
     def thrust_at(self, throttle: Array, airspeed: Array, density: Array) -> Array:
         """Thrust, shape (...,) [N]; arguments as of `ElectricMotor.thrust_at`."""
-        return clip(throttle * (self.power * self.efficiency) / clip(airspeed, SLOWEST, None), 0.0, self.thrust)
+        return clip(
+            throttle * (self.power * self.efficiency) / clip(airspeed, SLOWEST, None), 0.0, self.thrust
+        )
 
     def torque_at(self, throttle: Array) -> Array:
         """None is modelled; see `ElectricMotor.torque_at`."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import least_squares
 
-from fulmar_core.attitude import from_euler, product, turn
+from fulmar_core.attitude import euler_of, from_euler, product, turn
 from fulmar_core.counter_rng import Draws
 from fulmar_core.disturbances.parts import Air
 from fulmar_core.disturbances.scenario import Scenario
@@ -19,7 +19,7 @@ from fulmar_core.flight.dynamics import FlightDynamics, FlightWorld
 from fulmar_core.robot import Robot
 from fulmar_core.spatial import SpatialState
 
-FREE_AIR = 1e4  # height that stands for free air [m]
+FREE_AIR = 100.0  # height above ground without effect that stands for free air [m]
 RESIDUAL = 1e-6  # largest acceleration of a trim [m/s², rad/s²]
 
 
@@ -34,6 +34,11 @@ class Trim:
     state: SpatialState  # shapes ()
     command: np.ndarray  # shape (n,): deflections [rad] and throttles
     thrust: float  # of all propellers [N]
+
+    @property
+    def ground(self) -> float:
+        """Altitude of z = 0 above mean sea level [m]."""
+        return self.altitude if self.height is not None else self.altitude - FREE_AIR
 
     @property
     def elevator(self) -> float:
@@ -71,7 +76,9 @@ def find_trim(robot: Robot, speed: float, height: float | None = None, altitude:
         ConfigError: The robot is no aircraft, a number is impossible, or there is no trim within the limits.
     """
     if not robot.flies or robot.airframe is None:
-        raise ConfigError(f"'{robot.name}' is no aircraft, so it has no trim. `fulmar list robots` shows others.")
+        raise ConfigError(
+            f"'{robot.name}' is no aircraft, so it has no trim. `fulmar list robots` shows others."
+        )
     if not 0.0 < speed < math.inf:
         raise ConfigError(f"speed = {speed:g} m/s must be greater than 0.")
     if height is not None and not 0.0 < height < math.inf:
@@ -79,24 +86,37 @@ def find_trim(robot: Robot, speed: float, height: float | None = None, altitude:
     if not -500.0 <= altitude <= 11_000.0:
         raise ConfigError(f"altitude = {altitude:g} m must lie between -500 and 11000, in the troposphere.")
     craft = robot if height is not None else free_air(robot)
-    problem = _Problem(craft, speed, height or 0.0, altitude)
-    found = least_squares(problem.residual, problem.start, bounds=problem.bounds, xtol=1e-14, ftol=1e-14, gtol=1e-14)
+    problem = _Problem(
+        craft, speed, height or FREE_AIR, altitude if height is not None else altitude - FREE_AIR
+    )
+    found = least_squares(
+        problem.residual, problem.start, bounds=problem.bounds, xtol=1e-14, ftol=1e-14, gtol=1e-14
+    )
     worst = float(np.abs(problem.residual(found.x)).max())
     if worst > RESIDUAL:
         raise ConfigError(
             f"'{robot.name}' has no trim at {speed:g} m/s and {'in free air' if height is None else f'{height:g} m'}: "
             f"{problem.shortfall(found.x)}. Try a speed near {robot.airframe.speed:g} m/s."
         )
-    return problem.trim(found.x, height)
+    return problem.trim(found.x, height, altitude)
+
+
+def flying_at(robot: Robot, pose: np.ndarray) -> SpatialState:
+    """An aircraft at cruising speed at a pose of 7 numbers, on a level path along its heading, shapes ()."""
+    assert robot.airframe is not None  # as of `Robot.flies`
+    state = SpatialState.resting(np.asarray(pose, dtype=float))
+    heading = float(euler_of(state.quat)[2])
+    ahead = robot.airframe.speed * np.array([math.cos(heading), math.sin(heading)])
+    return replace(state, vx=np.asarray(ahead[0]), vy=np.asarray(ahead[1]))
 
 
 class _Problem:
     """Accelerations of a craft as a function of α, roll, sideslip, deflections and throttle, all in one vector."""
 
-    def __init__(self, robot: Robot, speed: float, height: float, altitude: float) -> None:
-        self._robot, self._speed, self._height, self._altitude = robot, speed, height, altitude
+    def __init__(self, robot: Robot, speed: float, height: float, ground: float) -> None:
+        self._robot, self._speed, self._height = robot, speed, height
         self._dynamics = FlightDynamics(robot, turbulent=False)
-        self._world = still_air(robot, 1, altitude)
+        self._world = still_air(robot, 1, ground)
         self._inertia = inertia_of(tuple(self._world.inertia))
         actuators = robot.actuators
         self._surfaces = actuators.positions
@@ -126,8 +146,8 @@ class _Problem:
         ca, sa, cb, sb = math.cos(alpha), math.sin(alpha), math.cos(beta), math.sin(beta)
         # Velocity in the body: ahead, left, up.
         inside = np.array([ca * cb, -sb, -sa * cb])
-        align = _between(inside, np.array([1.0, 0.0, 0.0]))
-        quat = product(path, tuple(np.array([part]) for part in align))
+        x, y, z, w = _between(inside, np.array([1.0, 0.0, 0.0]))[:, None]
+        quat = product(path, (x, y, z, w))
         zero = np.zeros(1)
         return SpatialState(
             zero, zero, zero + self._height, *quat, zero + self._speed, zero, zero, zero, zero, zero
@@ -140,9 +160,9 @@ class _Problem:
         pull = turn(state.quat, force)
         turned = turn_acceleration(state.rate, torque, self._inertia)
         mass = float(self._world.mass[0])
-        return np.array(
-            [*(float(part[0]) / mass for part in pull), *(float(part[0]) for part in turned)]
-        ) - np.array([0.0, 0.0, GRAVITY, 0.0, 0.0, 0.0])
+        found = [*(float(part[0]) / mass for part in pull), *(float(part[0]) for part in turned)]
+        found[2] -= GRAVITY
+        return np.array(found)
 
     def shortfall(self, x: np.ndarray) -> str:
         """What is left over, in words."""
@@ -159,20 +179,29 @@ class _Problem:
             if value <= low + 1e-6 * (high - low) or value >= high - 1e-6 * (high - low)
         ]
         alpha = math.degrees(float(x[0]))
+        limits = f", with {', '.join(at_limit)} at a limit" if at_limit else ""
         return (
             f"at best {abs(left[0]):.2g} m/s² ahead, {abs(left[2]):.2g} m/s² up and {abs(left[4]):.2g} rad/s² in pitch "
-            f"remain, at an angle of attack of {alpha:.1f}°{', with ' + ', '.join(at_limit) + ' at a limit' if at_limit else ''}"
+            f"remain, at an angle of attack of {alpha:.1f}°{limits}"
         )
 
-    def trim(self, x: np.ndarray, height: float | None) -> Trim:
+    def trim(self, x: np.ndarray, height: float | None, altitude: float) -> Trim:
         """The solution."""
         alpha, _, _, command = self._split(x)
         state = self.state(x)
         thrust, _ = self._dynamics.propellers(
-            command[self._surfaces :, None], np.array([self._speed]), self._dynamics.density(state, self._world)
+            command[self._surfaces :, None],
+            np.array([self._speed]),
+            self._dynamics.density(state, self._world),
         )
         return Trim(
-            self._speed, height, self._altitude, alpha, state.mapped(lambda part: part[0]), command, float(thrust[0][0])
+            self._speed,
+            height,
+            altitude,
+            alpha,
+            state.mapped(lambda part: part[0]),
+            command,
+            float(thrust[0][0]),
         )
 
 

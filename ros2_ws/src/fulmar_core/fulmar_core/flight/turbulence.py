@@ -22,7 +22,9 @@ NORMALS = 6  # random numbers of a step
 SETTLED = 40.0  # time constants after which nothing is left of a filter's past [-]
 CLASSES = {"light": 7.7, "moderate": 15.4, "severe": 23.1}  # wind at 20 ft: 15, 30 and 45 kt [m/s]
 
-Gust = tuple[Array, Array, Array, Array, Array, Array]  # u, v, w [m/s], p, q, r [rad/s]: x ahead, y right, z down
+Gust = tuple[
+    Array, Array, Array, Array, Array, Array
+]  # u, v, w [m/s], p, q, r [rad/s]: x ahead, y right, z down
 
 
 def lengths_and_intensities(height: Array, wind_at_20_ft: Array) -> tuple[Array, Array, Array, Array]:
@@ -45,7 +47,15 @@ def lengths_and_intensities(height: Array, wind_at_20_ft: Array) -> tuple[Array,
 
 
 def gust_step(
-    filters: Array, keys: Array, steps: Array, *, airspeed: Array, height: Array, wind: Array, span: float, dt: float
+    filters: Array,
+    keys: Array,
+    steps: Array,
+    *,
+    airspeed: Array,
+    height: Array,
+    wind: Array,
+    span: float,
+    dt: float,
 ) -> tuple[Array, Gust]:
     """Let the air move past for a time step.
 
@@ -102,7 +112,7 @@ def _first_order(xp: object, before: Array, noise: Array, d: Array) -> Array:
 def _double_pole(xp: object, y1: Array, y2: Array, n1: Array, n2: Array, d: Array) -> tuple[Array, Array]:
     """1 / (1 + T s) and its second power, on one noise of intensity T: exact after d = dt / T.
 
-    The noise that comes in adds e^−τ and τ e^−τ of its age τ; their covariance over [0, d] is integrated in closed form.
+    The noise that comes in adds e^−τ and τ e^−τ of its age τ, whose covariance over [0, d] has a closed form.
     """
     keep = xp.exp(-d)  # type: ignore[attr-defined]
     gone = keep * keep

@@ -15,7 +15,7 @@ RAMP_M = (1.0, 11.0, 11.0, 1.0, 1.0, 0.55)  # heights there
 
 def ramps(t: np.ndarray) -> np.ndarray:
     """Up by 10 m in 10 s, level, down, level, and closer to the water [m]."""
-    return np.interp(t, RAMP_S, RAMP_M)
+    return np.asarray(np.interp(t, RAMP_S, RAMP_M))
 
 
 Profile = Callable[[np.ndarray], np.ndarray]  # times [s] to metres

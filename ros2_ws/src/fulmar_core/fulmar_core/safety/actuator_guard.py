@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 
 from fulmar_core.actuators.family import Actuators
+from fulmar_core.actuators.refuge import Refuge
 from fulmar_core.safety.command_gate import CommandPublishers, command_problem, name_problem
 from fulmar_core.safety.estop import EstopMonitor
 from fulmar_core.safety.watchdog import Watchdog
@@ -38,6 +40,7 @@ class ActuatorGuard:
         estop: EstopMonitor | None = None,
         control_dt: float = 0.0,
         lockstep: bool = False,
+        refuge: Refuge | None = None,
     ) -> None:
         """Begin with the safe command.
 
@@ -47,11 +50,13 @@ class ActuatorGuard:
             estop: Ends any command; none by default.
             control_dt: Time between commands: what they may differ by follows from it; 0 for no such limit [s].
             lockstep: Time stands still between commands, so nothing slows down while one is waited for.
+            refuge: Safe controller; that of the actuators by default.
         """
         self._actuators, self.watchdog = actuators, watchdog
         self.estop = estop or EstopMonitor(required=False)
         self.publishers = CommandPublishers()
         self._control_dt, self._lockstep = control_dt, lockstep
+        self._refuge = refuge or actuators.refuge
         self.rejected = 0
         self.last_rejection = ""
         self._given_back_ns: int | None = None
@@ -153,11 +158,19 @@ class ActuatorGuard:
         since_ns = self._ended_ns(now_ns)
         if since_ns is None:
             return self.command
-        return self._actuators.refuge.command(max(0, now_ns - since_ns) / 1e9, self.command, state)
+        return self._refuge.command(max(0, now_ns - since_ns) / 1e9, self.command, state)
 
-    def answer(self, now_ns: int) -> np.ndarray:
-        """What to apply in lock step, where time stands still between commands and only the e-stop may end one."""
-        return self._actuators.safe_command if self._stopped(now_ns) is not None else self.command
+    def answer(self, now_ns: int, state: RigidBodyState | None = None) -> np.ndarray:
+        """What to apply in lock step, where time stands still between commands and only the e-stop may end one.
+
+        What cannot stop flies on by its safe controller, for which `state` is the newest one.
+        """
+        since_ns = self._stopped(now_ns)
+        if since_ns is None:
+            return self.command
+        if math.isinf(self._refuge.longest_s):
+            return self._refuge.command(max(0, now_ns - since_ns) / 1e9, self.command, state)
+        return self._actuators.safe_command
 
     def _ended_ns(self, now_ns: int) -> int | None:
         """When the command came to its end; None if it holds."""

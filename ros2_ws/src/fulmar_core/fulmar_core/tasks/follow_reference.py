@@ -126,13 +126,9 @@ class FollowReference(Task[SpatialState]):
         zero = xp.zeros_like(held)
         level = trim.mapped(lambda part: zero + float(part))
         turned = exponential(scaled(math.pi / 180.0 * tilt, about))
-        return (
-            SpatialState(
-                zero, first[:, 1] + aside, first[:, 2] + above, *product(level.quat, turned), *level.velocity, zero, zero,
-                zero,
-            ),
-            goal,
-        )  # fmt: skip
+        place = zero, first[:, 1] + aside, first[:, 2] + above
+        state = SpatialState(*place, *product(level.quat, turned), *level.velocity, zero, zero, zero)
+        return state, goal
 
     def _goal(self, held: Array, speed: float) -> Goal:
         """Places along the reference; of a held height one is enough."""
@@ -195,7 +191,7 @@ class FollowReference(Task[SpatialState]):
         Angles of attack and sideslip are against still air.
         """
         side, above = off_reference(state, goal)
-        now = goal.things[NOW]
+        now = reference_of(goal)
         climb, drift = now[..., 4] - state.vz, now[..., 3] - state.vy
         ahead, left, up = state.velocity_in_body
         xp = array_namespace(ahead)
@@ -251,5 +247,14 @@ class FollowReference(Task[SpatialState]):
 
 def off_reference(state: SpatialState, goal: Goal) -> tuple[Array, Array]:
     """Way to the reference, to the left and up, shapes (...,) [m]."""
-    now = goal.things[NOW]
+    now = reference_of(goal)
     return now[..., 1] - state.y, now[..., 2] - state.z
+
+
+def reference_of(goal: Goal) -> Array:
+    """Time, place and rate of the reference now, shape (..., 5); of a goal that has not begun its first place."""
+    if NOW in goal.things:
+        return goal.things[NOW]
+    first = goal.targets[..., 0, :]
+    zero = 0.0 * first[..., 0]
+    return array_namespace(first).stack((zero, first[..., 1], first[..., 2], zero, zero), axis=-1)

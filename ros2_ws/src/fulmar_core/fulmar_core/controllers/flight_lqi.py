@@ -1,0 +1,218 @@
+"""LQR and LQI of an aircraft, solved from its own linear models and scheduled over height.
+
+The state is the departure from the smoothed reference: place, attitude, velocity and turn rate, servos and motors, and,
+with integral action, the integrals of the place. What the reference asks for ahead goes in as attitude: pitch for a
+climb rate, heading for a drift, bank for a bend (thesis §5.5.2 has the LQR; the feed-forward is ours).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from fulmar_core.actuators.control_surfaces import ControlSurfaces
+from fulmar_core.attitude import from_euler, product, rotation_error
+from fulmar_core.controllers.controller import Inputs
+from fulmar_core.controllers.flight_observer import FlightObserver, ObserverNoise
+from fulmar_core.controllers.flight_reference import SmoothReference
+from fulmar_core.controllers.law import Law
+from fulmar_core.controllers.lqr import regulator
+from fulmar_core.dynamics.hydrodynamics import GRAVITY
+from fulmar_core.flight.schedule import FlightModel, Schedule
+from fulmar_core.robot import Robot
+from fulmar_core.spatial import SpatialState
+from fulmar_core.tasks.follow_reference import FollowReference
+
+
+@dataclass(frozen=True)
+class FlightWeights:
+    """Weights per second, as read from `configs/controllers/<robot>_lqi.yaml` or `_lqr.yaml`."""
+
+    height: float  # per m²
+    side: float  # per m²
+    height_integral: float  # per (m·s)²; 0 with `side_integral` 0: no integral action
+    side_integral: float  # per (m·s)²
+    attitude: float  # per rad²
+    speed: float  # per (m/s)²
+    rate: float  # per (rad/s)²
+    surface: float  # of commands, per rad²
+    throttle: float  # of commands [-]
+    smooth_s: float  # half of the time that the reference is smoothed over [s]
+    error_limit: float  # errors of the place beyond count as this [m]
+    observer: ObserverNoise | None = (
+        None  # of a Kalman filter on the craft's own model; None: state as measured
+    )
+
+    def __post_init__(self) -> None:
+        if min(self.height, self.side, self.surface, self.throttle, self.error_limit, self.smooth_s) <= 0.0:
+            raise ValueError(
+                "height, side, surface, throttle, smooth_s and error_limit must be greater than 0."
+            )
+        if min(self.height_integral, self.side_integral, self.attitude, self.speed, self.rate) < 0.0:
+            raise ValueError("weights must not be negative.")
+
+
+class FlightLqi(Law):
+    """Linear-quadratic regulator of an aircraft, with integral action where the weights have any."""
+
+    law = "lqi"
+    title = "LQI of aircraft, scheduled over height"
+
+    gains: FlightWeights
+
+    def bind(self) -> None:
+        """See `Law.bind`."""
+        if not isinstance(self.robot.actuators, ControlSurfaces) or self.robot.airframe is None:
+            raise ValueError("the law flies aircraft; this robot is none.")
+        if not isinstance(self.task, FollowReference):
+            raise ValueError(f"the law follows references, and '{self.task.name}' has none.")
+        self._craft = self.robot.actuators
+        self._speed = self.robot.airframe.speed
+        self._dt = self.robot.timing.substeps(self.control_hz) * self.robot.timing.physics_dt
+        self._reference = SmoothReference(self.task, over_s=self.gains.smooth_s, dt=self._dt)
+        noise = self.gains.observer
+        self._observer = None if noise is None else FlightObserver(self.robot, noise, self._dt)
+
+    def prepare(self) -> None:
+        """Solve for the gains at every height."""
+        self._integrates = max(self.gains.height_integral, self.gains.side_integral) > 0.0
+        self._schedule = Schedule(self.robot, self._speed, self._dt, self._gain)
+
+    def _gain(self, model: FlightModel) -> np.ndarray:
+        g, dt, count = self.gains, self._dt, len(model.a)
+        surfaces, motors = self._craft.positions, len(self._craft.motors)
+        weights = [g.side, g.height, *[g.attitude] * 3, *[g.speed] * 3, *[g.rate] * 3]
+        q = np.diag([*weights, *[1e-3] * (2 * surfaces + motors)])
+        r = np.diag([*[g.surface] * surfaces, *[g.throttle] * motors])
+        a, b = model.a, model.b
+        if self._integrates:
+            a = np.block([[a, np.zeros((count, 2))], [dt * np.eye(2, count), np.eye(2)]])
+            b = np.vstack((b, np.zeros((2, surfaces + motors))))
+            q = np.diag([*np.diag(q), g.side_integral, g.height_integral])
+        return regulator(a, b, dt * q, dt * r).gain
+
+    def reset(self) -> None:
+        """Forget the past."""
+        super().reset()
+        self._reference.reset()
+        if self._observer is not None:
+            self._observer.reset()
+        self._servos: np.ndarray | None = None
+        self._sums: np.ndarray | None = None
+
+    def command(self, inputs: Inputs) -> np.ndarray:
+        """Choose commands; shapes as in `Controller.act`."""
+        aim, state = self._reference.at(inputs), inputs.state
+        assert isinstance(state, SpatialState)
+        if self._observer is not None:
+            state = self._observer.update(state, inputs)
+        count = len(aim.place)
+        if self._servos is None or len(self._servos) != count:
+            self._servos = np.concatenate(
+                (inputs.previous, np.zeros((count, self._craft.positions))), axis=-1
+            )
+            self._sums = np.zeros((count, 2))
+        else:
+            self._servos = self._followed(self._servos, inputs.previous)
+        assert self._sums is not None
+        limit = self.gains.error_limit
+        off = np.clip(np.stack((state.y, state.z), axis=-1) - aim.place, -limit, limit)
+        x = np.concatenate((off, self._motion(state, aim.rate, aim.bend), self._actuators(aim)), axis=-1)
+        if self._integrates:
+            x = np.concatenate((x, self._sums), axis=-1)
+        gain = self._schedule.array(aim.place[:, 1])
+        wanted = self._trimmed(aim) - np.einsum("nij,nj->ni", gain, x)
+        if self._integrates:
+            free = np.abs(off) < limit
+            self._sums = self._sums + self._dt * np.where(free, off, 0.0)
+        return np.asarray(wanted)
+
+    def _motion(self, state: SpatialState, rate: np.ndarray, bend: np.ndarray) -> np.ndarray:
+        """Departures of attitude, velocity and turn rate, shape (n, 9)."""
+        drift, climb = rate.T
+        speed = self._speed
+        heading, rise, bank = np.arctan2(drift, speed), -climb / speed, -bend[:, 0] / GRAVITY
+        level = self._schedule.quat(state.z)
+        aimed = product(from_euler(bank, rise, heading), tuple(level.T))
+        turned = rotation_error(aimed, state.quat)
+        velocity = state.vx - speed, state.vy - drift, state.vz - climb
+        rates = state.wx, state.wy + bend[:, 1] / speed, state.wz - bend[:, 0] / speed
+        return np.stack((*turned, *velocity, *rates), axis=-1)
+
+    def _trimmed(self, aim: Any) -> np.ndarray:
+        """Commands of the trim, with the thrust that a climb takes, shape (n, m)."""
+        command = self._schedule.command(aim.place[:, 1])
+        surfaces = self._craft.positions
+        thrust = self.robot.body.mass * GRAVITY * aim.rate[:, 1] / self._speed
+        command[:, surfaces:] += (thrust / self._slope)[:, None]
+        return command
+
+    @property
+    def _slope(self) -> float:
+        """Thrust of all motors per throttle at the cruising speed [N]."""
+        at, density = np.array([self._speed]), np.array([1.225])
+        total = 0.0
+        for motor in self._craft.motors:
+            low, high = (float(motor.engine.thrust_at(np.array([t]), at, density)[0]) for t in (0.3, 0.5))
+            total += (high - low) / 0.2
+        return total
+
+    def _actuators(self, aim: Any) -> np.ndarray:
+        """Departures of deflections, their rates, and levels, as of the commands that were sent, shape (n, k)."""
+        assert self._servos is not None
+        surfaces, motors = self._craft.positions, len(self._craft.motors)
+        trim = self._trimmed(aim)
+        places = self._servos[:, :surfaces] - trim[:, :surfaces]
+        levels = self._servos[:, surfaces : surfaces + motors] - trim[:, surfaces:]
+        return np.concatenate((places, self._servos[:, surfaces + motors :], levels), axis=-1)
+
+    def _followed(self, servos: np.ndarray, command: np.ndarray) -> np.ndarray:
+        """Where servos and motors are a control step after a command, shape (n, m + surfaces)."""
+        surfaces, motors = self._craft.positions, len(self._craft.motors)
+        matrix = self._craft.servo_matrix(self._dt)
+        off = servos[:, :surfaces] - command[:, :surfaces]
+        rates = servos[:, surfaces + motors :]
+        places = command[:, :surfaces] + matrix[0, 0] * off + matrix[0, 1] * rates
+        keep = np.array(
+            [np.exp(-self._dt / motor.lag_s) if motor.lag_s else 0.0 for motor in self._craft.motors]
+        )
+        levels = command[:, surfaces:] + keep * (
+            servos[:, surfaces : surfaces + motors] - command[:, surfaces:]
+        )
+        return np.concatenate((places, levels, matrix[1, 0] * off + matrix[1, 1] * rates), axis=-1)
+
+
+class FlightLqr(FlightLqi):
+    """The same without integral action."""
+
+    law = "lqr"
+    title = "LQR of aircraft, scheduled over height"
+
+
+def flight_lqi_weights(robot: Robot) -> FlightWeights:
+    """Weights of an aircraft without a file: those of airship_v7, in proportion to its size and speed."""
+    assert robot.airframe is not None
+    size = robot.airframe.span / 5.0
+    noise = ObserverNoise() if robot.sensors.odometry.position.std > 0.0 else None
+    return FlightWeights(
+        height=200.0 / size**2,
+        side=40.0 / size**2,
+        height_integral=40.0 / size**2,
+        side_integral=10.0 / size**2,
+        attitude=1.0,
+        speed=0.25,
+        rate=1.0,
+        surface=20.0,
+        throttle=2.0,
+        smooth_s=0.6,
+        error_limit=0.1
+        * size,  # more makes craft in turbulence leave the angles that the coefficients hold for
+        observer=noise,
+    )
+
+
+def flight_lqr_weights(robot: Robot) -> FlightWeights:
+    """The same without integral action."""
+    return replace(flight_lqi_weights(robot), height_integral=0.0, side_integral=0.0)

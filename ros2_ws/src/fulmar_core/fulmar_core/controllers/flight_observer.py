@@ -1,0 +1,113 @@
+"""Kalman filter of an aircraft on its own model: what it measures, less the noise.
+
+The prediction is the craft's own dynamics in still air under the commands that were sent; the gain is the steady one of
+the linear model at cruise (Kwakernaak and Sivan, Linear Optimal Control Systems, 1972, §6.4).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fulmar_core.attitude import exponential, minus, normalised, plus, product, rotation_error
+from fulmar_core.controllers.controller import Inputs
+from fulmar_core.controllers.lqr import regulator
+from fulmar_core.flight.dynamics import FlightDynamics
+from fulmar_core.flight.schedule import MOTION, RATE, SPEED, flight_model
+from fulmar_core.flight.trim import find_trim, still_air
+from fulmar_core.motion import actuation_of
+from fulmar_core.robot import Robot
+from fulmar_core.spatial import SpatialState
+
+LEAST = (
+    1e-4  # standard deviations of sensors below this count as this: a filter that trusts nothing else [SI]
+)
+
+
+@dataclass(frozen=True)
+class ObserverNoise:
+    """What the model does not know: white noise of accelerations, as spectral densities."""
+
+    acceleration: float = 0.3  # [m/s² / √Hz]
+    turn: float = 0.3  # [rad/s² / √Hz]
+
+    def __post_init__(self) -> None:
+        if min(self.acceleration, self.turn) <= 0.0:
+            raise ValueError("acceleration and turn must be greater than 0.")
+
+
+class FlightObserver:
+    """The believed state of n craft."""
+
+    def __init__(self, robot: Robot, noise: ObserverNoise, dt: float) -> None:
+        """Solve for the gain; `dt` of a control step [s].
+
+        Raises:
+            ConfigError: The craft has no trim at its speed.
+        """
+        assert robot.airframe is not None
+        self._robot, self._dt = robot, dt
+        self._dynamics = FlightDynamics(robot, turbulent=False)
+        self._substeps = robot.timing.substeps(1.0 / dt)
+        model = flight_model(robot, find_trim(robot, robot.airframe.speed, 0.5 * robot.airframe.span), dt)
+        its = robot.sensors.odometry
+        spread = np.repeat(
+            [max(c.std, LEAST) for c in (its.position, its.heading, its.velocity, its.yaw_rate)], (2, 3, 3, 3)
+        )
+        push = np.zeros(MOTION)
+        push[SPEED], push[RATE] = noise.acceleration**2, noise.turn**2
+        a = model.a[:MOTION, :MOTION]
+        dual = regulator(a.T, np.eye(MOTION), dt * np.diag(push) + 1e-12 * np.eye(MOTION), np.diag(spread**2))
+        # P of the prediction is the cost to go of the dual regulator; the gain corrects after a measurement.
+        p = dual.cost_to_go
+        self._gain = p @ np.linalg.inv(p + np.diag(spread**2))
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the past."""
+        self._state: SpatialState | None = None
+
+    def update(self, measured: SpatialState, inputs: Inputs) -> SpatialState:
+        """The believed state after a measurement, shapes (n,); the step before was commanded `inputs.previous`."""
+        if self._state is None or len(self._state.x) != len(measured.x):
+            self._state = measured
+            self._world: Any = still_air(self._robot, len(measured.x))
+            self._actuation = actuation_of(self._robot, inputs.previous.T.copy())
+            return measured
+        self._actuation.begin(inputs.previous.T, self._world, None)
+        ahead = self._dynamics.move(
+            self._state,
+            self._actuation,
+            self._world,
+            (np.zeros(len(measured.x)),) * 3,
+            substeps=self._substeps,
+            latest_s=0.0,
+            off_centre=False,
+        )
+        self._state = self._corrected(ahead, measured)
+        return self._state
+
+    def _corrected(self, ahead: SpatialState, measured: SpatialState) -> SpatialState:
+        off = np.stack(
+            (
+                measured.y - ahead.y,
+                measured.z - ahead.z,
+                *rotation_error(ahead.quat, measured.quat),
+                *minus(measured.velocity, ahead.velocity),
+                *minus(measured.rate, ahead.rate),
+            )
+        )
+        step = self._gain @ off
+        turn = (step[2], step[3], step[4])
+        # Along x the filter of the other places holds.
+        x = ahead.x + float(self._gain[0, 0]) * (measured.x - ahead.x)
+        return SpatialState(
+            x,
+            ahead.y + step[0],
+            ahead.z + step[1],
+            *normalised(product(ahead.quat, exponential(turn))),
+            *plus(ahead.velocity, (step[5], step[6], step[7])),
+            *plus(ahead.rate, (step[8], step[9], step[10])),
+        )

@@ -1,0 +1,116 @@
+"""Aircraft in MuJoCo: it integrates a free body under gravity; the core supplies the forces of air and propellers."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from fulmar_core.actuators.actuation import ActuationState
+from fulmar_core.dynamics.hydrodynamics import GRAVITY
+from fulmar_core.dynamics.rigid_body import inertia_of
+from fulmar_core.flight.dynamics import FlightDynamics
+from fulmar_core.flight.turbulence import Gust
+from fulmar_core.robot import Robot
+from fulmar_core.spatial import SpatialState
+from sim_nodes.mujoco_model.floater import OFF_CENTRE
+from sim_nodes.mujoco_model.scenery import BODY, add_hull
+
+STEPS = 4  # of MuJoCo in a physics tick, each with the forces of where the craft is by then
+
+
+class Aircraft:
+    """One body on a free joint; see `RobotModel`."""
+
+    steps_per_tick = STEPS
+    steady = False
+    rest_height = 0.0
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot, self._dynamics = robot, FlightDynamics(robot)
+        self._body = 0
+        self._world: Any = None
+        self._actuation: ActuationState | None = None
+        self._gust: Gust | None = None
+        self._tick = -1
+        self._low = robot.hull_span[0]
+
+    def add(self, spec: mujoco.MjSpec) -> mujoco.MjsBody:
+        """Add the body; see `RobotModel.add`."""
+        robot = self._robot
+        spec.option.gravity = [0.0, 0.0, -GRAVITY]
+        body = spec.worldbody.add_body(name=BODY)
+        body.add_freejoint(name="free")
+        body.explicitinertial = True
+        body.ipos, body.iquat = [OFF_CENTRE, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]
+        body.mass = robot.body.mass
+        body.inertia = [max(robot.body.inertia[:3])] * 3  # the world of an episode brings the tensor
+        low, high = robot.hull_span
+        add_hull(
+            body,
+            footprint=robot.body.footprint,
+            radius=robot.body.radius,
+            low=low,
+            high=high,
+            ahead=robot.body.footprint_x,
+        )
+        return body
+
+    def bind(self, model: mujoco.MjModel) -> None:
+        """Look up the body."""
+        self._body = model.body(BODY).id
+
+    def take_world(self, model: mujoco.MjModel, world: Any) -> None:
+        """Take mass and inertia."""
+        xx, yy, zz, xy, xz, yz = np.asarray(world.inertia, dtype=float)
+        moments, axes = np.linalg.eigh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
+        axes[:, 2] = np.cross(axes[:, 0], axes[:, 1])  # a rotation, not a mirror image
+        mujoco.mju_mat2Quat(model.body_iquat[self._body], axes.ravel())
+        model.body_ipos[self._body] = 0.0
+        model.body_inertia[self._body], model.body_mass[self._body] = moments, world.mass
+
+    def fly_in(self, world: Any, actuation: ActuationState) -> None:
+        """Take the air of an episode, a `FlightWorld`, and what remembers its gusts, each of a batch of one."""
+        self._world, self._actuation = world, actuation
+        self._inertia = inertia_of(tuple(world.inertia))
+        self._tick, self._gust = -1, None
+
+    def place(self, model: mujoco.MjModel, data: mujoco.MjData, start: SpatialState) -> None:
+        """Put the craft where it starts."""
+        x, y, z, w = start.quat
+        data.qpos[:7] = *start.position, w, x, y, z
+        data.qvel[:6] = *start.velocity, *start.rate
+
+    def own_truth(self, data: mujoco.MjData) -> dict[str, Any]:
+        """What the air probes would measure without errors."""
+        return {"air": self._dynamics.air_data(self._state(data), self._gust, self._world)}
+
+    def drive(
+        self, model: mujoco.MjModel, data: mujoco.MjData, applied: np.ndarray, gain: np.ndarray, outside: Any
+    ) -> None:
+        """Set the forces of the coming step; see `RobotModel.drive`. What touches the water stops there."""
+        assert self._actuation is not None  # as of `fly_in`
+        if data.qpos[2] + self._low <= 0.0:
+            data.qvel[:] = 0.0
+            data.xfrc_applied[self._body] = 0.0, 0.0, model.body_mass[self._body] * GRAVITY, 0.0, 0.0, 0.0
+            return
+        state, dt = self._state(data), self._robot.timing.physics_dt
+        tick = round(data.time / model.opt.timestep) // STEPS
+        if tick != self._tick:
+            self._tick, self._gust = tick, self._dynamics.gust(state, self._actuation, self._world, dt)
+        force, torque = self._dynamics.wrench(
+            state, (applied * gain)[:, None], self._gust, self._world, self._inertia
+        )
+        push, turn = np.empty(3), np.empty(3)
+        mujoco.mju_rotVecQuat(push, np.array([float(part[0]) for part in force]), data.qpos[3:7])
+        steady = np.asarray(self._world.torque, dtype=float)[:, 0]
+        mujoco.mju_rotVecQuat(turn, np.array([float(part[0]) for part in torque]) + steady, data.qpos[3:7])
+        data.xfrc_applied[self._body] = *(push + outside[:3]), *turn
+
+    def _state(self, data: mujoco.MjData) -> SpatialState:
+        """Of a batch of one."""
+        x, y, z = data.qpos[:3]
+        w, qx, qy, qz = data.qpos[3:7]
+        columns = (x, y, z, qx, qy, qz, w, *data.qvel[:6])
+        return SpatialState(*(np.array([float(value)]) for value in columns))
