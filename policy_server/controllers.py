@@ -82,6 +82,10 @@ def _load_excite(robot: Robot, task: Task, choice: Choice) -> Controller:
 
 
 def _check_excite(robot: Robot, task: Task) -> None:
+    if robot.flies:
+        raise ConfigError(
+            f"controller 'excite' is not for aircraft such as '{robot.name}': random commands crash it."
+        )
     tasks = excite_tasks(robot)
     if task.kind not in tasks:
         raise ConfigError(

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from fulmar_core.actuators.pushing import PLANAR, Pushing
+from fulmar_core.disturbances.scenario import Scenario
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.state import State
@@ -16,6 +18,7 @@ from fulmar_core.teleop import OUT_OF_PLANE
 
 SPACECRAFT = load_robot("spacecraft_16")
 SATELLITE = load_robot("cubesat_wheels")
+AIRCRAFT = load_robot("airship_v7")
 
 
 def shared_space(robots: Mapping[str, Any], tasks: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -31,21 +34,29 @@ def shared_space(robots: Mapping[str, Any], tasks: Mapping[str, Any]) -> list[tu
         for task in tasks
         if robots[robot].state_type is tasks[task].state_type
         and robots[robot].actuators.turns_only is tasks[task].turns_only
+        and robots[robot].flies is tasks[task].flies
     ]
 
 
 def robot_for(task: Task, in_plane: Robot, in_space: Robot = SPACECRAFT) -> Robot:
-    """The one of two robots that moves in the space of a task, or a satellite for one that turns it."""
-    if task.turns_only:
-        return SATELLITE
+    """The one of two robots that moves in the space of a task, a satellite or an aircraft where it is for them."""
+    if task.turns_only or task.flies:
+        return SATELLITE if task.turns_only else AIRCRAFT
     return in_plane if task.state_type is PlanarState else in_space
 
 
 def task_for(robot: Robot, name: str) -> Task:
     """The task of a name in the space of a robot: those in space end in _3d, and satellites hold an attitude."""
-    if robot.actuators.turns_only:
-        return load_task("point_inertial")
+    if robot.actuators.turns_only or robot.flies:
+        return load_task("fly_hold" if robot.flies else "point_inertial")
     return load_task(name if robot.state_type is PlanarState else f"{name}_3d")
+
+
+def prompt(scenario: Scenario, robot: Robot) -> Scenario:
+    """A scenario without the delays of commands that are longer than a control step of an aircraft."""
+    if not robot.flies:
+        return scenario
+    return replace(scenario, actuation=replace(scenario.actuation, delay_s=0.0, opening_delay_s=(0.0, 0.0)))
 
 
 def at_target(task: Task, target: Any) -> State:

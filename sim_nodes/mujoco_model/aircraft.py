@@ -45,7 +45,8 @@ class Aircraft:
         body.explicitinertial = True
         body.ipos, body.iquat = [OFF_CENTRE, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]
         body.mass = robot.body.mass
-        body.inertia = [max(robot.body.inertia[:3])] * 3  # the world of an episode brings the tensor
+        its = robot.body.inertia[:3]  # the world of an episode brings the rest of the tensor
+        body.inertia = [max(its)] * 3 if robot.body.as_printed else list(its)
         low, high = robot.hull_span
         add_hull(
             body,

@@ -204,14 +204,14 @@ def test_pairs_without_a_law_are_refused_with_what_to_use_instead(name):
     assert lacking
     for robot, task in lacking:
         if name == "lqr" and robot.actuators.kind not in families_of("lqr"):
-            families = "thrusters or fans or reaction_wheels"
+            families = "thrusters or fans or reaction_wheels or control_surfaces"
             expected = rf"'lqr' is for robots with {families}; '{robot.name}' .*Use --controller classical"
         elif task.state_type is robot.state_type:
-            expected = rf"on '{robot.name}' .*there is one for: (go_to_|point).*Use --controller policy"
-        else:
             expected = (
-                rf"'{robot.name}' moves in .*'{task.name}' is a task in .*Choose one of: (go_to_|point)"
+                rf"on '{robot.name}' .*there is one for: (go_to_|point|follow_).*Use --controller policy"
             )
+        else:
+            expected = rf"'{robot.name}' moves in .*'{task.name}' is a task in .*Choose one of: (go_to_|point|follow_)"
         with pytest.raises(ConfigError, match=expected):
             load_controller(name, robot, task, Choice(robot.timing.control_hz))
 

@@ -11,6 +11,7 @@ import pytest
 from fulmar_core.counter_rng import WORLD, Draws
 from fulmar_core.disturbances.parts import (
     Actuation,
+    Air,
     InertiaChange,
     Kick,
     Push,
@@ -114,6 +115,14 @@ ENTRIES = {
     "sensing.gyroscope": (SEEING, {"sensing": Sensing(gyroscope=2.0)}, set()),  # of simulated sensors
     "sensing.gyroscope_dies_s": (SEEING, {"sensing": Sensing(gyroscope_dies_s=2.0)}, set()),
     "orbit_rate": (STILL, {"orbit_rate": 0.001}, set()),  # of worlds in space
+    "air.wind": (STILL, {"air": Air(wind=(1.0, 2.0))}, set()),  # of aircraft
+    "air.turbulence": (STILL, {"air": Air(turbulence=7.7)}, set()),
+    "air.altitude": (STILL, {"air": Air(altitude=100.0)}, set()),
+    "sensing.least_delay": (
+        replace(SEEING, sensing=Sensing(delay_s=0.1)),
+        {"sensing": Sensing(delay_s=0.1, least_delay=0.9)},
+        {"sensor_delay"},
+    ),
     "solar.force": (STILL, {"solar": Solar(force=1e-6)}, set()),
     "solar.arm": (replace(STILL, solar=Solar(1e-6)), {"solar": Solar(1e-6, 0.01)}, set()),
     **{
@@ -128,6 +137,7 @@ PARTS = {
     "tether": Tether,
     "slope": Slope,
     "solar": Solar,
+    "air": Air,
     "inertia": InertiaChange,
     "actuation": Actuation,
     "sensing": Sensing,

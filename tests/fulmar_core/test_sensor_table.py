@@ -11,6 +11,7 @@ import yaml
 from fulmar_core.errors import ConfigError
 from fulmar_core.paths import config_path
 from fulmar_core.robot import load_robot
+from fulmar_core.sensors.air_data import AirData, AirDataSpec
 from fulmar_core.sensors.imu import Gyroscope, ImuSpec
 from fulmar_core.sensors.kind import Truth
 from fulmar_core.sensors.odometer import Channel
@@ -26,6 +27,7 @@ TRUTH = Truth(
     RigidBodyState(np.zeros(3), np.array([0.0, 0.6, 0.0, 0.8]), np.zeros(3), np.array([0.1, 0.2, 0.3])),
     np.array([1.0, 2.0, 9.0]),
     WheelSpeeds(("wheel_x", "wheel_y"), np.array([10.0, -20.0])),
+    AirData(AirDataSpec.NAMES, np.array([28.0, 0.03, -0.01, 1.0])),
 )
 
 

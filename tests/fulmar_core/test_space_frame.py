@@ -21,7 +21,7 @@ from tests.spaces import SPACECRAFT
 TASKS = {
     name: task
     for name, task in ((name, load_task(name)) for name in config_names("tasks"))
-    if task.state_type is SpatialState and not task.turns_only
+    if task.state_type is SpatialState and not (task.turns_only or task.flies)
 }
 COUNT = 30
 

@@ -52,6 +52,8 @@ def test_each_actuator_has_a_frame_at_its_place_along_its_force(name):
             place = model.get_transform(f"{wheel.name}_link", "base_link")
             np.testing.assert_allclose(place[:3, 3], np.zeros(3), atol=1e-12)
             np.testing.assert_allclose(place[:3, 0], wheel.direction, atol=1e-12)
+    elif robot.flies:  # propellers and surfaces have none yet
+        assert f"{robot.actuators.names[0]}_link" not in model.link_map
     else:
         assert isinstance(robot.actuators, Rolling)
         for wheel, (x, y) in robot.actuators.wheels.items():

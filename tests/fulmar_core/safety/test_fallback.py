@@ -13,7 +13,7 @@ from fulmar_core.safety.command_gate import REJECTIONS_TO_LATCH
 from fulmar_core.safety.fallback import WARM_UP, ControllerSwitch, warm_up
 from fulmar_core.tasks import load_task
 
-ROBOT = load_robot("turtlebot2")
+ROBOT, AIRCRAFT = load_robot("turtlebot2"), load_robot("airship_v7")
 
 
 class Counting:
@@ -39,7 +39,7 @@ class Counting:
 @pytest.mark.parametrize("task", config_names("tasks"))
 def test_it_is_asked_for_commands_of_its_task_and_begins_anew(task):
     controller = Counting()
-    warm_up(controller, ROBOT, load_task(task))
+    warm_up(controller, AIRCRAFT if load_task(task).flies else ROBOT, load_task(task))
     assert len(controller.seen) == WARM_UP
     assert np.isfinite(controller.seen).all()
     assert controller.since_reset == 0

@@ -85,7 +85,7 @@ class BatchSimulation(MutableState, Generic[S]):
         self.worlds, self.training = worlds, training
         self._first = first
         self.substeps = robot.timing.substeps(control_hz or robot.timing.control_hz)
-        self.observer = Observer(robot, task)
+        self.observer = Observer(robot, self.task)
         self._xp = array_namespace(xp.empty(0))  # the library itself may lack parts of the array standard
         self._device, self._dtype = device, dtype or xp.float32
         self._numbers = self._whole(first + np.arange(worlds))

@@ -69,7 +69,7 @@ class ControlSurfaces(Actuators):
     servo_damping: float  # of them [-]
     response: Response = Response()  # only its delay and gain: servos have dynamics of their own
 
-    law = "lqi"
+    law = "lqr"
     flies = True
 
     def __post_init__(self) -> None:

@@ -132,11 +132,7 @@ def families_of(law: str | None) -> tuple[str, ...]:
             (FLIGHT_LAWS, FLYING_FAMILIES),
         )
         return tuple(family for laws, families in tables if law in laws for family in families)
-    flying = FLYING_FAMILIES if law in FLIGHT_LAWS else ()
-    return (
-        *(kind for kind, each in FAMILIES.items() if each.law and law in (None, each.law) and not each.flies),
-        *flying,
-    )
+    return tuple(kind for kind, each in FAMILIES.items() if each.law and law in (None, each.law))
 
 
 def entry_of(robot: Robot, law: str | None) -> Entry:

@@ -43,7 +43,7 @@ class SmoothReference:
         now = np.asarray(reference_of(inputs.goal), dtype=float)
         if targets.shape[-2] == 1:
             still = np.zeros((len(now), 2))
-            return Aim(now[:, 1:3], still, still)
+            return Aim(now[:, 2:4], now[:, 5:7], still)
         if (
             self._targets is None
             or self._targets.shape != targets.shape

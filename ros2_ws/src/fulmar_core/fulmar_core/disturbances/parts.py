@@ -169,7 +169,6 @@ class Sensing:
     bias: float = 1.0  # factor on the robot's own biases and errors of scale [-]
     # Largest delay beyond the robot's own. It counts in whole readings: in training half a control step is none [s].
     delay_s: float = 0.0
-    least_delay: float = 0.0  # smallest of these, as a share of the largest [-]
     dropout: float = 0.0  # largest chance that a measurement is lost [-]
     # Beside the noise of the robot's own sensors, and where these are perfect too; uniform, anew each time.
     velocity_noise: Range = (0.0, 0.0)  # largest error of each measured velocity, for a whole episode [m/s]
@@ -177,6 +176,7 @@ class Sensing:
     gyroscope: float = 1.0  # factor on noise and walk of the inertial unit's gyroscope [-]
     # Time in an episode from which on the unit reports nothing; None: it lives on [s].
     gyroscope_dies_s: float | None = None
+    least_delay: float = 0.0  # smallest `delay_s`, as a share of the largest [-]
 
     def __post_init__(self) -> None:
         if min(self.noise, self.bias, self.delay_s, self.dropout) < 0.0 or self.dropout > 1.0:

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from scipy.linalg import logm
 
 from fulmar_core.dynamics.linear_model import linearise
 from fulmar_core.flight.trim import Trim, free_air, still_air
@@ -17,6 +16,7 @@ from fulmar_core.robot import Robot
 ALONG = (4, 6, 8, 10)  # pitch, speed ahead and up, pitch rate
 HEIGHT = (0, 2)  # place ahead and up, which count near the ground
 ACROSS = (3, 5, 7, 9, 11)  # roll and heading, speed to the left, roll and yaw rate
+SHORT_S, TERMS = 0.001, 6  # of the step that is linearised, and of the series
 STILL = 1e-4  # eigenvalues below this are those of coordinates that nothing depends on [1/s]
 
 
@@ -52,15 +52,18 @@ class Mode:
 def continuous_model(robot: Robot, trim: Trim) -> tuple[np.ndarray, np.ndarray]:
     """Ẋ = A x + B u of departures from a trim, shapes (12, 12) and (12, n); servos and motors count as at once.
 
-    From the discrete model of one physics step, by the logarithm of the joint matrix.
+    From the discrete model of a short step, by the series of the logarithm of its joint matrix.
     """
     craft = robot if trim.height is not None else free_air(robot)
-    dt = robot.timing.physics_dt
-    model = linearise(craft, trim.state, trim.command, dt, partial(still_air, altitude=trim.ground))
+    craft = replace(craft, timing=replace(craft.timing, physics_dt=SHORT_S))
+    model = linearise(craft, trim.state, trim.command, SHORT_S, partial(still_air, altitude=trim.ground))
     count, inputs = model.b.shape
-    joint = np.eye(count + inputs)
-    joint[:count, :count], joint[:count, count:] = model.a, model.b
-    rates = np.real(logm(joint)) / dt
+    step = np.zeros((count + inputs,) * 2)
+    step[:count, :count], step[:count, count:] = model.a - np.eye(count), model.b
+    power, rates = np.eye(len(step)), np.zeros_like(step)
+    for term in range(1, TERMS + 1):
+        power = power @ step
+        rates += (-1.0) ** (term + 1) / term * power / SHORT_S
     return rates[:count, :count], rates[:count, count:]
 
 

@@ -81,11 +81,11 @@ class LevelDescent:
         target = np.zeros((1, 7))
         target[0, 1], target[0, 2], target[0, 6] = state.y[0], height, 1.0
         goal = goals_at(target)
-        now = np.array([[0.0, state.y[0], height, 0.0, -falls]])
+        now = np.array([[0.0, 0.0, state.y[0], height, 0.0, 0.0, -falls]])
         dt = 1.0 / self._law.control_hz
         empty = np.zeros((1, 0))
         inputs = Inputs(state, replace(goal, things={NOW: now}), empty, self._sent[None], None, 0, dt)
-        return np.asarray(self._law.act(inputs)[0])
+        return np.asarray(self._robot.actuators.limited(self._law.command(inputs))[0])
 
 
 def refuge_of(robot: Robot) -> Refuge:

@@ -78,7 +78,8 @@ class Schedule:
             ConfigError: There is no trim at this speed.
         """
         assert robot.airframe is not None
-        self.heights = robot.airframe.span * np.array(HEIGHTS)
+        above = 1.1 * max(0.0, -robot.hull_span[0] - robot.airframe.span * HEIGHTS[0] / 1.1)
+        self.heights = above + robot.airframe.span * np.array(HEIGHTS)
         models = [flight_model(robot, find_trim(robot, speed, float(height)), dt) for height in self.heights]
         self._arrays = np.stack([make(model) for model in models])
         self._commands = np.stack([model.trim.command for model in models])

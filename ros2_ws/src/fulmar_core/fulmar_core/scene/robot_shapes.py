@@ -45,6 +45,8 @@ def applied_shapes(robot: Robot, effort: Sequence[float]) -> list[Shape]:
         return _plumes(robot, robot.actuators, np.asarray(effort, dtype=float))
     if isinstance(robot.actuators, ReactionWheels):
         return _torques(robot, robot.actuators, np.asarray(effort, dtype=float))
+    if robot.flies:
+        return []
     speed, turn = effort
     if isinstance(robot.actuators, Ackermann):
         turn = speed * math.tan(turn) / robot.actuators.wheelbase

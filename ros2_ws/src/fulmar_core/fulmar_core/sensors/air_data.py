@@ -20,27 +20,28 @@ NAME = "air_data"
 
 @dataclass(frozen=True)
 class AirDataSpec:
-    """What is measured of the air, and when; a part without a channel is not reported."""
+    """What is measured of the air, and when; angles only where there are vanes."""
 
     NAMES: ClassVar[tuple[str, ...]] = ("airspeed", "alpha", "beta", "height")
 
-    airspeed: Channel | None = None  # of a pitot tube [m/s]
-    alpha: Channel | None = None  # angle of attack, of a vane [rad]
-    beta: Channel | None = None  # sideslip, of a vane [rad]
-    height: Channel | None = None  # above the ground, of a radar or sonar altimeter [m]
+    airspeed: Channel = Channel()  # of a pitot tube [m/s]
+    alpha: Channel = Channel()  # angle of attack, of a vane [rad]
+    beta: Channel = Channel()  # sideslip, of a vane [rad]
+    height: Channel = Channel()  # above the ground, of a radar or sonar altimeter [m]
+    vanes: bool = True  # False: neither angle is reported
     rate_hz: float = 0.0  # of measurements; 0: one with each sample of the plant [Hz]
     delay_s: float = 0.0  # from measurement to message; the stamp is that of the measurement [s]
 
     def __post_init__(self) -> None:
         if min(self.rate_hz, self.delay_s) < 0.0:
             raise ValueError("rate_hz and delay_s must not be negative.")
-        if not self.names:
-            raise ValueError(f"'air_data' needs at least one of {', '.join(self.NAMES)}.")
 
     @property
     def names(self) -> tuple[str, ...]:
         """What is reported."""
-        return tuple(name for name in self.NAMES if getattr(self, name) is not None)
+        return (
+            self.NAMES if self.vanes else tuple(name for name in self.NAMES if name not in ("alpha", "beta"))
+        )
 
     @property
     def channels(self) -> tuple[Channel, ...]:

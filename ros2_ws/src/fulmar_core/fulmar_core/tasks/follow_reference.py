@@ -22,11 +22,11 @@ from fulmar_core.tasks.task import Task
 from fulmar_core.tasks.terms import Errors, Tolerance, weighted_sum
 
 Range = tuple[float, float]
-NOW = "reference"  # among the things of a goal: time [s]; place y, z [m] and its rate [m/s] now, five numbers
+NOW = "reference"  # among the things of a goal: time [s], place [m] and its rate [m/s] now, seven numbers
 TERMS = (
     "height_error", "fine_height_error", "finest_height_error", "side_error", "fine_side_error",
     "climb_error", "drift_error", "reference_climb", "reference_drift", "reference_height", "speed_error",
-    "angle_of_attack", "sideslip", "roll", "pitch", "heading", "roll_rate", "pitch_rate", "yaw_rate",
+    "angle_of_attack", "sideslip", "roll", "pitch", "heading", "roll_rate", "pitch_rate", "turn_rate",
 )  # fmt: skip
 COARSE, FINE, FINEST = 1.0, 0.3, 0.05  # where errors saturate [m]
 FAST, QUICK = 1.0, 0.2  # scales of climb rates [m/s] and turn rates [rad/s]
@@ -151,23 +151,23 @@ class FollowReference(Task[SpatialState]):
         return replace(goal, things={**goal.things, NOW: self._now(goal, zero)})
 
     def _now(self, goal: Goal, time_s: Array) -> Array:
-        """Time, place and rate of the reference, between its places in a straight line, shape (..., 5)."""
+        """Time, place and rate of the reference, between its places in a straight line, shape (..., 7)."""
         targets = goal.targets
         xp, last = array_namespace(targets), targets.shape[-2] - 1
         here = targets[..., 0, :]
         zero = 0.0 * here[..., 0]
         time = time_s + zero
         if last == 0:
-            return xp.stack((time, here[..., 1], here[..., 2], zero, zero), axis=-1)
+            return xp.stack((time, *(here[..., i] for i in range(3)), zero, zero, zero), axis=-1)
         share = clip(time / self.spacing_s, 0.0, float(last))
         before = clip(xp.floor(share + 1e-6), 0.0, last - 1.0)
         which = xp.astype(before, xp.int64)[..., None, None]
         low = xp.take_along_axis(targets, which, axis=-2)[..., 0, :]
         high = xp.take_along_axis(targets, which + 1, axis=-2)[..., 0, :]
         part, going = share - before, xp.astype(time < last * self.spacing_s, targets.dtype)
-        y, z = (low[..., i] + part * (high[..., i] - low[..., i]) for i in (1, 2))
-        vy, vz = (going * (high[..., i] - low[..., i]) / self.spacing_s for i in (1, 2))
-        return xp.stack((time, y, z, vy, vz), axis=-1)
+        place = (low[..., i] + part * (high[..., i] - low[..., i]) for i in range(3))
+        rate = (going * (high[..., i] - low[..., i]) / self.spacing_s for i in range(3))
+        return xp.stack((time, *place, *rate), axis=-1)
 
     def advance(self, goal: Goal, state: SpatialState, time_s: Array) -> Goal:
         """The reference moves on; see `Task.advance`."""
@@ -192,7 +192,7 @@ class FollowReference(Task[SpatialState]):
         """
         side, above = off_reference(state, goal)
         now = reference_of(goal)
-        climb, drift = now[..., 4] - state.vz, now[..., 3] - state.vy
+        climb, drift = now[..., 6] - state.vz, now[..., 5] - state.vy
         ahead, left, up = state.velocity_in_body
         xp = array_namespace(ahead)
         roll, pitch, yaw = euler_of(state.quat)
@@ -200,7 +200,7 @@ class FollowReference(Task[SpatialState]):
         return (
             clip(above / COARSE, -3.0, 3.0), clip(above / FINE, -1.0, 1.0), clip(above / FINEST, -1.0, 1.0),
             clip(side / COARSE, -3.0, 3.0), clip(side / FINE, -1.0, 1.0),
-            climb / FAST, drift / FAST, now[..., 4] / FAST, now[..., 3] / FAST, 0.2 * now[..., 2],
+            climb / FAST, drift / FAST, now[..., 6] / FAST, now[..., 5] / FAST, 0.2 * now[..., 3],
             0.1 * (self.speed_of(goal) - speed), 10.0 * xp.atan2(-up, ahead), 10.0 * left / clip(speed, 1.0, None),
             2.0 * roll, 5.0 * pitch, 5.0 * yaw, *(rate / QUICK for rate in state.rate),
         )  # fmt: skip
@@ -248,13 +248,13 @@ class FollowReference(Task[SpatialState]):
 def off_reference(state: SpatialState, goal: Goal) -> tuple[Array, Array]:
     """Way to the reference, to the left and up, shapes (...,) [m]."""
     now = reference_of(goal)
-    return now[..., 1] - state.y, now[..., 2] - state.z
+    return now[..., 2] - state.y, now[..., 3] - state.z
 
 
 def reference_of(goal: Goal) -> Array:
-    """Time, place and rate of the reference now, shape (..., 5); of a goal that has not begun its first place."""
+    """Time, place and rate of the reference now, shape (..., 7); of a goal that has not begun its first place."""
     if NOW in goal.things:
         return goal.things[NOW]
     first = goal.targets[..., 0, :]
     zero = 0.0 * first[..., 0]
-    return array_namespace(first).stack((zero, first[..., 1], first[..., 2], zero, zero), axis=-1)
+    return array_namespace(first).stack((zero, *(first[..., i] for i in range(3)), zero, zero, zero), axis=-1)

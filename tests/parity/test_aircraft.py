@@ -1,0 +1,41 @@
+"""An aircraft under its LQI in the core's batch, in the mock and in MuJoCo: one flight, in turbulence or without."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fulmar_core.controllers.classical import load_classical
+from fulmar_core.disturbances.parts import Air
+from fulmar_core.disturbances.scenario import Scenario
+from fulmar_core.robot import load_robot
+from fulmar_core.rollout import roll_out_in_backends, roll_out_in_batch
+from fulmar_core.tasks import load_task
+from sim_nodes.mock_backend import MockBackend
+from sim_nodes.mujoco_backend import MujocoBackend
+
+CRAFT = load_robot("airship_v7")
+TASK = replace(load_task("fly_a"), episode_s=4.0)
+EXACT = Scenario("exact", sensor_noise=False, body="nominal")
+
+
+def flown(backend, scenario):
+    controller = load_classical(CRAFT, TASK)
+    given = {"task": TASK, "scenario": scenario, "episodes": 2, "seed": 3}
+    if backend is None:
+        return roll_out_in_batch(controller, CRAFT, **given)
+    return roll_out_in_backends(controller, backend, **given)
+
+
+@pytest.mark.parametrize("turbulence", [0.0, 7.7])
+def test_one_flight_is_the_same_in_the_batch_the_mock_and_mujoco(turbulence):
+    scenario = replace(EXACT, air=Air(turbulence=turbulence))
+    batch = flown(None, scenario)
+    assert np.ptp(batch.z) > (0.05 if turbulence else 1e-4)
+    for make in (lambda: MockBackend(CRAFT), lambda: MujocoBackend.of(CRAFT, TASK, scenario)):
+        other = flown(make, scenario)
+        np.testing.assert_allclose(other.z, batch.z, rtol=0, atol=0.01)
+        np.testing.assert_allclose(other.y, batch.y, rtol=0, atol=0.01)
+        assert not other.touching.any()
