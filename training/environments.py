@@ -20,15 +20,16 @@ from fulmar_core.tasks import Task, load_task
 from training.gym_env import TaskEnv, TaskVectorEnv
 
 DEFAULT_ROBOTS: dict[type[State], str] = {PlanarState: "floating_platform", SpatialState: "spacecraft_16"}
+AIRCRAFT = "airship_v7"
 
 
-def task_env(task: str, robot: str | None = None, scenario: str = "randomised", **options: Any) -> TaskEnv:
+def task_env(task: str, robot: str | None = None, scenario: str | None = None, **options: Any) -> TaskEnv:
     """Build the environment of one world from names of configuration files.
 
     Args:
         task: Name that `fulmar list tasks` shows.
         robot: Name that `fulmar list robots` shows; of `DEFAULT_ROBOTS` by default.
-        scenario: Name that `fulmar list scenarios` shows.
+        scenario: Name that `fulmar list scenarios` shows; randomised by default, of aircraft nominal.
         **options: `seed` and `training` of `TaskEnv`.
 
     Raises:
@@ -38,17 +39,19 @@ def task_env(task: str, robot: str | None = None, scenario: str = "randomised", 
 
 
 def task_vector_env(
-    task: str, robot: str | None = None, scenario: str = "randomised", **options: Any
+    task: str, robot: str | None = None, scenario: str | None = None, **options: Any
 ) -> TaskVectorEnv:
     """Build the environment of many worlds; as `task_env`, with `num_envs` among the options."""
     return TaskVectorEnv(*_parts(task, robot, scenario), **options)
 
 
-def _parts(task: str, robot: str | None, scenario: str) -> tuple[Robot, Task, Scenario]:
+def _parts(task: str, robot: str | None, scenario: str | None) -> tuple[Robot, Task, Scenario]:
     the_task = load_task(task)
-    the_robot = load_robot(robot or DEFAULT_ROBOTS[the_task.state_type])
+    usual = AIRCRAFT if the_task.flies else DEFAULT_ROBOTS[the_task.state_type]
+    the_robot = load_robot(robot or usual)
     the_task.check(the_robot)
-    return the_robot, the_task, load_scenario(scenario)
+    # The delays of `randomised` are longer than the control step of an aircraft.
+    return the_robot, the_task, load_scenario(scenario or ("nominal" if the_robot.flies else "randomised"))
 
 
 def environment_id(task: str) -> str:

@@ -9,6 +9,7 @@ import pytest
 import yaml
 
 from fulmar_core.paths import OWN_FOLDERS, config_names, config_path
+from fulmar_core.robot import load_robot
 from tests import new_robots
 from tests.fulmar_cli.command_line import complaint
 
@@ -47,7 +48,7 @@ def test_every_shipped_robot_passes(fulmar, name):
     assert found["robot"] == name
     assert found["controllable"]
     assert found["zero_wrench_holdable"]
-    assert found["trim"] == []
+    assert bool(found["trim"]) is load_robot(name).flies
 
 
 @pytest.mark.parametrize("name", ["courier", "fan_disc", "lopsided_probe", "raft", "rally", "skiff"])
@@ -288,3 +289,37 @@ def test_the_figure_is_small_and_not_empty(fulmar, tmp_path, name):
     assert image.shape[1] > 800
     blue = (image[..., 2] - image[..., 0] > 0.1).mean()  # what is filled
     assert 0.005 < blue < 0.6
+
+
+def test_an_aircraft_is_trimmed_where_asked_and_its_modes_have_names(fulmar):
+    code, out, _ = fulmar("check", "robot", "navion", "--speed", "53.64", "--altitude", "0", "--json")
+    (trim,) = json.loads(out)["trim"]
+    assert (code, trim["speed"], trim["height"], trim["altitude"]) == (0, 53.64, None, 0.0)
+    assert set(trim) == {
+        "speed",
+        "height",
+        "altitude",
+        "alpha_deg",
+        "elevator_deg",
+        "throttle",
+        "thrust_n",
+        "modes",
+    }
+    modes = {mode["name"]: mode for mode in trim["modes"]}
+    assert set(modes) == {"short period", "phugoid", "roll", "Dutch roll", "spiral"}
+    assert modes["short period"]["frequency"] == pytest.approx(3.57, abs=0.05)  # Nelson: 3.6 rad/s
+    assert modes["roll"]["real"] == pytest.approx(-8.43, abs=0.05)  # Nelson: -8.435
+
+
+def test_an_aircraft_without_a_trim_there_is_one_line(fulmar):
+    assert "'navion' has no trim at 10 m/s" in complaint(fulmar("check", "robot", "navion", "--speed", "10"))
+    assert "height = -1 m must be" in complaint(
+        fulmar("check", "robot", "navion", "--speed", "50", "--height", "-1")
+    )
+    assert "are for aircraft" in complaint(fulmar("check", "robot", "jetbot", "--speed", "1"))
+
+
+def test_the_envelope_of_an_aircraft_is_drawn(fulmar, tmp_path):
+    code, _, _ = fulmar("check", "robot", "airship_v7", "--plot", str(tmp_path / "envelope.png"))
+    assert code == 0
+    assert (tmp_path / "envelope.png").stat().st_size > 10_000

@@ -74,6 +74,7 @@ def test_the_list_is_one_json_object(fulmar):
     assert found["controllers"] == [
         "policy",
         "lqr",
+        "lqi",
         "pd",
         "adaptive",
         "mpc",

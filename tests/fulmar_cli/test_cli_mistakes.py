@@ -46,7 +46,7 @@ def broken_configs(tmp_path, monkeypatch):
         (["run", "leatherback", "--controller", "lqr"], "controller 'lqr' is for robots with thrusters"),
         (
             [*RUN, "--controller", "fuzzy"],
-            "unknown controller 'fuzzy'. Known: adaptive, classical, excite, external, lqr, lqr_drift, mpc, pd, "
+            "unknown controller 'fuzzy'. Known: adaptive, classical, excite, external, lqi, lqr, lqr_drift, mpc, pd, "
             "policy.",
         ),
         (

@@ -31,7 +31,8 @@ ROBOTS = config_names("robots")
 FLYING = [
     name
     for name in ROBOTS
-    if load_robot(name).state_type is SpatialState and not load_robot(name).actuators.turns_only
+    if load_robot(name).state_type is SpatialState
+    and not (load_robot(name).actuators.turns_only or load_robot(name).flies)
 ]
 SATELLITES = [name for name in ROBOTS if load_robot(name).actuators.turns_only]
 MOST_LEFT_OUT = 4

@@ -18,6 +18,12 @@ DT_NS = round(1e9 * ROBOT.timing.physics_dt)
 TICKS = ROBOT.timing.substeps(10.0)
 
 
+class Named(str):
+    """A sample that is known by its name, and has no odometry."""
+
+    odometry = None
+
+
 class Backend:
     robot = ROBOT
 
@@ -26,7 +32,7 @@ class Backend:
 
     def step(self, command: np.ndarray, ticks: int = 1, *, begins: int | None = None) -> str:
         self.steps.append((ticks, begins))
-        return f"sample {len(self.steps)}"
+        return Named(f"sample {len(self.steps)}")
 
 
 class Wires:
@@ -75,7 +81,7 @@ def run(wires: Wires, *, steps: int = 2, timeout_s: float = 10.0) -> tuple[Chain
     loop = ChainLoop(
         backend, wires, guard, SimulatedTime(0), control_hz=10.0, answer_timeout_s=timeout_s
     )  # fmt: skip
-    loop.run("sample 0", steps, threading.Event())
+    loop.run(Named("sample 0"), steps, threading.Event())
     return loop, backend
 
 

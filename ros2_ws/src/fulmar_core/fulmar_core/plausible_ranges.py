@@ -72,10 +72,10 @@ def _noise(sensor: str, part: str, unit: str, most: float, usual: float, why: st
 
 ROBOT: tuple[Plausible, ...] = (
     Plausible("body.mass", "kg", (0.02, 2e4), (0.2, 2000.0), "palm-sized robots to satellites and cars"),
-    Plausible("body.radius", "m", (0.01, 30.0), (0.03, 6.0), "palm-sized robots to small aircraft"),
+    Plausible("body.radius", "m", (0.01, 30.0), (0.03, 10.0), "palm-sized robots to small aircraft"),
     Plausible("body.height", "m", (0.005, 30.0), (0.02, 6.0), "same as the radius"),
     Plausible(
-        "body.inertia.2", "kg·m²", (0.01, 3.0), (0.05, 1.05), f"{BODY}: solid cylinder 0.5 m r², thin ring 1 m r²",
+        "body.inertia.2", "kg·m²", (0.01, 3.0), (0.03, 1.05), f"{BODY}: solid cylinder 0.5 m r², thin ring 1 m r²",
         scale=lambda robot: _inertia(robot.body, upright=True),
     ),
     *(
@@ -142,7 +142,7 @@ ROBOT: tuple[Plausible, ...] = (
         "performance.torque", "N·m", (1e-6, 2000.0), (1e-4, 200.0),
         "of the yaw inertia: angular acceleration of up to 200 rad/s²", scale=lambda robot: robot.body.inertia[2],
     ),
-    Plausible("performance.top_speed", "m/s", (0.001, 500.0), (0.02, 100.0), "crawling robots to aircraft"),
+    Plausible("performance.top_speed", "m/s", (0.001, 500.0), (0.02, 200.0), "crawling robots to aircraft"),
     Plausible(
         "performance.speed", "m/s", (0.001, 1.5), (0.02, 1.0), "of top_speed",
         scale=lambda robot: robot.performance.top_speed,

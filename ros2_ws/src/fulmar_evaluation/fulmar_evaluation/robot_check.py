@@ -16,12 +16,13 @@ from fulmar_core.actuators.pushing import WRENCH, Pushing
 from fulmar_core.actuators.rolling import Rolling
 from fulmar_core.controllers.allocation import check_allocation
 from fulmar_core.dynamics.linear_model import linearise
-from fulmar_core.errors import ImplausibleError
+from fulmar_core.errors import ConfigError, ImplausibleError
 from fulmar_core.planar import PlanarState
 from fulmar_core.plausibility import logger as plausibility
 from fulmar_core.robot import Robot, load_robot, load_robot_file
 from fulmar_core.spatial import SpatialState
 from fulmar_core.wrench_limits import AXES, WrenchSet, wrench_set_of
+from fulmar_evaluation.aircraft_check import AircraftCheck, check_aircraft, problems_of
 
 PLAIN = {
     "force_x": "force along x",
@@ -48,6 +49,7 @@ class RobotCheck:
         wrenches: About the body's origin; None with the robot.
         rank: Of what commands do to the axes in which the robot moves.
         missing_axes: Of these axes, those that no command moves alone; `AXES` has the names.
+        aircraft: Trims and modes of an aircraft, which has no wrenches; None for any other robot.
         controllable: Whether commands bring the robot to any pose.
         problems: One line each; a robot without any has passed.
         warnings: Unusual values, one line each.
@@ -59,6 +61,7 @@ class RobotCheck:
     rank: int = 0
     missing_axes: tuple[str, ...] = ()
     controllable: bool = False
+    aircraft: AircraftCheck | None = None
     problems: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
 
@@ -85,21 +88,38 @@ class RobotCheck:
                 "controllable": self.controllable,
                 "least_time": least_time(self.robot, self.wrenches),
             }
+        if self.aircraft is not None:
+            known |= {
+                "actuators": {
+                    "count": len(self.aircraft.robot.actuators.names),
+                    "rank": self.rank,
+                    "missing_axes": list(self.missing_axes),
+                    "axes": list(self.aircraft.authority),
+                    "authority": self.aircraft.authority,
+                },
+                "zero_wrench_holdable": bool(self.aircraft.trims),
+                "controllable": self.controllable,
+            }
         return {
             "robot": self.name,
             **known,
-            "trim": [],
+            "trim": [] if self.aircraft is None else self.aircraft.as_json(),
             "passed": self.passed,
             "problems": list(self.problems),
             "warnings": list(self.warnings),
         }
 
 
-def check_robot(name: str) -> RobotCheck:
+def check_robot(
+    name: str, *, speed: float | None = None, altitude: float | None = None, height: float | None = None
+) -> RobotCheck:
     """Check a robot by its name, or a robot's file.
 
     Args:
         name: Of a robot, or a path that ends in .yaml or .yml.
+        speed: Of an aircraft; as the rest as of `check_aircraft` [m/s].
+        altitude: Same; None: 0 [m].
+        height: Same [m].
 
     Raises:
         ConfigError: There is none of that name, or the file cannot be read.
@@ -110,6 +130,23 @@ def check_robot(name: str) -> RobotCheck:
             robot = load_robot_file(path) if path.suffix in (".yaml", ".yml") else load_robot(name)
         except ImplausibleError as error:
             return RobotCheck(path.stem, problems=(str(error),), warnings=tuple(warnings))
+        if robot.flies:
+            flown = check_aircraft(robot, speed=speed, altitude=altitude or 0.0, height=height)
+            axes = [axis for axis in flown.authority if axis not in flown.missing_axes]
+            return RobotCheck(
+                robot.name,
+                robot,
+                aircraft=flown,
+                rank=len(axes),
+                missing_axes=flown.missing_axes,
+                controllable=bool(flown.trims) and not flown.missing_axes,
+                problems=tuple(problems_of(flown)),
+                warnings=tuple(warnings),
+            )
+        if (speed, altitude, height) != (None, None, None):
+            raise ConfigError(
+                f"--speed, --altitude and --height are for aircraft, and '{robot.name}' is none."
+            )
         wrenches = wrench_set_of(robot)
         effects = _effects(robot, wrenches)
         controllable = _controllable(robot, wrenches)

@@ -26,14 +26,31 @@ def _group() -> None:
 def robot(
     name: Annotated[str, argument("NAME|FILE", "A name from `fulmar list robots`, or a robot's .yaml file.")],
     plot: Annotated[
-        Path | None, option("FILE", "Draw forces and torques into this image (.png).", "--plot")
+        Path | None,
+        option(
+            "FILE", "Draw forces and torques, or an aircraft's envelope, into this image (.png).", "--plot"
+        ),
+    ] = None,
+    speed: Annotated[float | None, option("M/S", "Of an aircraft: trim at this speed alone.")] = None,
+    altitude: Annotated[
+        float | None, option("M", "Of an aircraft: above mean sea level, for the density of the air.")
+    ] = None,
+    height: Annotated[
+        float | None, option("M", "Of an aircraft: above ground or water, which switches ground effect on.")
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Check a robot: what its actuators can do to its body, and what looks like a mistake.
 
     Rank and limits of the wrench, whether nothing remains with every actuator on, controllability, the least time for a
-    metre and a quarter turn, and values of the wrong unit.
+    metre and a quarter turn, and values of the wrong unit. Of an aircraft: trim over speed and height, modes by their names,
+    and what full controls do.
+
+    Try:
+
+    fulmar check robot navion --speed 53.64 --altitude 0
+
+    fulmar check robot airship_v7 --height 1 --plot envelope.png
 
     Exit code: 0 passed, 1 it has a problem, 2 the file cannot be read.
     """
@@ -43,11 +60,15 @@ def robot(
         from fulmar_cli.extras import require
 
         require("matplotlib")
-    found = check_robot(name)
+    found = check_robot(name, speed=speed, altitude=altitude, height=height)
     if as_json:
         print_json(found.as_json())
     else:
         _show(found)
+    if plot is not None and found.aircraft is not None:
+        from fulmar_evaluation.report.envelope_plot import write_envelope_plot
+
+        log_line(f"wrote {write_envelope_plot(found.aircraft.robot, plot)}")
     if plot is not None and found.robot is not None and found.wrenches is not None:
         from fulmar_evaluation.report.wrench_plot import write_wrench_plot
 
@@ -58,10 +79,13 @@ def robot(
 
 def _show(found: RobotCheck) -> None:
     """Print a check for people."""
+    from fulmar_evaluation.aircraft_check import lines_of
+
     result = found.as_json()
     if found.robot is not None:
         write_line(f"{found.name}: {found.robot.title}")
-        for label, text in _lines(found, result):
+        flown = found.aircraft
+        for label, text in _lines(found, result) if flown is None else lines_of(flown):
             write_line(f"  {label:<24}{text}")
     for problem in found.problems:
         write_line(f"  problem: {problem}" if found.robot is not None else f"{found.name}: {problem}")

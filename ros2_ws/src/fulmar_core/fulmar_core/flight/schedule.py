@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import expm
 
 from fulmar_core.actuators.control_surfaces import ControlSurfaces
 from fulmar_core.attitude import turn
@@ -35,6 +34,8 @@ class FlightModel:
 
 def flight_model(robot: Robot, trim: Trim, dt: float) -> FlightModel:
     """The model of an aircraft about a trim, servos and motors included; `dt` of a control step [s]."""
+    from scipy.linalg import expm
+
     craft = robot.actuators
     assert isinstance(craft, ControlSurfaces)  # as of `find_trim`
     rates, effects = continuous_model(robot, trim)

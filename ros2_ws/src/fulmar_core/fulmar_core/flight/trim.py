@@ -6,7 +6,6 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from fulmar_core.attitude import euler_of, from_euler, product, turn
 from fulmar_core.counter_rng import Draws
@@ -85,6 +84,8 @@ def find_trim(robot: Robot, speed: float, height: float | None = None, altitude:
         raise ConfigError(f"height = {height:g} m must be greater than 0: the craft flies above the ground.")
     if not -500.0 <= altitude <= 11_000.0:
         raise ConfigError(f"altitude = {altitude:g} m must lie between -500 and 11000, in the troposphere.")
+    from scipy.optimize import least_squares  # a fifth of a second, which nobody who flies nothing shall pay
+
     craft = robot if height is not None else free_air(robot)
     problem = _Problem(
         craft, speed, height or FREE_AIR, altitude if height is not None else altitude - FREE_AIR

@@ -1,0 +1,157 @@
+"""Check of an aircraft: trim over speed and height, modes with their names, and what its controls do."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fulmar_core.errors import ConfigError
+from fulmar_core.flight.modes import Mode, continuous_model, modes_of
+from fulmar_core.flight.trim import Trim, find_trim
+from fulmar_core.robot import Robot
+
+# Of the cruising speed, and, where there is ground effect, of the span: where trims are looked for [-].
+SPEEDS, HEIGHTS = (0.8, 0.9, 1.0, 1.1, 1.2), (0.2, 0.5, 1.0)
+# What each control is for, by the row of `continuous_model` that it acts on.
+AXES = {"force_x": 6, "torque_x": 9, "torque_y": 10, "torque_z": 11}
+UNITS = {"force_x": "m/s²", "torque_x": "rad/s²", "torque_y": "rad/s²", "torque_z": "rad/s²"}
+LEAST = 1e-3  # share of the strongest effect on an axis that counts as one [-]
+
+
+@dataclass(frozen=True)
+class AircraftCheck:
+    """Result for one aircraft.
+
+    Attributes:
+        trims: Those that were found, with their modes.
+        missing: One line for each condition without a trim.
+        authority: Acceleration at full deflection or throttle at the first trim, by axis and control.
+    """
+
+    robot: Robot
+    trims: tuple[tuple[Trim, tuple[Mode, ...]], ...]
+    missing: tuple[str, ...]
+    authority: dict[str, dict[str, float]]
+
+    @property
+    def missing_axes(self) -> tuple[str, ...]:
+        """Axes that no control moves."""
+        return tuple(axis for axis, each in self.authority.items() if max(map(abs, each.values())) < LEAST)
+
+    def as_json(self) -> list[dict[str, Any]]:
+        """The list `trim` of `fulmar check robot --json`."""
+        return [
+            {
+                "speed": trim.speed,
+                "height": trim.height,
+                "altitude": trim.altitude,
+                "alpha_deg": math.degrees(trim.alpha),
+                "elevator_deg": math.degrees(trim.elevator),
+                "throttle": trim.throttle,
+                "thrust_n": trim.thrust,
+                "modes": [mode.as_json() for mode in modes],
+            }
+            for trim, modes in self.trims
+        ]
+
+
+def check_aircraft(
+    robot: Robot, *, speed: float | None = None, altitude: float = 0.0, height: float | None = None
+) -> AircraftCheck:
+    """Trim and linearise an aircraft.
+
+    Args:
+        robot: An aircraft.
+        speed: Through the air; None: five around its cruising speed [m/s].
+        altitude: Above mean sea level, of the craft in free air, else of the ground [m].
+        height: Of the craft above the ground, with ground effect; None: free air, and, without a speed, some heights
+            at cruise too [m].
+
+    Raises:
+        ConfigError: There is no trim at the speed or height that was asked for, or none at all.
+    """
+    assert robot.airframe is not None  # as of `Robot.flies`
+    cruise = robot.airframe.speed
+    asked = [(speed, height)] if speed is not None else [(share * cruise, height) for share in SPEEDS]
+    if speed is None and height is None and robot.airframe.ground_effect is not None:
+        asked += [(cruise, share * robot.airframe.span) for share in HEIGHTS]
+    found, missing = [], []
+    for at_speed, at_height in asked:
+        try:
+            trim = find_trim(robot, at_speed, at_height, altitude)
+        except ConfigError as error:
+            if speed is not None:
+                raise
+            missing.append(str(error))
+            continue
+        found.append((trim, modes_of(robot, trim)))
+    authority = _authority(robot, found[len(found) // 2][0]) if found else {}
+    return AircraftCheck(robot, tuple(found), tuple(missing), authority)
+
+
+def _authority(robot: Robot, trim: Trim) -> dict[str, dict[str, float]]:
+    _, effects = continuous_model(robot, trim)
+    full = effects * robot.actuators.scale
+    names = robot.actuators.names
+    return {axis: dict(zip(names, map(float, full[row]), strict=True)) for axis, row in AXES.items()}
+
+
+def problems_of(check: AircraftCheck) -> Iterator[str]:
+    """One line for each thing that is wrong."""
+    if not check.trims:
+        yield check.missing[0]
+    if check.authority and check.missing_axes:
+        yield f"no control moves it about or along {', '.join(check.missing_axes)}."
+
+
+def lines_of(check: AircraftCheck) -> list[tuple[str, str]]:
+    """What people read, as labels and texts."""
+    lines = []
+    for axis, each in check.authority.items():
+        strongest = sorted(each.items(), key=lambda one: -abs(one[1]))
+        most = abs(strongest[0][1])
+        shown = [f"{name} {value:+.3g}" for name, value in strongest if abs(value) > 0.05 * most]
+        lines.append((f"full control, {axis}", f"{', '.join(shown)} {UNITS[axis]}"))
+    for trim, modes in check.trims:
+        where = "free air" if trim.height is None else f"{trim.height:g} m"
+        lines.append(
+            (
+                f"{trim.speed:.4g} m/s, {where}",
+                f"α {math.degrees(trim.alpha):.2f}°, elevator {math.degrees(trim.elevator):.2f}°, throttle "
+                f"{trim.throttle:.3f}, thrust {trim.thrust:.4g} N",
+            )
+        )
+        lines += [("", _mode_line(mode)) for mode in modes]
+    return lines
+
+
+def _mode_line(mode: Mode) -> str:
+    if mode.imag:
+        period = 2.0 * math.pi / mode.imag
+        return f"{mode.name}: {mode.frequency:.3g} rad/s, damping {mode.damping:.3g}, period {period:.3g} s"
+    kind = "time constant" if mode.real < 0.0 else "doubles in"
+    seconds = -1.0 / mode.real if mode.real < 0.0 else math.log(2.0) / mode.real
+    return f"{mode.name}: {mode.real:.3g} 1/s, {kind} {seconds:.3g} s"
+
+
+def envelope(
+    robot: Robot, heights: Sequence[float | None], altitude: float = 0.0
+) -> dict[float | None, np.ndarray]:
+    """Trims over speed at some heights, columns speed, α [deg], elevator [deg] and throttle; where there are any."""
+    assert robot.airframe is not None  # as of `Robot.flies`
+    found = {}
+    for height in heights:
+        rows = []
+        for speed in np.linspace(0.5, 1.8, 40) * robot.airframe.speed:
+            try:
+                trim = find_trim(robot, float(speed), height, altitude)
+            except ConfigError:
+                continue
+            if abs(math.degrees(trim.alpha)) <= robot.airframe.stall_deg:
+                rows.append([speed, math.degrees(trim.alpha), math.degrees(trim.elevator), trim.throttle])
+        found[height] = np.array(rows).reshape(-1, 4)
+    return found
