@@ -17,7 +17,7 @@ from fulmar_core.spatial import SpatialState
 from sim_nodes.mujoco_model.floater import OFF_CENTRE
 from sim_nodes.mujoco_model.scenery import BODY, add_hull
 
-STEPS = 4  # of MuJoCo in a physics tick, each with the forces of where the craft is by then
+STEPS = 2  # of MuJoCo in a physics tick, each with the forces of where the craft is by then
 
 
 class Aircraft:

@@ -43,8 +43,8 @@ def robot(
     """Check a robot: what its actuators can do to its body, and what looks like a mistake.
 
     Rank and limits of the wrench, whether nothing remains with every actuator on, controllability, the least time for a
-    metre and a quarter turn, and values of the wrong unit. Of an aircraft: trim over speed and height, modes by their names,
-    and what full controls do.
+    metre and a quarter turn, and values of the wrong unit. Of an aircraft: trim over speed and height, modes with their
+    names, and what full controls do.
 
     Try:
 

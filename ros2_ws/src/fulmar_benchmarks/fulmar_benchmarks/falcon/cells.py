@@ -1,0 +1,122 @@
+"""One cell of the benchmark: some flights of a craft by one controller in one scenario, and their figures."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from fulmar_benchmarks.falcon.published import BESIDE
+from fulmar_core.controllers.classical import gains_of
+from fulmar_core.controllers.controller import Controller
+from fulmar_core.controllers.flight_lqi import FlightLqi, FlightLqr
+from fulmar_core.disturbances.parts import Air, Sensing
+from fulmar_core.disturbances.scenario import Scenario
+from fulmar_core.flight.turbulence import CLASSES
+from fulmar_core.references.flight_paths import PATHS
+from fulmar_core.robot import Robot, load_robot
+from fulmar_core.rollout import roll_out_in_batch
+from fulmar_core.tasks import load_task
+from fulmar_core.trajectories import Trajectories
+from policy_server.controllers import Choice, load_controller
+
+TASKS = ("hold", *PATHS)
+CONTROLLERS = ("lqi", "lqr", "policy")
+LATE_S = 0.02  # delay of measurements in `delay` and `all`
+NOISY = 2.0  # times the noise of the sensors: the mild row of FALCON-S
+SETTLED_M = 0.1  # a flight has settled once it stays so near to its reference
+WITHOUT_START_S = 10.0  # after which `late_altitude_rmse_m` counts
+
+
+def _scenario(name: str, **parts: Any) -> Scenario:
+    return Scenario(name, sensor_noise=name != "exact", body="nominal", **parts)
+
+
+SCENARIOS = {
+    "exact": _scenario("exact"),
+    "calm": _scenario("calm"),
+    "noise": _scenario("noise", sensing=Sensing(noise=NOISY)),
+    "delay": _scenario("delay", sensing=Sensing(delay_s=LATE_S, least_delay=1.0)),
+    "light": _scenario("light", air=Air(turbulence=CLASSES["light"])),
+    "severe": _scenario("severe", air=Air(turbulence=CLASSES["severe"])),
+    "all": _scenario(
+        "all",
+        sensing=Sensing(noise=NOISY, delay_s=LATE_S, least_delay=1.0),
+        air=Air(turbulence=CLASSES["light"]),
+    ),
+}
+
+
+@dataclass(frozen=True)
+class Cell:
+    """What one cell flies."""
+
+    robot: str
+    task: str
+    controller: str
+    scenario: str
+    episodes: int
+    seed: int
+
+
+def controller_of(robot: Robot, cell: Cell) -> Controller:
+    """The controller of a cell; with exact state the laws take it as it is, without their filter.
+
+    Raises:
+        FulmarError: There is none, such as no shipped policy for the task.
+    """
+    task = load_task(f"fly_{cell.task}")
+    if cell.controller == "policy":
+        return load_controller("policy", robot, task, Choice(0.0))
+    weights = gains_of(robot, cell.controller)
+    if cell.scenario == "exact":
+        weights = replace(weights, observer=None)
+    law = FlightLqr if cell.controller == "lqr" else FlightLqi
+    return law(robot, task, weights, name=cell.controller)
+
+
+def fly(cell: Cell) -> dict[str, Any]:
+    """Fly a cell; its figures, JSON-ready, see `fulmar benchmark falcon --help`."""
+    robot, task = load_robot(cell.robot), load_task(f"fly_{cell.task}")
+    controller = controller_of(robot, cell)
+    run = roll_out_in_batch(
+        controller, robot, task, SCENARIOS[cell.scenario], episodes=cell.episodes, seed=cell.seed
+    )
+    found = figures(run, cell.task, robot)
+    published = BESIDE.get(cell.controller, {}).get(cell.task)
+    return found | {"thesis": published.as_json() if published else {}}
+
+
+def figures(run: Trajectories, task: str, robot: Robot) -> dict[str, Any]:
+    """Figures of some flights: medians over those that survive, and the share that does.
+
+    Per axis and over all: √(mean ‖e‖² / 3) and √(mean ‖e‖²) of the way to the reference, of which that ahead is 0.
+    """
+    error = np.asarray(run.position_error, dtype=float)
+    times = run.control_dt * np.arange(1, error.shape[1] + 1)
+    height = np.full_like(times, 1.0) if task == "hold" else PATHS[task][1](times)
+    off = np.asarray(run.z, dtype=float) - height
+    alive = ~np.any(run.touching, axis=1)
+    rmse = np.sqrt(np.mean(error**2, axis=1))
+    throttles = np.asarray(run.shares)[..., robot.actuators.positions :]
+    near = np.flip(np.logical_and.accumulate(np.flip(error <= SETTLED_M, axis=1), axis=1), axis=1)
+    settled = np.where(near.any(axis=1), np.argmax(near, axis=1) * run.control_dt, np.nan)
+    late = times > WITHOUT_START_S
+
+    def median(values: np.ndarray) -> float | None:
+        kept = values[alive & np.isfinite(values)]
+        return float(np.median(kept)) if kept.size else None
+
+    return {
+        "rmse_per_axis_m": median(rmse / np.sqrt(3.0)),
+        "rmse_per_axis_worst_m": float(rmse[alive].max() / np.sqrt(3.0)) if alive.any() else None,
+        "rmse_m": median(rmse),
+        "altitude_rmse_m": median(np.sqrt(np.mean(off**2, axis=1))),
+        "late_altitude_rmse_m": median(np.sqrt(np.mean(off[:, late] ** 2, axis=1))) if late.any() else None,
+        "settling_s": median(settled),
+        "peak_error_m": median(error.max(axis=1)),
+        "energy": median(np.mean(throttles**2, axis=(1, 2))),
+        "survival": float(np.mean(alive)),
+        "episodes": len(alive),
+    }

@@ -1,0 +1,86 @@
+"""Report of the benchmark of FALCON-S: errors by task and scenario, and ground effect over height."""
+
+from __future__ import annotations
+
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from matplotlib.figure import Figure
+
+from fulmar_benchmarks.falcon.campaign import requirements
+from fulmar_benchmarks.falcon.tables import lines
+from fulmar_evaluation.report.page import Part, Plot, headline
+from fulmar_evaluation.report.style import house_style, quiet_grid
+from fulmar_evaluation.report.writer import write_benchmark
+
+_ERRORS = """
+RMSE per axis of each task, median over the flights that survive, by scenario; the stroke is the thesis' LQR (Table
+5.8). What is missing has crashed."""
+_GROUND = """
+Left: lift and induced drag near the ground over those in free air at the same angle of attack (Phillips and Hunsaker,
+2013), as in thesis Fig. 5.1. Right: mean squared throttle in level flight, and that of thesis Table 5.2, whose motors
+had other constants."""
+
+
+def write_report(document: dict[str, Any], out: Path) -> Path:
+    """Write the page and its plots into a folder; returns the page."""
+    met = requirements(document)
+    with house_style():
+        parts: list[Part] = [headline(f"{sum(good for *_, good in met)} of {len(met)} requirements are met.")]
+        parts.append(Plot("Errors by task", _ERRORS, draw_errors(document), "errors"))
+        parts.append(Plot("Ground effect", _GROUND, draw_ground(document), "ground_effect"))
+        parts.append("<h2>All figures</h2><pre>" + escape("\n".join(lines(document))) + "</pre>")
+        return write_benchmark(out, f"{document['robot']} over the water", parts)
+
+
+def draw_errors(document: dict[str, Any]) -> Figure:
+    """RMSE of every task, one panel for each controller."""
+    by: dict[str, dict[str, Any]] = {}
+    for task, controllers in document["tasks"].items():
+        for controller, scenarios in controllers.items():
+            by.setdefault(controller, {})[task] = scenarios
+    figure = Figure(figsize=(4.4 * max(1, len(by)), 4.0), layout="constrained")
+    panels = figure.subplots(1, max(1, len(by)), sharey=True, squeeze=False)[0]
+    for axes, (controller, tasks) in zip(panels, by.items(), strict=False):
+        scenarios = list(dict.fromkeys(name for each in tasks.values() for name in each))
+        for number, scenario in enumerate(scenarios):
+            shown = [
+                (place + 0.08 * (number - 0.5 * len(scenarios)), each[scenario]["rmse_per_axis_m"])
+                for place, each in enumerate(tasks.values())
+                if each.get(scenario, {}).get("rmse_per_axis_m") is not None
+            ]
+            if shown:
+                axes.plot(*zip(*shown, strict=True), marker="o", linestyle="", markersize=4, label=scenario)
+        for place, each in enumerate(tasks.values()):
+            thesis = next((one["thesis"] for one in each.values() if one.get("thesis")), None)
+            if thesis:
+                level = thesis["rmse_per_axis_m"]
+                axes.plot([place - 0.4, place + 0.4], [level, level], color="black", linewidth=1.2)
+        axes.set_xticks(range(len(tasks)), list(tasks))
+        axes.set_yscale("log")
+        axes.set_title(controller)
+        quiet_grid(axes)
+    panels[0].set_ylabel("RMSE per axis [m]")
+    panels[0].legend(fontsize="small")
+    return figure
+
+
+def draw_ground(document: dict[str, Any]) -> Figure:
+    """Ratios near the ground, and energy over height."""
+    ground = document["ground_effect"]
+    figure = Figure(figsize=(8.4, 3.6), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    left.plot(ground["height_over_span"], ground["lift_ratio"], label="lift")
+    left.plot(ground["height_over_span"], ground["induced_drag_ratio"], label="induced drag / lift²")
+    left.set_xlabel("height over span")
+    left.set_ylabel("ratio to free air")
+    right.plot(ground["heights_m"], ground["energy"], marker="o", label="ours")
+    right.plot(ground["heights_m"], ground["thesis_energy"], marker="s", label="thesis")
+    right.set_xscale("log")
+    right.set_xlabel("height [m]")
+    right.set_ylabel("mean squared throttle")
+    for axes in (left, right):
+        axes.legend()
+        quiet_grid(axes)
+    return figure

@@ -1,0 +1,52 @@
+"""The benchmark of FALCON-S as lines of text."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from fulmar_benchmarks.falcon.campaign import requirements
+
+
+def lines(document: dict[str, Any]) -> list[str]:
+    """Every figure beside the thesis', then what is required."""
+    found = [
+        f"{document['robot']}, seed {document['seed']}; RMSE per axis in m, of the thesis in brackets",
+        f"{'task':5} {'by':7} {'scenario':8} {'RMSE':>16} {'worst':>8} {'altitude':>8} {'peak':>7} {'settles':>8} "
+        f"{'energy':>7} {'alive':>6}",
+    ]
+    for task, controllers in document["tasks"].items():
+        for controller, scenarios in controllers.items():
+            for scenario, each in scenarios.items():
+                if "error" in each:
+                    found.append(f"{task:5} {controller:7} {scenario:8} {each['error']}")
+                    continue
+                thesis = each["thesis"].get("rmse_per_axis_m")
+                beside = f"({thesis:.3f})" if thesis is not None else ""
+                found.append(
+                    f"{task:5} {controller:7} {scenario:8} {_number(each['rmse_per_axis_m'], 4):>8}{beside:>8} "
+                    f"{_number(each['rmse_per_axis_worst_m'], 4):>8} {_number(each['altitude_rmse_m'], 4):>8} "
+                    f"{_number(each['peak_error_m'], 3):>7} {_number(each['settling_s'], 2):>8} "
+                    f"{_number(each['energy'], 3):>7} {each['survival']:>6.2f}"
+                )
+    ground = document["ground_effect"]
+    found.append("mean squared throttle in level flight over height, and of the thesis (Table 5.2):")
+    found += [
+        f"  {height:g} m: {ours:.3f} ({theirs:.3f})"
+        for height, ours, theirs in zip(
+            ground["heights_m"], ground["energy"], ground["thesis_energy"], strict=True
+        )
+    ]
+    for name, asked, shown, good in requirements(document):
+        found.append(f"{'met' if good else 'NOT MET':8} {name}: {shown} ({asked})")
+    return found
+
+
+def print_tables(document: dict[str, Any], write: Callable[[str], None]) -> None:
+    """Print them."""
+    for line in lines(document):
+        write(line)
+
+
+def _number(value: float | None, digits: int) -> str:
+    return "-" if value is None else f"{value:.{digits}f}"

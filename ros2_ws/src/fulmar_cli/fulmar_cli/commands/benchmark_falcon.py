@@ -1,0 +1,77 @@
+"""`fulmar benchmark falcon`: a ground-effect craft along the references of the thesis."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import Annotated
+
+from fulmar_bringup.console import log_line, print_result, write_line
+from fulmar_bringup.progress import work_bar
+from fulmar_cli.commands.arguments import JobsOption, JsonOption, SeedOption, invoked_command, option
+from fulmar_cli.commands.benchmark_campaign import ReportOption
+from fulmar_cli.commands.values import read_names
+from fulmar_cli.extras import require
+from fulmar_core.seeds import EVALUATION_SEED
+
+
+def falcon(
+    robot: Annotated[str, option("NAME", "An aircraft.")] = "airship_v7",
+    tasks: Annotated[str, option("T,...", "Out of hold and a to f, or all.")] = "all",
+    controllers: Annotated[str, option("C,...", "Out of lqi, lqr and policy, or all.")] = "all",
+    scenarios: Annotated[
+        str, option("S,...", "Out of exact, calm, noise, delay, light, severe and all, or `every`.")
+    ] = "every",
+    episodes: Annotated[
+        int, option("N", "Flights of each cell; with exact state they are all alike.", min=1)
+    ] = 10,
+    seed: SeedOption = EVALUATION_SEED,
+    out: Annotated[Path, option("DIR", "Folder of the report and its figures.")] = Path(
+        "runs/benchmark/falcon"
+    ),
+    jobs: JobsOption = None,
+    report: ReportOption = True,
+    as_json: JsonOption = False,
+) -> None:
+    """Fly a ground-effect craft along the references of the thesis, beside its Tables 5.2 and 5.6 to 5.8.
+
+    Flights of 60 s in the core's dynamics: `hold` one metre over the water, and (a) to (f) of thesis §5.5.2. Scenarios:
+    exact (state as it is), calm (sensors of 100 Hz with 0.05 m, 0.05 m/s, 0.01 rad, 0.01 rad/s), calm with twice the
+    noise, a delay of 20 ms, light or severe Dryden turbulence, or noise, delay and light turbulence in `all`.
+    `rmse_per_axis_m` is √(mean e² / 3), as the thesis prints it, `rmse_m` √(mean e²), medians over the flights that
+    survive. A flight survives if the hull touches no water and no angle of attack goes beyond 1.5 times the stall's.
+
+    Try:
+
+    fulmar benchmark falcon --tasks a,d --controllers lqi --scenarios exact,calm --json
+    """
+    from fulmar_benchmarks.falcon.campaign import Request, run_falcon
+    from fulmar_benchmarks.falcon.cells import CONTROLLERS, SCENARIOS, TASKS
+    from fulmar_benchmarks.falcon.tables import print_tables
+
+    chosen = (
+        tuple(SCENARIOS)
+        if scenarios == "every"
+        else tuple(read_names(scenarios, "scenario", tuple(SCENARIOS)))
+    )
+    request = Request(
+        robot,
+        tuple(read_names(tasks, "task", TASKS)),
+        tuple(read_names(controllers, "controller", CONTROLLERS)),
+        chosen,
+        episodes,
+        seed,
+        jobs or len(os.sched_getaffinity(0)),
+    )
+    with work_bar("flights") as progress:
+        document = run_falcon(request, progress)
+    document["command"] = invoked_command()
+    out.mkdir(parents=True, exist_ok=True)
+    (out / "falcon.json").write_text(json.dumps(document, indent=1), encoding="utf-8")
+    if report:
+        require("matplotlib")
+        from fulmar_benchmarks.falcon.report import write_report
+
+        log_line(f"report: {write_report(document, out)}")
+    print_result(document, lambda found: print_tables(found, write_line), as_json=as_json)
