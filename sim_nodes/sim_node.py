@@ -14,7 +14,7 @@ from fulmar_ros.plant_settings import PlantSettings
 from fulmar_ros.runtime import run_node
 from sim_nodes.on_air import CanStand, OnAir
 
-BACKENDS = ("mujoco", "mock")
+BACKENDS = ("mujoco", "mock", "jsbsim")
 
 
 def make_backend(robot: Robot, settings: PlantSettings) -> Backend:
@@ -34,6 +34,10 @@ def _simulator(robot: Robot, settings: PlantSettings) -> CanStand:
         from sim_nodes.mock_backend import MockBackend
 
         return MockBackend(robot, things=task.things)
+    if settings.backend == "jsbsim":
+        from sim_nodes.jsbsim_backend import JsbsimBackend
+
+        return JsbsimBackend.of(robot, task, load_scenario(settings.scenario))
     raise UnknownNameError("simulated backend", settings.backend, BACKENDS)
 
 

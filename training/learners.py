@@ -14,6 +14,10 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.noise import NormalActionNoise, VectorizedActionNoise
 from stable_baselines3.common.vec_env import VecEnv
 
+from fulmar_core.counter_rng import Draws
+from fulmar_core.flight.trim import find_trim
+from fulmar_core.robot import Robot
+from fulmar_core.tasks import Task
 from training.behavior_cloning import BehaviorCloningPPO
 from training.fast_ppo import FastPPO
 from training.settings import Algorithm, OnPolicy, Ppo, RecurrentPpo, Td3
@@ -70,6 +74,26 @@ def build_learner(
         device="cpu",
         **more,
     )
+
+
+def first_action(robot: Robot, task: Task) -> np.ndarray | None:
+    """Shares of full command that a learner begins around, shape (n,); None: those of no command.
+
+    An aircraft begins in trim: without thrust every craft would be in the water before it has learned anything.
+    """
+    if not robot.flies or robot.airframe is None:
+        return None
+    _, goal = task.draw(Draws.of_episode(0, 0), robot, training=True)
+    height = max(float(goal.targets[0, 0, 2]), 0.1 * robot.airframe.span)
+    return np.asarray(find_trim(robot, robot.airframe.speed, height).command / robot.actuators.scale)
+
+
+def begin_near(learner: BaseAlgorithm, action: np.ndarray | None) -> None:
+    """Let a new policy of an on-policy learner answer with about an action, whatever it observes."""
+    last = getattr(learner.policy, "action_net", None)
+    if action is not None and last is not None:
+        with torch.no_grad():
+            last.bias.copy_(torch.as_tensor(action, dtype=last.bias.dtype))
 
 
 def callbacks_of(learner: BaseAlgorithm) -> list[BaseCallback]:

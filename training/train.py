@@ -23,7 +23,7 @@ from fulmar_core.tasks import Task
 from training.checkpoint import load_checkpoint
 from training.evaluator import held_out_evaluator
 from training.fallback_policy import FallbackPolicy
-from training.learners import build_learner, callbacks_of
+from training.learners import begin_near, build_learner, callbacks_of, first_action
 from training.network import save_network
 from training.progress import LearningBar, Watcher
 from training.run_folder import (
@@ -144,6 +144,7 @@ def train(
         begin_run(robot, task, settings, seed=seed, out=out, time_limit_s=time_limit_s, updates=updates)
         env = VecNormalize(worlds, norm_reward=False, gamma=settings.algorithm.gamma)
         learner = build_learner(settings.algorithm, env, seed=seed)
+        begin_near(learner, first_action(robot, task))
     _log_to(learner, out / TENSORBOARD_FOLDER, curves)
     with polite_interrupt() as interrupt:
         session = Session(

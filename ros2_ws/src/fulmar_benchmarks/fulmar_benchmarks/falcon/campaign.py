@@ -54,13 +54,7 @@ def run_falcon(request: Request, progress: Progress) -> dict[str, Any]:
         for scenario in request.scenarios
         if controller != "policy" or shipped_policy(request.robot, f"fly_{task}") is not None
     ]
-    found = dict(
-        zip(
-            cells,
-            mapped(_fly, [(cell,) for cell in cells], jobs=request.jobs, progress=progress),
-            strict=True,
-        )
-    )
+    flown = mapped(_fly, [(cell,) for cell in cells], jobs=request.jobs, progress=progress)
     tasks: dict[str, Any] = {}
     for cell, figures in zip(cells, flown, strict=True):
         tasks.setdefault(cell.task, {}).setdefault(cell.controller, {})[cell.scenario] = figures

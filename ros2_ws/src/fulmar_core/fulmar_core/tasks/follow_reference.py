@@ -52,10 +52,11 @@ class FlightStart:
 
 @dataclass(frozen=True)
 class FlightReward:
-    """Weights of the reward, per control step; e is the distance from the reference."""
+    """Weights of the reward, per control step; e is the height error, s the error to the side."""
 
     near: float  # times exp(-e / 0.5 m)
     nearer: float  # times exp(-e / 0.08 m)
+    side: float  # times exp(-|s| / 0.5 m)
     speed: float  # times exp(-|speed error| / 2 m/s)
     upright: float  # times cos(roll)
     turning: float  # times -|turn rate|
@@ -220,11 +221,12 @@ class FollowReference(Task[SpatialState]):
     def reward(self, before: SpatialState, after: SpatialState, goal: Goal, ended: Goal) -> Array:
         """Reward of one control step; see `Task.reward`."""
         xp, w = array_namespace(after.x), self.reward_weights
-        e = self.errors(after, ended).position
+        s, e = (xp.abs(part) for part in off_reference(after, ended))
         slow = xp.abs(self.speed_of(ended) - length(after.velocity))
         return weighted_sum(
             (w.near, lambda: xp.exp(-e / 0.5)),
             (w.nearer, lambda: xp.exp(-e / 0.08)),
+            (w.side, lambda: xp.exp(-s / 0.5)),
             (w.speed, lambda: xp.exp(-slow / 2.0)),
             (w.upright, lambda: xp.cos(euler_of(after.quat)[0])),
             (-w.turning, lambda: length(after.rate)),
