@@ -118,7 +118,10 @@ class JsbsimBackend:
         roll, pitch, yaw = (float(angle[0]) for angle in euler_of(state.quat))
         model = self._model
         model["ic/terrain-elevation-ft"] = 0.0
-        model["ic/lat-gc-rad"], model["ic/long-gc-rad"] = float(state.y[0]) / RADIUS_M, float(state.x[0]) / RADIUS_M
+        model["ic/lat-gc-rad"], model["ic/long-gc-rad"] = (
+            float(state.y[0]) / RADIUS_M,
+            float(state.x[0]) / RADIUS_M,
+        )
         model["ic/h-sl-ft"] = float(state.z[0]) / FOOT
         model["ic/phi-rad"], model["ic/theta-rad"] = roll, -pitch
         model["ic/psi-true-rad"] = math.remainder(0.5 * math.pi - yaw, 2.0 * math.pi)
@@ -148,12 +151,19 @@ class JsbsimBackend:
         one = np.array([1.0])
         quat = from_euler(phi * one, -theta * one, (0.5 * math.pi - psi) * one)
         place = np.array(
-            [model["position/long-gc-rad"] * RADIUS_M, model["position/lat-gc-rad"] * RADIUS_M, model["position/h-sl-meters"]]
+            [
+                model["position/long-gc-rad"] * RADIUS_M,
+                model["position/lat-gc-rad"] * RADIUS_M,
+                model["position/h-sl-meters"],
+            ]
         )
         north, east, down = (model[f"velocities/v-{name}-fps"] * FOOT for name in ("north", "east", "down"))
         p, q, r = (model[f"velocities/{axis}-rad_sec"] for axis in "pqr")
         state = RigidBodyState(
-            place, np.array([float(part[0]) for part in quat]), np.array([east, north, -down]), np.array([p, -q, -r])
+            place,
+            np.array([float(part[0]) for part in quat]),
+            np.array([east, north, -down]),
+            np.array([p, -q, -r]),
         )
         self._down = self._down or place[2] + self._low <= 0.0
         if self._down:

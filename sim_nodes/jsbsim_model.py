@@ -1,8 +1,8 @@
 """An aircraft as a JSBSim model: coefficients, ground effect, propellers and body of a robot's file as XML functions.
 
 JSBSim integrates; deflections [rad] and thrust levels come in as properties `fulmar/<actuator>`, since servos and
-motors are those of Fulmar in every simulator. Forces are along JSBSim's body axes (x ahead, y right, z down) about the centre
-of mass. The planet of `STILL_PLANET` does not turn, is a sphere, and has Fulmar's gravity.
+motors are those of Fulmar in every simulator. Forces are along JSBSim's body axes (x ahead, y right, z down) about
+the centre of mass. The planet of `STILL_PLANET` does not turn, is a sphere, and has Fulmar's gravity.
 """
 
 from __future__ import annotations

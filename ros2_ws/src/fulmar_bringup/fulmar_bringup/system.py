@@ -18,7 +18,7 @@ from fulmar_core.tasks import load_task
 from hardware_drivers.settings import hardware_of, hardware_path, load_hardware
 from policy_server.controllers import FALLBACKS, controller_entry
 
-SIMULATED = ("mujoco", "mock")
+SIMULATED = ("mujoco", "mock", "jsbsim")
 BACKENDS = (*SIMULATED, "hardware")
 
 
@@ -149,7 +149,7 @@ def modules_of(
     controller: str, backend: str, *, guards: Guards = NONE, hardware: str = "", emulated: bool = False
 ) -> tuple[str, ...]:
     """Modules of extras that the nodes of a controller, a backend, its guards and a hardware file import."""
-    simulated = ("mujoco",) if backend == "mujoco" or emulated else ()
+    simulated = ("mujoco",) if backend == "mujoco" or emulated else ("jsbsim",) * (backend == "jsbsim")
     driven = load_hardware(hardware).needs if hardware else ()
     files = (*filter(None, (guards.estimator,)), *guards.estimators)
     estimated = (module for file in files for module in estimator_kind(file).needs)
@@ -175,6 +175,10 @@ def check_names(robot: str, task: str, controller: str, backend: str, hardware: 
     controller_entry(controller).check(the_robot, the_task)
     if backend not in BACKENDS:
         raise UnknownNameError("backend", backend, BACKENDS)
+    if backend == "jsbsim" and not the_robot.flies:
+        raise ConfigError(
+            f"JSBSim flies aircraft only, and '{robot}' is none. Backends: {', '.join(SIMULATED[:2])}."
+        )
     if backend == "hardware":
         default_hardware(robot, hardware)
 

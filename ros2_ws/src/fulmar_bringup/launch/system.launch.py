@@ -19,7 +19,7 @@ ARGUMENTS = {
     "name": "what the robot is called: its namespace; its type by default",
     "task": "a file of configs/tasks, without .yaml, or your own class: mypackage.mymodule:MyTask",
     "controller": "policy, a classical one such as lqr, mymodule:MyController, or external: a node of yours",
-    "backend": "mujoco, mock or hardware",
+    "backend": "mujoco, mock, jsbsim or hardware",
     "hardware": "a file of configs/hardware, without .yaml, or a path to one",
     "policy": "folder of a policy bundle",
     "adapter": "with controller external, a file of configs/hardware: commands come in as its driver sends them",

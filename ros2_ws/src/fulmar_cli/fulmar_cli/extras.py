@@ -32,6 +32,7 @@ EXTRAS: dict[str, tuple[str, ...]] = {
     "hardware": ("filterpy", "serial", "gpiod", "pymavlink"),
     "view": ("matplotlib",),
     "events": ("h5py", "hdf5plugin", "aedat"),
+    "jsbsim": ("jsbsim",),
     "datasets": ("pyarrow",),
     "train": ("torch", "stable_baselines3", "sb3_contrib", "gymnasium", "onnx", "tensorboard"),
     "cluster": ("ray",),

@@ -1,4 +1,4 @@
-"""`fulmar export`: make a policy bundle from a training run."""
+"""`fulmar export`: make a policy bundle from a training run, or a model for JSBSim from an aircraft."""
 
 from __future__ import annotations
 
@@ -7,20 +7,40 @@ from typing import Annotated
 
 from fulmar_bringup.console import output
 from fulmar_cli.commands.arguments import argument, flag, option
-from fulmar_core.errors import ConfigError
+from fulmar_core.errors import ConfigError, UnknownNameError
+
+JSBSIM = "jsbsim"
 
 
 def export(
-    run: Annotated[Path, argument("RUN", "Run folder that `fulmar train` left.")],
-    out: Annotated[Path, option("DIR", "Folder of the bundle; new or empty.")],
+    run: Annotated[
+        Path, argument("RUN", "Run folder that `fulmar train` left; with --to jsbsim an aircraft.")
+    ],
+    out: Annotated[Path, option("DIR", "Folder of the bundle or model; new or empty.")],
+    to: Annotated[
+        str | None, option("FORMAT", "jsbsim: write an aircraft's model for JSBSim in place of a bundle.")
+    ] = None,
     force: Annotated[bool, flag("--force", "Replace the bundle that DIR holds.")] = False,
 ) -> None:
-    """Write a policy bundle: network, golden vectors and passport; then load it as the robot will."""
+    """Write a policy bundle: network, golden vectors and passport; then load it as the robot will.
+
+    `--to jsbsim` takes the name of an aircraft and writes `DIR/NAME/NAME.xml` and the planet it was compared on.
+    """
     if out.exists() and not force and (not out.is_dir() or any(out.iterdir())):
         raise ConfigError(
             f"{out} exists already and is not empty; no bundle is overwritten. Give --out another folder, or --force."
         )
     from fulmar_core.robot import load_robot
+
+    if to is not None:
+        if to != JSBSIM:
+            raise UnknownNameError("format", to, (JSBSIM,))
+        from sim_nodes.jsbsim_model import write_aircraft
+
+        output.print(
+            f"{write_aircraft(load_robot(str(run)), out)}: for JSBSim; {out / 'still_planet.xml'}: its planet"
+        )
+        return
     from fulmar_core.tasks import load_task
     from policy_server.policy import Policy
     from training.export import export as write

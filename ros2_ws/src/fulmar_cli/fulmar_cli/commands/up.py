@@ -40,7 +40,7 @@ def up(
     controller: Annotated[
         str | None, option("C", "Another controller, or your own class; or external.")
     ] = None,
-    backend: Annotated[str | None, option("B", "mujoco, mock or hardware.")] = None,
+    backend: Annotated[str | None, option("B", "mujoco, mock, jsbsim (aircraft) or hardware.")] = None,
     hardware: cli.HardwareOption = None,
     emulate: cli.EmulateOption = False,
     arm: cli.ArmOption = False,
