@@ -60,6 +60,7 @@ class JsbsimBackend:
             raise ConfigError(f"JSBSim cannot load the model of '{robot.name}'.")
         self._model.set_dt(robot.timing.physics_dt / STEPS)
         self._low = robot.hull_span[0]
+        self._truth: RigidBodyState
 
     @classmethod
     def of(cls, robot: Robot, task: Task, scenario: Scenario) -> JsbsimBackend:
@@ -139,7 +140,7 @@ class JsbsimBackend:
         self._gust = self._dynamics.gust(state, self._world.actuation, world, dt)
         wind = (world.wind[0], world.wind[1], world.wind[2])
         if self._gust is not None:
-            wind = minus(wind, turn(state.quat, flipped(tuple(-part for part in self._gust[:3]))))  # type: ignore[arg-type]
+            wind = minus(wind, turn(state.quat, flipped(tuple(-part for part in self._gust[:3]))))
         east, north, up = (float(part[0]) for part in wind)
         for name, value in (("north", north), ("east", east), ("down", -up)):
             self._model[f"atmosphere/wind-{name}-fps"] = value / FOOT
@@ -170,7 +171,8 @@ class JsbsimBackend:
             still = np.zeros(3)
             state = RigidBodyState(place, state.quat_xyzw, still, still)
         force = [model[f"forces/fb{axis}-total-lbs"] * POUND / self.robot.body.mass for axis in "xyz"]
-        air = self._dynamics.air_data(SpatialState.from_rigid(state)[None], self._gust, self._world.world)  # type: ignore[arg-type]
+        world: Any = self._world.world  # of an aircraft
+        air = self._dynamics.air_data(SpatialState.from_rigid(state)[None], self._gust, world)
         return Truth(state, np.array([force[0], -force[1], -force[2]]), air=air)
 
     def _sample(self, truth: Truth, odometry: RigidBodyState) -> Sample:
