@@ -63,7 +63,7 @@ def broken_configs(tmp_path, monkeypatch):
             ["evaluate", "spacecraft_16", "track_velocities_3d", "--controller", "excite"],
             "'track_velocities_3d' has none. Use --task with one of: go_to_position_3d, go_to_pose_3d.",
         ),
-        ([*RUN, "--backend", "gazebo"], "unknown backend 'gazebo'. Known: hardware, mock, mujoco."),
+        ([*RUN, "--backend", "gazebo"], "unknown backend 'gazebo'. Known: hardware, jsbsim, mock, mujoco."),
         (["run", "jetbot", "--backend", "hardware"], "there is no hardware driver for 'jetbot'"),
         ([*RUN, "--backend", "hardware"], "a real robot goes nowhere by chance: say where with --goal"),
         ([*RUN, "--backend", "hardware", "--emulate", "--lockstep"], "a device runs in real time"),
