@@ -59,7 +59,6 @@ class JsbsimBackend:
         if not (loaded and self._model.load_model(robot.name, True)):
             raise ConfigError(f"JSBSim cannot load the model of '{robot.name}'.")
         self._model.set_dt(robot.timing.physics_dt / STEPS)
-        self._low = robot.hull_span[0]
         self._truth: RigidBodyState
 
     @classmethod
@@ -72,10 +71,10 @@ class JsbsimBackend:
         self._sensors.reset(seed, number)
         self._world.begin_episode(episode)
         self._gust: Gust | None = None
-        self._time_s, self._down = 0.0, False
+        self._time_s, self._lost = 0.0, False
         self._begin(episode.start)
-        truth = self._read()
-        return self._sample(truth, self._world.first_measurement(truth.state, seed=seed, number=number))
+        self._truth = self._read()
+        return self._sample(self._world.first_measurement(self._truth, seed=seed, number=number))
 
     def step(self, command: np.ndarray, ticks: int = 1, *, begins: int | None = None) -> Sample:
         """Apply a command; see `Backend.step`.
@@ -88,18 +87,17 @@ class JsbsimBackend:
         for _ in range(ticks):
             applied = world.actuation.advance(dt, latest_s=world.latest_s) * world.actuation.gain
             self._time_s += dt
-            if self._down:
+            if self._lost:
                 continue
             for name, value in zip(self.robot.actuators.names, applied[:, 0], strict=True):
                 self._model[f"fulmar/{name}"] = float(value)
             self._blow(SpatialState.from_rigid(self._truth)[None], dt)
             for _ in range(STEPS):
                 self._model.run()
-            self._truth = self._read().state
-        truth = self._read()
-        if not np.isfinite(truth.state.position_in_world).all():
+            self._truth = self._or_lost(SpatialState.from_rigid(self._read())[None])
+        if not np.isfinite(self._truth.position_in_world).all():
             raise SafetyError(f"JSBSim's state is not finite at t = {self._time_s:.2f} s.")
-        return self._sample(truth, world.measure(truth.state))
+        return self._sample(world.measure(self._truth))
 
     def stand(self, ticks: int = 1, *, begins: int | None = None) -> Sample:
         """An aircraft cannot stand; see `CanStand.stand`."""
@@ -145,8 +143,14 @@ class JsbsimBackend:
         for name, value in (("north", north), ("east", east), ("down", -up)):
             self._model[f"atmosphere/wind-{name}-fps"] = value / FOOT
 
-    def _read(self) -> Truth:
-        """True motion."""
+    def _or_lost(self, after: SpatialState) -> RigidBodyState:
+        """The state after a tick or, of a craft that is lost, where it was, at rest; for the rest of the episode."""
+        kept = self._dynamics.where_it_flies(SpatialState.from_rigid(self._truth)[None], after)
+        self._lost = not np.array_equal(kept.columns(), after.columns(), equal_nan=True)
+        return kept[0].to_rigid()
+
+    def _read(self) -> RigidBodyState:
+        """Motion by JSBSim's own account."""
         model = self._model
         phi, theta, psi = (model[f"attitude/{name}-rad"] for name in ("phi", "theta", "psi"))
         one = np.array([1.0])
@@ -160,22 +164,20 @@ class JsbsimBackend:
         )
         north, east, down = (model[f"velocities/v-{name}-fps"] * FOOT for name in ("north", "east", "down"))
         p, q, r = (model[f"velocities/{axis}-rad_sec"] for axis in "pqr")
-        state = RigidBodyState(
+        return RigidBodyState(
             place,
             np.array([float(part[0]) for part in quat]),
             np.array([east, north, -down]),
             np.array([p, -q, -r]),
         )
-        self._down = self._down or place[2] + self._low <= 0.0
-        if self._down:
-            still = np.zeros(3)
-            state = RigidBodyState(place, state.quat_xyzw, still, still)
-        force = [model[f"forces/fb{axis}-total-lbs"] * POUND / self.robot.body.mass for axis in "xyz"]
-        world: Any = self._world.world  # of an aircraft
-        air = self._dynamics.air_data(SpatialState.from_rigid(state)[None], self._gust, world)
-        return Truth(state, np.array([force[0], -force[1], -force[2]]), air=air)
 
-    def _sample(self, truth: Truth, odometry: RigidBodyState) -> Sample:
-        self._truth = truth.state
-        others = self._sensors.measure(truth, self._time_s)
-        return Sample({"odometry": Reading(odometry), **others}, truth.state)
+    def _sample(self, odometry: RigidBodyState) -> Sample:
+        """All that sensors measure now."""
+        model, truth = self._model, self._truth
+        force = [model[f"forces/fb{axis}-total-lbs"] * POUND / self.robot.body.mass for axis in "xyz"]
+        if self._lost:
+            force = [0.0, 0.0, 0.0]
+        world: Any = self._world.world  # of an aircraft
+        air = self._dynamics.air_data(SpatialState.from_rigid(truth)[None], self._gust, world)
+        felt = Truth(truth, np.array([force[0], -force[1], -force[2]]), air=air)
+        return Sample({"odometry": Reading(odometry), **self._sensors.measure(felt, self._time_s)}, truth)

@@ -43,7 +43,20 @@ def build_mujoco(robot):
     return MujocoBackend(robot)
 
 
-BUILDERS = {"mock": MockBackend, "mujoco": build_mujoco}
+def build_jsbsim(robot):
+    from sim_nodes.jsbsim_backend import JsbsimBackend
+
+    return JsbsimBackend(robot)
+
+
+OF_ANY_ROBOT = {"mock": MockBackend, "mujoco": build_mujoco}
+BUILDERS = {**OF_ANY_ROBOT, "jsbsim": build_jsbsim}
+PAIRS = [
+    (kind, name)
+    for kind in sorted(BUILDERS)
+    for name in sorted(ROBOTS)
+    if kind in OF_ANY_ROBOT or ROBOTS[name].flies
+]
 
 
 def episode_of(robot, scenario="nominal", start=None, **world):
@@ -64,14 +77,15 @@ def command_of(robot):
     return robot.actuators.limited(0.6 * robot.actuators.scale)
 
 
-@pytest.fixture(params=sorted(BUILDERS))
+@pytest.fixture(params=sorted(OF_ANY_ROBOT))
 def build(request):
-    return BUILDERS[request.param]
+    return OF_ANY_ROBOT[request.param]
 
 
-@pytest.fixture(params=sorted(ROBOTS))
-def backend(request, build):
-    backend = build(ROBOTS[request.param])
+@pytest.fixture(params=PAIRS, ids="-".join)
+def backend(request):
+    kind, name = request.param
+    backend = BUILDERS[kind](ROBOTS[name])
     yield backend
     backend.close()
 
@@ -82,7 +96,7 @@ def platform(build):
 
 
 def test_every_simulated_backend_is_under_this_contract():
-    assert set(BUILDERS) == set(SIMULATED) - {"jsbsim"}  # aircraft only: tests/sim_nodes/test_jsbsim_backend.py
+    assert set(BUILDERS) == set(SIMULATED)
 
 
 def test_it_speaks_for_its_robot(backend):

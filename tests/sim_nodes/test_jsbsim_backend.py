@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import draw_episode
 from fulmar_core.errors import ConfigError
-from fulmar_core.flight.trim import find_trim
+from fulmar_core.flight.trim import find_trim, flying_at
 from fulmar_core.robot import load_robot
+from fulmar_core.spatial import SpatialState
 from fulmar_core.tasks import load_task
 from sim_nodes.jsbsim_backend import JsbsimBackend
 from sim_nodes.mock_backend import MockBackend
 
 ROBOT = load_robot("airship_v7")
 TASK = load_task("fly_hold").fitted(ROBOT)
-SURFACES = 0.01 * np.array([1.0, 1.0, 1.0, 0.0, 0.0])
+
+
+def at_height(height):
+    return flying_at(ROBOT, np.asarray(SpatialState.target_at((0.0, 0.0, height))))
 
 
 @pytest.fixture
@@ -24,18 +30,33 @@ def episode():
     return draw_episode(ROBOT, TASK, load_scenario("ideal"), seed=4, number=0)
 
 
-def test_two_seconds_of_steering_lead_where_our_own_dynamics_lead(episode):
+def flown(episode, *, spread, commands):
+    """True motion by our dynamics and by JSBSim after control steps about trim, all five actuators moving."""
     rng = np.random.default_rng(2)
-    trim = find_trim(ROBOT, ROBOT.airframe.speed, 1.0).command
-    ours, theirs = MockBackend(ROBOT, things=TASK.things), JsbsimBackend(ROBOT, sensor_noise=False)
-    for backend in (ours, theirs):
+    trim = find_trim(ROBOT, ROBOT.airframe.speed, float(episode.start.z)).command
+    sent = [ROBOT.actuators.limited(trim + spread * rng.standard_normal(5)) for _ in range(commands)]
+    backends = MockBackend(ROBOT, things=TASK.things), JsbsimBackend(ROBOT, sensor_noise=False)
+    ends = []
+    for backend in backends:
         backend.reset(episode, seed=4)
-    for _ in range(50):
-        command = ROBOT.actuators.limited((trim + SURFACES * rng.standard_normal(5))[None])[0]
-        one, other = ours.step(command, 4).truth, theirs.step(command, 4).truth
-    theirs.close()
-    np.testing.assert_allclose(other.position_in_world, one.position_in_world, rtol=0, atol=0.02)
-    np.testing.assert_allclose(other.quat_xyzw, one.quat_xyzw, rtol=0, atol=2e-3)
+        ends.append([backend.step(command, 4).truth for command in sent][-1])
+        backend.close()
+    return ends
+
+
+def test_two_seconds_of_steering_lead_where_our_own_dynamics_lead(episode):
+    ours, theirs = flown(replace(episode, start=at_height(5.0)), spread=0.01, commands=50)
+    assert ours.position_in_world[2] > 1.0  # it has not touched the water
+    np.testing.assert_allclose(theirs.position_in_world, ours.position_in_world, rtol=0, atol=0.02)
+    np.testing.assert_allclose(theirs.quat_xyzw, ours.quat_xyzw, rtol=0, atol=2e-3)
+
+
+def test_a_craft_that_touches_the_water_stays_there_at_rest(episode):
+    low = replace(at_height(0.6), vz=np.asarray(-2.0))
+    _, theirs = flown(replace(episode, start=low), spread=0.0, commands=25)
+    assert 0.0 < theirs.position_in_world[2] + ROBOT.hull_span[0] < 0.05
+    assert not theirs.velocity_in_world.any()
+    assert not theirs.angular_velocity_in_body.any()
 
 
 def test_a_robot_that_does_not_fly_is_refused():

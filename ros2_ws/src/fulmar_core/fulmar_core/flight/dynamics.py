@@ -93,10 +93,10 @@ class FlightDynamics(SpatialDynamics):
         for _ in range(substeps):
             applied = actuation.advance(dt, latest_s=latest_s) * actuation.gain
             gust = self.gust(state, actuation, world, dt)
-            state = self._where_it_flies(state, self._step(state, applied, gust, world, inertia, push, dt))
+            state = self.where_it_flies(state, self._step(state, applied, gust, world, inertia, push, dt))
         return state
 
-    def _where_it_flies(self, before: SpatialState, after: SpatialState) -> SpatialState:
+    def where_it_flies(self, before: SpatialState, after: SpatialState) -> SpatialState:
         """The state after a step, or, of a craft that is lost, where it was, at rest.
 
         Lost is one whose hull touches the ground, or that tumbles faster than any model of the air holds for.
