@@ -47,18 +47,11 @@ class JsbsimBackend:
         """
         self.robot = robot
         self._folder = tempfile.TemporaryDirectory(prefix="fulmar-jsbsim-")
-        folder = Path(self._folder.name)
-        write_aircraft(robot, folder)
+        write_aircraft(robot, Path(self._folder.name))
         self._dynamics = FlightDynamics(robot)
         self._sensors = SimulatedSensors(sensors or robot.sensors.specs, noisy=sensor_noise)
         self._world = OneWorld(robot, noisy=sensor_noise)
-        self._model = jsbsim.FGFDMExec(None)
-        self._model.set_debug_level(0)
-        self._model.set_aircraft_path(str(folder))
-        loaded = self._model.load_planet(str(folder / "still_planet.xml"), False)
-        if not (loaded and self._model.load_model(robot.name, True)):
-            raise ConfigError(f"JSBSim cannot load the model of '{robot.name}'.")
-        self._model.set_dt(robot.timing.physics_dt / STEPS)
+        self._model = self._loaded()
         self._truth: RigidBodyState
 
     @classmethod
@@ -68,6 +61,7 @@ class JsbsimBackend:
 
     def reset(self, episode: Episode, *, seed: int, number: int = 0) -> Sample:
         """Begin anew; see `Backend.reset`. Mass and inertia are those of the robot's file."""
+        self._model = self._loaded()  # a model that has flown keeps the history of its integrators
         self._sensors.reset(seed, number)
         self._world.begin_episode(episode)
         self._gust: Gust | None = None
@@ -111,6 +105,16 @@ class JsbsimBackend:
     def close(self) -> None:
         """Let go of the model and its files."""
         self._folder.cleanup()
+
+    def _loaded(self) -> jsbsim.FGFDMExec:
+        folder, model = Path(self._folder.name), jsbsim.FGFDMExec(None)
+        model.set_debug_level(0)
+        model.set_aircraft_path(str(folder))
+        planet = model.load_planet(str(folder / "still_planet.xml"), False)
+        if not (planet and model.load_model(self.robot.name, True)):
+            raise ConfigError(f"JSBSim cannot load the model of '{self.robot.name}'.")
+        model.set_dt(self.robot.timing.physics_dt / STEPS)
+        return model
 
     def _begin(self, start: SpatialState) -> None:
         state = start.mapped(lambda part: np.array([float(part)]))

@@ -10,7 +10,7 @@ import pytest
 from fulmar_bringup.system import SIMULATED
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import Episode, draw_episode
-from fulmar_core.flight.trim import flying_at
+from fulmar_core.flight.trim import find_trim, flying_at
 from fulmar_core.goal import goal_at
 from fulmar_core.planar import PlanarState
 from fulmar_core.sensors.star_tracker import StarTrackerSpec
@@ -200,7 +200,9 @@ def test_it_moves_by_commands(backend):
 
 def test_without_a_command_it_stays_or_glides_on(backend):
     if backend.robot.flies:
-        begun = backend.reset(episode_of(backend.robot), seed=1).truth
+        level = find_trim(backend.robot, backend.robot.airframe.speed, 50.0).state
+        start = [float(part) for part in level.columns()]
+        begun = backend.reset(episode_of(backend.robot, start=start), seed=1).truth
         after = backend.step(backend.robot.actuators.safe_command, 100).truth
         went = after.position_in_world - begun.position_in_world
         assert went[0] > 0.5 * backend.robot.airframe.speed

@@ -22,6 +22,7 @@ from fulmar_core.backend import Sample
 from fulmar_core.controllers.controller import Controller, Inputs
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import draw_episode, episode_steps
+from fulmar_core.flight.trim import find_trim
 from fulmar_core.observation import Observer
 from fulmar_core.paths import config_names
 from fulmar_core.robot import Robot, load_robot
@@ -68,6 +69,10 @@ class Wanderer:
         rng = np.random.default_rng(1)
         self._scale = robot.actuators.scale * (0.4 if isinstance(robot.actuators, Rolling) else 1.0)
         shape = (len(Observer(robot, task).names), len(robot.actuators.names))
+        self._middle: Any = 0.0
+        if robot.airframe is not None:  # anything bolder tumbles it, and the gates of the nodes end that
+            self._middle = find_trim(robot, robot.airframe.speed, 1.0).command
+            self._scale = 0.02 * robot.actuators.scale
         self._weights = rng.normal(0.0, 0.4, shape)
         self._seen = 0
 
@@ -77,7 +82,8 @@ class Wanderer:
     def act(self, inputs: Inputs) -> np.ndarray:
         self._seen += 1
         wave = 0.2 * np.sin(0.3 * self._seen)
-        return self._scale * np.tanh(np.clip(inputs.observation, -2.0, 2.0) @ self._weights + wave)
+        wanted = np.tanh(np.clip(inputs.observation, -2.0, 2.0) @ self._weights + wave)
+        return np.asarray(self._middle + self._scale * wanted)
 
     def metadata(self) -> dict[str, Any]:
         return {"controller": self.name, "sha256": ""}
