@@ -23,6 +23,7 @@ from fulmar_core.planar import PlanarState
 from fulmar_core.robot import load_robot
 from fulmar_core.rollout import roll_out_in_batch
 from fulmar_core.tasks import load_task
+from fulmar_core.tasks.follow_reference import FlightStart
 from fulmar_core.teleop import hand_mapping
 from tests.inputs import inputs_at
 from tests.pairs import covering
@@ -49,6 +50,7 @@ def command(robot, task, state, *targets, previous=None):
 QUICK = {
     pair for law in LAWS for pair in covering((r.name, t.name) for r, t in PAIRS if r.actuators.law == law)
 } - {("cubesat_wheels", "point")}  # ten minutes of an orbit
+QUICK = {(robot, task) for robot, task in QUICK if not ROBOTS[robot].flies}  # a minute at 100 Hz each
 
 
 @pytest.mark.parametrize(
@@ -67,6 +69,17 @@ def test_it_does_its_task_in_nine_of_ten_episodes(robot, task):
     law = load_classical(robot, task)
     run = roll_out_in_batch(law, robot, task, load_scenario("nominal"), episodes=64, seed=7)
     assert successes(run, task).mean() >= 0.9
+
+
+def test_an_aircraft_holds_its_height_and_its_side():
+    robot, task = (
+        ROBOTS["airship_v7"],
+        replace(TASKS["fly_hold"], episode_s=8.0, start=FlightStart()),
+    )  # on its height
+    run = roll_out_in_batch(
+        load_classical(robot, task), robot, task, load_scenario("nominal"), episodes=8, seed=7
+    )
+    assert successes(run, task).all()
 
 
 @pytest.mark.parametrize("robot", WHEELED, ids=lambda robot: robot.name)

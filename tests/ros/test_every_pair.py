@@ -171,7 +171,8 @@ def test_every_robot_goes_the_same_way_over_the_wires_as_without_them(robot: str
 
 
 @pytest.mark.parametrize(
-    "name", [task for task in TASKS if task.values[0] not in ("go_to_position", "go_to_position_3d")]
+    "name",
+    [task for task in TASKS if task.values[0] not in ("go_to_position", "go_to_position_3d", "fly_hold")],
 )
 def test_every_task_comes_over_the_wires_as_it_does_without_them(name: str) -> None:
     """Poses, waypoints, gates, velocities that change, obstacles and the block; with wheels on `cmd_vel`, or valves."""

@@ -13,6 +13,7 @@ from fulmar_core.safety.geofence import (
     check_area,
     check_area_of,
     check_places,
+    farthest_goal,
     outside,
     unreachable,
 )
@@ -56,6 +57,15 @@ def test_the_first_of_some_places_that_is_outside_is_named_with_the_area():
     assert str(caught.value) == (
         "the goal x = 1 m, y = 2 m lies outside the area of x 0 to 5 m, y -3 to 0 m. Give another place, in metres."
     )
+
+
+def test_goals_of_a_robot_lie_within_a_kilometre_or_within_its_geofence_where_that_is_wider():
+    assert farthest_goal(load_robot("turtlebot2")) == 1000.0
+    craft = load_robot("airship_v7")
+    assert farthest_goal(craft) == craft.limits.geofence > 1000.0
+    check_places("the goal", [(1002.4, 0.0, 2.9, 0.0, 0.0, 0.0, 1.0)], NO_AREA, farthest_goal(craft))
+    with pytest.raises(ConfigError, match="farther than 10,000 m"):
+        check_places("the goal", [(10_001.0, 0.0, 2.9, 0.0, 0.0, 0.0, 1.0)], NO_AREA, farthest_goal(craft))
 
 
 @pytest.mark.parametrize("place", [(1000.1, 0.0), (-800.0, 800.0), (math.nan, 0.0)])

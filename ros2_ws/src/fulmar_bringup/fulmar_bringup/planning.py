@@ -55,7 +55,7 @@ from fulmar_core.goal_files import GoalFile
 from fulmar_core.recording import MODES, Mode, Recording
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.robot_name import checked_name
-from fulmar_core.safety.geofence import check_places, check_starts, unreachable
+from fulmar_core.safety.geofence import check_places, check_starts, farthest_goal, unreachable
 from fulmar_core.tasks import Task, load_task
 
 DRAWS = 1000  # of a start and a goal, before an area counts as too small for them
@@ -197,7 +197,9 @@ def plan_run(
         None if goals is None else checked_goals(goals, the_robot, the_task, goal_rate(hz, lockstep=lockstep))
     )
     if file is not None:
-        check_places(f"the goal of '{goals}'", places_of(file).tolist(), watched.area)
+        check_places(
+            f"the goal of '{goals}'", places_of(file).tolist(), watched.area, farthest_goal(the_robot)
+        )
     mission, drawn_start = _placed(
         the_robot,
         the_task,
@@ -287,13 +289,16 @@ def _placed(
     Raises:
         ConfigError: What was given is outside, or no draw is inside.
     """
+    farthest = farthest_goal(robot)
     if goal is not None:
-        check_places("the goal", [goal], area)  # numbers of a pose, of which a place is at the front
+        check_places(
+            "the goal", [goal], area, farthest
+        )  # numbers of a pose, of which a place is at the front
     if start is not None and checks_start:
-        check_places("the start", [start], area)
+        check_places("the start", [start], area, farthest)
     fixed = start_of(file) if file is not None else None
     if fixed is not None and start is None and checks_start:
-        check_places("the start of these goals", [fixed], area)
+        check_places("the start of these goals", [fixed], area, farthest)
     for number in range(DRAWS):
         episode = draw_episode(robot, task, scenario, seed=seed, number=number)
         mission, drawn = episode.goal, task.state_type.written(episode.start.pose)
@@ -303,7 +308,9 @@ def _placed(
             mission, drawn = _moved(task, mission, drawn, goal)
         targets = mission.targets.tolist() if checks_goal and task.goal_topic != "goal_velocity" else []
         starts = [start or drawn] if checks_start else []
-        problem = unreachable("the drawn goal", targets, area) or unreachable("the drawn start", starts, area)
+        problem = unreachable("the drawn goal", targets, area, farthest) or unreachable(
+            "the drawn start", starts, area, farthest
+        )
         if not problem:
             return mission, drawn
         if mission.obstacles.size or task.things:

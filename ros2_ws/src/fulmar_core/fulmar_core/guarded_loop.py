@@ -17,7 +17,7 @@ from fulmar_core.mission import Mission
 from fulmar_core.robot import Robot
 from fulmar_core.safety.arbiter import Decision, Flags, arbitrate
 from fulmar_core.safety.fallback import ControllerSwitch, Standby
-from fulmar_core.safety.geofence import OUT_OF_BOUNDS, check_area_of, outside, unreachable
+from fulmar_core.safety.geofence import OUT_OF_BOUNDS, check_area_of, farthest_goal, outside, unreachable
 from fulmar_core.safety.input_gate import InputGate, Measurement
 from fulmar_core.state import State
 from fulmar_core.tasks import Task
@@ -314,7 +314,9 @@ class GuardedLoop:
         """How a goal lies outside the area; empty if it does not, or is no place."""
         if self.loop.task.goal_topic == "goal_velocity":
             return ""
-        problem = unreachable("the goal", goal.targets.tolist(), self._settings.area)
+        problem = unreachable(
+            "the goal", goal.targets.tolist(), self._settings.area, farthest_goal(self.loop.robot)
+        )
         return problem and OUT_OF_BOUNDS + problem
 
     def _change(self, **changes: object) -> None:

@@ -85,7 +85,7 @@ def goals(
     from fulmar_core.goal_files import load_goals, single_goal
     from fulmar_core.goal_sequence import goal_sequence
     from fulmar_core.robot import load_robot
-    from fulmar_core.safety.geofence import NO_AREA, check_area_of, check_places
+    from fulmar_core.safety.geofence import NO_AREA, check_area_of, check_places, farthest_goal
 
     the_robot = load_robot(robot)
     inside = read_area(area) or NO_AREA
@@ -96,7 +96,12 @@ def goals(
     file = given or load_goals(name or "")
     goal_sequence(file, the_robot, as_path=as_path)  # rejects goals that the robot cannot have
     check_pace(file, name or "", the_robot, min(control_hz, the_robot.timing.control_hz))
-    check_places(f"the goal of '{name}'" if name else "the goal", places_of(file).tolist(), inside)
+    check_places(
+        f"the goal of '{name}'" if name else "the goal",
+        places_of(file).tolist(),
+        inside,
+        farthest_goal(the_robot),
+    )
     spec = goals_spec(
         robot,
         name or "",

@@ -13,7 +13,9 @@ if TYPE_CHECKING:  # the command line checks areas without loading NumPy
     from fulmar_core.tasks import Task
 
 NO_AREA = (0.0, 0.0, 0.0, 0.0)  # an area without extent stands for none
-FARTHEST_M = 1000.0  # of a goal from the origin: a goal beyond it is a mistake of units or of frames
+FARTHEST_M = (
+    1000.0  # of a goal from the origin, unless a robot's geofence reaches farther: as of `farthest_goal`
+)
 OUT_OF_BOUNDS = "out of bounds: "  # how the reason begins by which a controller refuses such a goal
 
 
@@ -63,7 +65,14 @@ def is_inside(place: Sequence[float], area: Sequence[float]) -> bool:
     return all(low <= value <= high for value, (low, high) in zip(place, _spans(area), strict=False))
 
 
-def unreachable(what: str, places: Iterable[Sequence[float]], area: Sequence[float]) -> str:
+def farthest_goal(robot: Robot) -> float:
+    """How far from the origin a goal of a robot may lie [m]; one beyond is a mistake of units or of frames."""
+    return max(FARTHEST_M, robot.limits.geofence)
+
+
+def unreachable(
+    what: str, places: Iterable[Sequence[float]], area: Sequence[float], farthest_m: float = FARTHEST_M
+) -> str:
     """Why a robot must not go to one of some places; empty if it may go to all of them.
 
     Args:
@@ -71,24 +80,30 @@ def unreachable(what: str, places: Iterable[Sequence[float]], area: Sequence[flo
         places: Each x [m], y [m] and whatever follows in the plane: at most three numbers; x, y, z [m] and the attitude
             in space: more.
         area: Area of the robot.
+        farthest_m: From the origin, as of `farthest_goal`.
     """
     for numbers in places:
         place = numbers[: 3 if len(numbers) > 3 else 2]
         if not is_inside(place, area):
             return f"{what} {_words(place, 'g')} lies outside the area of {_sides(area)}."
         away = math.hypot(*place)
-        if not away <= FARTHEST_M:  # also where it is not a number
-            return f"{what} {_words(place, 'g')} lies {away:,.0f} m from the origin, farther than {FARTHEST_M:,.0f} m."
+        if not away <= farthest_m:  # also where it is not a number
+            return f"{what} {_words(place, 'g')} lies {away:,.0f} m from the origin, farther than {farthest_m:,.0f} m."
     return ""
 
 
-def check_places(what: str, places: Iterable[Sequence[float]], area: Sequence[float] = NO_AREA) -> None:
+def check_places(
+    what: str,
+    places: Iterable[Sequence[float]],
+    area: Sequence[float] = NO_AREA,
+    farthest_m: float = FARTHEST_M,
+) -> None:
     """Reject places that a robot must not go to; arguments as of `unreachable`.
 
     Raises:
         ConfigError: For the first of them.
     """
-    problem = unreachable(what, places, area)
+    problem = unreachable(what, places, area, farthest_m)
     if problem:
         raise ConfigError(f"{problem} Give another place, in metres.")
 
