@@ -48,7 +48,7 @@ def test_shipped_files_have_usual_values(family, name, caplog):
 @pytest.mark.parametrize(
     ("file", "change", "words"),
     [
-        (PLATFORM, ("radius: 0.31", "radius: 310"), r":12: 'body.radius' = 310 m .*0.03 to 10 m.*310 mm are 0.31 m"),
+        (PLATFORM, ("radius: 0.31", "radius: 310"), r":12: 'body.radius' = 310 m .*0.03 to 6 m.*310 mm are 0.31 m"),
         (PLATFORM, ("thrust: 1.0", "thrust: 1000.0"), r"'actuators.thrust' = 1000 N .*1000 mN are 1 N"),
         (
             PLATFORM,
@@ -63,7 +63,7 @@ def test_shipped_files_have_usual_values(family, name, caplog):
         (
             PLATFORM,
             ("inertia: [0.2045, 0.2045, 0.2045]", "inertia: [0.2045, 0.2045, 0.00204]"),
-            r"'body.inertia.2' = 0.00204 kg·m² .*0.01534 to 0.5368 kg·m²",
+            r"'body.inertia.2' = 0.00204 kg·m² .*0.02556 to 0.5368 kg·m²",
         ),
         (PLATFORM, ("yaw_rate: 6.0", "yaw_rate: 360.0"), r"'limits.yaw_rate' = 360 rad/s .*360 °/s are 6.283 rad/s"),
         ("robots/turtlebot2", ("wheel_radius: 0.035", "wheel_radius: 35"), r"'actuators.wheel_radius' = 35 m .*35 mm"),

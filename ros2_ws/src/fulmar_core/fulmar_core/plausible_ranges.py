@@ -50,7 +50,7 @@ MOST_ACCELERATION = 20.0  # of a robot by its own actuators: twice its weight [m
 BODY = "of the body's mass and radius"
 
 
-def _inertia(body: Any, *, upright: bool) -> float:
+def edge_inertia(body: Any, *, upright: bool) -> float:
     """Moment of all mass at the edge of the body's circle or, about level axes, of its side view [kg·m²]."""
     return float(body.mass * (body.radius**2 + (0.0 if upright else 0.25 * body.height**2)))
 
@@ -72,16 +72,16 @@ def _noise(sensor: str, part: str, unit: str, most: float, usual: float, why: st
 
 ROBOT: tuple[Plausible, ...] = (
     Plausible("body.mass", "kg", (0.02, 2e4), (0.2, 2000.0), "palm-sized robots to satellites and cars"),
-    Plausible("body.radius", "m", (0.01, 30.0), (0.03, 10.0), "palm-sized robots to small aircraft"),
+    Plausible("body.radius", "m", (0.01, 30.0), (0.03, 6.0), "palm-sized robots to small aircraft"),
     Plausible("body.height", "m", (0.005, 30.0), (0.02, 6.0), "same as the radius"),
     Plausible(
-        "body.inertia.2", "kg·m²", (0.01, 3.0), (0.03, 1.05), f"{BODY}: solid cylinder 0.5 m r², thin ring 1 m r²",
-        scale=lambda robot: _inertia(robot.body, upright=True),
+        "body.inertia.2", "kg·m²", (0.01, 3.0), (0.05, 1.05), f"{BODY}: solid cylinder 0.5 m r², thin ring 1 m r²",
+        scale=lambda robot: edge_inertia(robot.body, upright=True),
     ),
     *(
         Plausible(
             f"body.inertia.{axis}", "kg·m²", (0.001, 3.0), (0.01, 1.05), f"{BODY} and height",
-            scale=lambda robot: _inertia(robot.body, upright=False),
+            scale=lambda robot: edge_inertia(robot.body, upright=False),
         )
         for axis in (0, 1)
     ),
@@ -142,7 +142,7 @@ ROBOT: tuple[Plausible, ...] = (
         "performance.torque", "N·m", (1e-6, 2000.0), (1e-4, 200.0),
         "of the yaw inertia: angular acceleration of up to 200 rad/s²", scale=lambda robot: robot.body.inertia[2],
     ),
-    Plausible("performance.top_speed", "m/s", (0.001, 500.0), (0.02, 200.0), "crawling robots to aircraft"),
+    Plausible("performance.top_speed", "m/s", (0.001, 500.0), (0.02, 100.0), "crawling robots to aircraft"),
     Plausible(
         "performance.speed", "m/s", (0.001, 1.5), (0.02, 1.0), "of top_speed",
         scale=lambda robot: robot.performance.top_speed,

@@ -345,7 +345,8 @@ def load_robot_file(path: Path) -> Robot:
         ImplausibleError: It can, and has values that no robot has.
     """
     robot = load_config(Robot, path)
-    check_plausible(robot, (*ROBOT, *robot.actuators.plausible, *RANGES), path)
+    ranges = {row.key: row for row in (*ROBOT, *robot.actuators.plausible, *RANGES)}
+    check_plausible(robot, tuple(ranges.values()), path)
     _check_spans(robot, path)
     return robot
 

@@ -19,6 +19,7 @@ from fulmar_core.actuators.response import Response
 from fulmar_core.arrays import array_namespace, clip
 from fulmar_core.flight.coefficients import SURFACES
 from fulmar_core.flight.propulsion import ElectricMotor, PistonEngine
+from fulmar_core.plausible_ranges import BODY, Plausible, edge_inertia
 from fulmar_core.rotation import Array
 
 Vector3 = tuple[float, float, float]
@@ -71,6 +72,14 @@ class ControlSurfaces(Actuators):
 
     law = "lqr"
     flies = True
+    plausible = (  # wings reach farther than other robots, and carry their mass near the middle
+        Plausible("body.radius", "m", (0.01, 30.0), (0.3, 10.0), "from hand-launched models to light aircraft"),
+        Plausible(
+            "body.inertia.2", "kg·m²", (0.01, 3.0), (0.03, 1.05), f"{BODY}: light aircraft 0.04 to 0.1 m r²",
+            scale=lambda robot: edge_inertia(robot.body, upright=True),
+        ),
+        Plausible("performance.top_speed", "m/s", (0.5, 500.0), (5.0, 200.0), "models to light aircraft"),
+    )  # fmt: skip
 
     def __post_init__(self) -> None:
         if len(set(self.names)) != len(self.names) or not self.surfaces:

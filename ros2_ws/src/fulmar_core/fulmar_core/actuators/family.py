@@ -33,7 +33,7 @@ class Actuators(ABC):
         turns_only: Commands turn the body and push it nowhere.
         flies: Commands steer an aircraft, which the robot's `airframe` describes.
         takes_velocity: A command is (speed, turn rate) of the body, which ROS has a message of its own for.
-        plausible: Ranges of the family's own keys, beside those of `plausible_ranges.ROBOT`.
+        plausible: Ranges of the family's own keys beside those of `plausible_ranges.ROBOT`, or in their place.
     """
 
     kind: str
