@@ -47,15 +47,7 @@ class Aircraft:
         body.mass = robot.body.mass
         its = robot.body.inertia[:3]  # the world of an episode brings the rest of the tensor
         body.inertia = [max(its)] * 3 if robot.body.as_printed else list(its)
-        low, high = robot.hull_span
-        add_hull(
-            body,
-            footprint=robot.body.footprint,
-            radius=robot.body.radius,
-            low=low,
-            high=high,
-            ahead=robot.body.footprint_x,
-        )
+        add_hull(body, robot)
         return body
 
     def bind(self, model: mujoco.MjModel) -> None:

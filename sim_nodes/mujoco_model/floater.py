@@ -67,15 +67,7 @@ class Floater:
         body.ipos, body.iquat = [OFF_CENTRE, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]
         # The world of an episode brings the rest of the tensor, and where the centre of mass is.
         body.mass, body.inertia = robot.body.mass, list(robot.body.inertia[:3])
-        low, high = robot.hull_span
-        add_hull(
-            body,
-            footprint=robot.body.footprint,
-            radius=robot.body.radius,
-            low=low,
-            high=high,
-            ahead=robot.body.footprint_x,
-        )
+        add_hull(body, robot)
         for push in self._actuators.pushes:
             _add_push(spec, body, push)
         return body

@@ -48,16 +48,7 @@ class Satellite:
         body.ipos, body.iquat = [0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]
         body.mass = robot.body.mass * (1.0 - WHEEL_MASS * wheels.count)
         body.inertia = (np.array(robot.body.inertia[:3]) - wheels.count * wheels.spin_inertia).tolist()
-        low, high = robot.hull_span
-        outline = robot.body
-        add_hull(
-            body,
-            footprint=outline.footprint,
-            radius=outline.radius,
-            low=low,
-            high=high,
-            ahead=outline.footprint_x,
-        )
+        add_hull(body, robot)
         for wheel in wheels.wheels:
             part = body.add_body(name=wheel.name)
             part.add_joint(name=wheel.name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=wheel.direction.tolist())

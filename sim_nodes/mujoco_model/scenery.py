@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import mujoco
 
+from fulmar_core.robot import Robot
 from fulmar_core.urdf import HULL_COLOUR
 
 BODY, IMU_SITE = "base_link", "imu_link"
@@ -43,34 +44,19 @@ def add_sensors(spec: mujoco.MjSpec, body: mujoco.MjsBody) -> None:
     spec.add_sensor(name="accelerometer", type=mujoco.mjtSensor.mjSENS_ACCELEROMETER, **on_site)
 
 
-def add_hull(
-    body: mujoco.MjsBody,
-    *,
-    footprint: tuple[float, float] | None,
-    radius: float,
-    low: float,
-    high: float,
-    ahead: float,
-) -> None:
-    """Add the outline that touches obstacles and blocks; it weighs nothing and never touches the floor.
-
-    Args:
-        body: The body.
-        footprint: Length and width of a box; None for a cylinder [m].
-        radius: Of the cylinder [m].
-        low: Bottom, in the body's frame [m].
-        high: Top [m].
-        ahead: Of the outline's centre, ahead of the body's origin [m].
-    """
+def add_hull(body: mujoco.MjsBody, robot: Robot) -> None:
+    """Add the outline that touches obstacles and blocks; it weighs nothing and never touches the floor."""
+    (low, high), outline = robot.hull_span, robot.body
     half = 0.5 * (high - low)
-    shape, size = mujoco.mjtGeom.mjGEOM_CYLINDER, [radius, half, 0.0]
-    if footprint is not None:
-        shape, size = mujoco.mjtGeom.mjGEOM_BOX, [0.5 * footprint[0], 0.5 * footprint[1], half]
+    shape, size = mujoco.mjtGeom.mjGEOM_CYLINDER, [outline.radius, half, 0.0]
+    if outline.footprint is not None:
+        length, width = outline.footprint
+        shape, size = mujoco.mjtGeom.mjGEOM_BOX, [0.5 * length, 0.5 * width, half]
     body.add_geom(
         name="hull",
         type=shape,
         size=size,
-        pos=[ahead, 0.0, 0.5 * (low + high)],
+        pos=[outline.footprint_x, 0.0, 0.5 * (low + high)],
         rgba=list(HULL_COLOUR),
         mass=0.0,
         contype=THING_BIT,

@@ -79,15 +79,7 @@ class Chassis:
         outline = self.robot.body
         mass, place, inertia = self._chassis(outline.mass, outline.inertia[2], self._weight)
         body.mass, body.ipos, body.inertia = mass, list(place), list(inertia)
-        low, high = self.robot.hull_span
-        add_hull(
-            body,
-            footprint=outline.footprint,
-            radius=outline.radius,
-            low=low,
-            high=high,
-            ahead=outline.footprint_x,
-        )
+        add_hull(body, self.robot)
         return body
 
     def add_wheel(self, carrier: mujoco.MjsBody, name: str, place: tuple[float, float, float]) -> None:

@@ -29,7 +29,7 @@ from fulmar_core.disturbances.scenario import (
 )
 from fulmar_core.disturbances.spatial_world import draw_spatial_world
 from fulmar_core.disturbances.world import FIELDS
-from fulmar_core.errors import ConfigError, UnknownNameError
+from fulmar_core.errors import ConfigError
 from fulmar_core.holdability import uncontrollable_losses
 from fulmar_core.paths import config_names
 from fulmar_core.planar import PlanarState
@@ -324,39 +324,6 @@ def test_a_world_of_a_batch_is_picked_written_and_cast_whole():
 
 
 @pytest.mark.parametrize(
-    ("build", "words"),
-    [
-        (lambda: Push(force=-1.0), "must not be negative"),
-        (lambda: Push(torque=-1.0), "must not be negative"),
-        (lambda: Push(least=1.5), "must lie in"),
-        (lambda: Actuation(noise=-1.0), "must not be negative"),
-        (lambda: Actuation(gain=(1.0, 0.5)), "low <= high"),
-        (lambda: Actuation(failure_chance=1.5), "at most 1"),
-        (lambda: Wave(force=-1.0), "must not be negative"),
-        (lambda: Wave(wave_number=(2.0, 1.0)), "low <= high"),
-        (lambda: Wave(least=1.5), "must lie in"),
-        (lambda: Tether(stiffness=(0.2, 0.1)), "low <= high"),
-        (lambda: Tether(lever=-1.0), "must not be negative"),
-        (lambda: Slope(milliradians=(2.0, 1.0)), "low <= high"),
-        (lambda: Actuation(opening_delay_s=(0.2, 0.1)), "low <= high"),
-        (lambda: Actuation(least_noise=1.5), "must lie in"),
-        (lambda: Sensing(velocity_noise=(0.2, 0.1)), "low <= high"),
-        (lambda: Kick(force=-1.0), "must not be negative"),
-        (lambda: Kick(every_s=(0.0, 1.0)), "greater than 0"),
-        (lambda: Sensing(noise=-1.0), "must not be negative"),
-        (lambda: Sensing(dropout=1.5), "at most 1"),
-        (lambda: Actuation(failures=2), "need one another"),
-        (lambda: Actuation(failure_chance=0.5), "need one another"),
-        (lambda: replace(STILL, sensing=Sensing(delay_s=0.4)), "do nothing where 'sensor_noise' is false"),
-        (lambda: replace(STILL, sensing=Sensing(dropout=0.9)), "do nothing where 'sensor_noise' is false"),
-    ],
-)
-def test_entries_without_meaning_are_refused(build, words):
-    with pytest.raises(ValueError, match=words):
-        build()
-
-
-@pytest.mark.parametrize(
     ("actuation", "words"),
     [
         (
@@ -371,11 +338,6 @@ def test_what_a_robot_cannot_have_is_refused_instead_of_cut(actuation, words):
         worlds(replace(STILL, actuation=actuation))
 
 
-def test_an_unknown_scenario_gets_the_nearest_name():
-    with pytest.raises(UnknownNameError, match=r"^unknown scenario 'nominall'\. Did you mean 'nominal'\?$"):
-        load_scenario("nominall")
-
-
 def test_docs_state_of_every_entry():
     text = (Path(__file__).parents[2] / "docs/scenarios.md").read_text(encoding="utf-8")
     names = {field.name for part in (Scenario, *PARTS.values()) for field in fields(part)}
@@ -388,21 +350,6 @@ def test_the_air_bearing_is_late_within_its_span_and_the_same_for_one_seed():
     fills(np.array(late_s), 1.0, 3.0)
     assert late_s == [bearing_late_s(scenario, seed=4, number=number) for number in range(200)]
     assert bearing_late_s(STILL, seed=4, number=0) == 0.0
-
-
-@pytest.mark.parametrize("name", ["bearing_late_s", "held_s"])
-def test_times_that_end_before_they_begin_are_refused(name):
-    with pytest.raises(ValueError, match=name):
-        replace(STILL, **{name: (2.0, 1.0)})
-
-
-def test_an_old_name_of_a_scenario_works_and_warns(caplog):
-    old, new = "drift_stranded", "drift_uncontrollable"  # word: old name of a scenario
-    with caplog.at_level("WARNING", logger="fulmar_core"):
-        assert load_scenario(old) == load_scenario(new)
-    (record,) = caplog.records
-    assert old in record.getMessage()
-    assert new in record.getMessage()
 
 
 def test_an_orbit_is_that_of_every_world_in_space_and_off_by_default():

@@ -84,7 +84,7 @@ def find_trim(robot: Robot, speed: float, height: float | None = None, altitude:
         raise ConfigError(f"height = {height:g} m must be greater than 0: the craft flies above the ground.")
     if not -500.0 <= altitude <= 11_000.0:
         raise ConfigError(f"altitude = {altitude:g} m must lie between -500 and 11000, in the troposphere.")
-    from scipy.optimize import least_squares  # a fifth of a second, which nobody who flies nothing shall pay
+    from scipy.optimize import least_squares  # slow to import, and only aircraft need it
 
     craft = robot if height is not None else free_air(robot)
     problem = _Problem(
