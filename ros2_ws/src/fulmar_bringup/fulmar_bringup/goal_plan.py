@@ -30,6 +30,7 @@ from fulmar_core.goal_files import (
 from fulmar_core.goal_sequence import goal_sequence
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot, load_robot
+from fulmar_core.safety.geofence import check_places, farthest_goal
 from fulmar_core.spatial import SpatialState, quat_of
 from fulmar_core.state import State
 from fulmar_core.tasks import Task, load_task
@@ -332,7 +333,17 @@ def first_targets(file: GoalFile) -> np.ndarray:
     return np.zeros((1, 3)) if isinstance(file, FollowedPath) else file.targets()
 
 
-def places_of(file: GoalFile) -> np.ndarray:
+def check_file_places(file: GoalFile, goals: str, robot: Robot, area: Sequence[float]) -> None:
+    """Reject goals, of a file of some name or of `--pose`, that lie where a robot must not go.
+
+    Raises:
+        ConfigError: As of `geofence.check_places`.
+    """
+    what = f"the goal of '{goals}'" if goals else "the goal"
+    check_places(what, _places_of(file).tolist(), area, farthest_goal(robot))
+
+
+def _places_of(file: GoalFile) -> np.ndarray:
     """Where a file leads, as `geofence.unreachable` takes it; no place for velocities."""
     if isinstance(file, FollowedPath):
         return np.asarray(file.planner().points)

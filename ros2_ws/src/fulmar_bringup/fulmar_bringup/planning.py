@@ -11,12 +11,12 @@ from typing import Any, cast
 
 from fulmar_bringup.excitation_plan import excitation_of
 from fulmar_bringup.goal_plan import (
+    check_file_places,
     checked_goals,
     duration_of,
     first_targets,
     goal_path,
     goal_rate,
-    places_of,
     start_of,
     whole_pose,
 )
@@ -197,9 +197,7 @@ def plan_run(
         None if goals is None else checked_goals(goals, the_robot, the_task, goal_rate(hz, lockstep=lockstep))
     )
     if file is not None:
-        check_places(
-            f"the goal of '{goals}'", places_of(file).tolist(), watched.area, farthest_goal(the_robot)
-        )
+        check_file_places(file, goals or "", the_robot, watched.area)
     mission, drawn_start = _placed(
         the_robot,
         the_task,

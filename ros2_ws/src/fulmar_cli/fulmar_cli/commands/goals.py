@@ -79,13 +79,13 @@ def goals(
     if robot is None:
         example = name if place is None else f"--pose {pose}"
         raise ConfigError(f"whose goals? Example: fulmar goals {example} --robot floating_platform")
-    from fulmar_bringup.goal_plan import check_pace, places_of, whole_pose
+    from fulmar_bringup.goal_plan import check_file_places, check_pace, whole_pose
     from fulmar_bringup.operator_rows import goals_spec
     from fulmar_bringup.processes import command_line
     from fulmar_core.goal_files import load_goals, single_goal
     from fulmar_core.goal_sequence import goal_sequence
     from fulmar_core.robot import load_robot
-    from fulmar_core.safety.geofence import NO_AREA, check_area_of, check_places, farthest_goal
+    from fulmar_core.safety.geofence import NO_AREA, check_area_of
 
     the_robot = load_robot(robot)
     inside = read_area(area) or NO_AREA
@@ -96,12 +96,7 @@ def goals(
     file = given or load_goals(name or "")
     goal_sequence(file, the_robot, as_path=as_path)  # rejects goals that the robot cannot have
     check_pace(file, name or "", the_robot, min(control_hz, the_robot.timing.control_hz))
-    check_places(
-        f"the goal of '{name}'" if name else "the goal",
-        places_of(file).tolist(),
-        inside,
-        farthest_goal(the_robot),
-    )
+    check_file_places(file, name or "", the_robot, inside)
     spec = goals_spec(
         robot,
         name or "",
