@@ -29,7 +29,7 @@ def flown(backend, scenario):
     return roll_out_in_backends(controller, backend, **given)
 
 
-@pytest.mark.parametrize("turbulence", [0.0, 7.7])
+@pytest.mark.parametrize("turbulence", [pytest.param(0.0, marks=pytest.mark.slow), 7.7])
 def test_one_flight_is_the_same_in_the_batch_the_mock_and_mujoco(turbulence):
     scenario = replace(EXACT, air=Air(turbulence=turbulence))
     batch = flown(None, scenario)

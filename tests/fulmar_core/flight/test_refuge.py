@@ -41,7 +41,7 @@ def left_alone(height: float, roll: float):
     return np.array(rows)
 
 
-@pytest.mark.parametrize("height", [1.0, 5.0])
+@pytest.mark.parametrize("height", [1.0, pytest.param(5.0, marks=pytest.mark.slow)])
 def test_a_craft_whose_controller_died_comes_down_with_level_wings_and_slowly(height):
     bank, climb, heights = left_alone(height, 0.0).T
     assert np.abs(bank).max() <= math.radians(10.0)
@@ -49,6 +49,7 @@ def test_a_craft_whose_controller_died_comes_down_with_level_wings_and_slowly(he
     assert heights[-1] < 0.5 * height
 
 
+@pytest.mark.slow
 def test_a_bank_at_the_moment_of_death_is_taken_out():
     bank, climb, _ = left_alone(5.0, math.radians(8.0)).T
     assert np.abs(bank).max() <= math.radians(10.0)
