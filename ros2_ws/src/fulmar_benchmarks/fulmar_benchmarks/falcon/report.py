@@ -6,6 +6,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from matplotlib.figure import Figure
 
 from fulmar_benchmarks.falcon.campaign import requirements
@@ -52,11 +53,15 @@ def draw_errors(document: dict[str, Any]) -> Figure:
             ]
             if shown:
                 axes.plot(*zip(*shown, strict=True), marker="o", linestyle="", markersize=4, label=scenario)
-        for place, each in enumerate(tasks.values()):
-            thesis = next((one["thesis"] for one in each.values() if one.get("thesis")), None)
-            if thesis:
-                level = thesis["rmse_per_axis_m"]
-                axes.plot([place - 0.4, place + 0.4], [level, level], color="black", linewidth=1.2)
+        published = [
+            (place, one["thesis"]["rmse_per_axis_m"])
+            for place, each in enumerate(tasks.values())
+            for one in list(each.values())[:1]
+            if one.get("thesis")
+        ]
+        if published:
+            places, levels = np.array(published).T
+            axes.hlines(levels, places - 0.4, places + 0.4, color="black", linewidth=1.2, label="thesis")
         axes.set_xticks(range(len(tasks)), list(tasks))
         axes.set_yscale("log")
         axes.set_title(controller)
