@@ -30,7 +30,9 @@ def test_runs_of_two_names_share_a_domain_and_one_name_is_refused_in_one_line(mo
                 claimed_domain("beta").__enter__()
 
 
-def test_a_domain_with_a_run_in_it_is_not_reserved(monkeypatch):
+def test_a_domain_with_a_run_in_it_is_not_reserved(monkeypatch, tmp_path):
+    # Locks of its own: another test may have this very domain.
+    monkeypatch.setattr("fulmar_bringup.domains._lock_folder", lambda: tmp_path)
     monkeypatch.setattr("fulmar_bringup.domains.DOMAINS", range(101, 102))
     monkeypatch.setenv("ROS_DOMAIN_ID", "101")
     with (
