@@ -17,8 +17,9 @@ from fulmar_core.tasks import load_task
 
 mujoco = pytest.importorskip("mujoco")
 
+from fulmar_benchmarks.jsbsim_pace import JsbsimPace  # noqa: E402
 from fulmar_benchmarks.mujoco_pace import SEED, AfloatPace, MujocoPace  # noqa: E402
-from fulmar_benchmarks.throughput import BatchPace, Library, SharedPace  # noqa: E402
+from fulmar_benchmarks.throughput import BatchPace, Library, SharedPace, shared_worlds  # noqa: E402
 from fulmar_cli.commands.benchmark_throughput import throughput  # noqa: E402
 from sim_nodes.mujoco_model import Scene  # noqa: E402
 
@@ -73,6 +74,26 @@ def test_robots_in_space_get_their_own_task_and_both_integrators_of_mujoco(comma
     table = command("--robots", "spacecraft_16", *small).stdout
     assert "Euler" in table
     assert "RK4, steps of 0.04 s" in table
+
+
+def test_aircraft_are_timed_in_jsbsim_too(command):
+    small = "--worlds", "16", "--seconds", "0.05", "--cores", "1", "--scenario", "light_turbulence"
+    done = command("--robots", "airship_v7", *small, "--json")
+    assert done.exit_code == 0, done.output
+    found = json.loads(done.stdout)["robots"]["airship_v7"]
+    assert found["task"] == "fly_hold"
+    assert found["ratio_with_jsbsim"] == pytest.approx(
+        found["batch_steps_per_s"] / found["jsbsim_steps_per_s"]
+    )
+
+
+def test_jsbsim_flies_above_the_ground_and_in_gusts_while_it_is_timed():
+    pace = JsbsimPace(load_robot("airship_v7"))
+    pace.steps_per_s(0.01)
+    model = pace._model
+    assert model["position/h-agl-ft"] > 10.0
+    assert model["simulation/sim-time-sec"] == pytest.approx(2.0)
+    assert abs(model["atmosphere/turb-down-fps"]) > 0.1
 
 
 def test_a_task_of_the_other_space_is_refused_for_robots_that_were_named(command):
@@ -179,7 +200,7 @@ def test_torch_steps_the_same_worlds_as_numpy():
 def test_shared_worlds_are_shared_out_and_give_one_pace():
     shared = SharedPace(2)
     try:
-        shared.take(BOAT, TASK, RANDOMISED, worlds=9, library=NUMPY)
+        shared.take(shared_worlds(BOAT, TASK, RANDOMISED, worlds=9, library=NUMPY, processes=2))
         assert shared.steps_per_s(0.05) > 0.0
     finally:
         shared.close()

@@ -117,6 +117,7 @@ ENTRIES = {
     "orbit_rate": (STILL, {"orbit_rate": 0.001}, set()),  # of worlds in space
     "air.wind": (STILL, {"air": Air(wind=(1.0, 2.0))}, set()),  # of aircraft
     "air.turbulence": (STILL, {"air": Air(turbulence=7.7)}, set()),
+    "air.least_turbulence": (STILL, {"air": Air(turbulence=7.7, least_turbulence=0.5)}, set()),
     "air.altitude": (STILL, {"air": Air(altitude=100.0)}, set()),
     "sensing.least_delay": (
         replace(SEEING, sensing=Sensing(delay_s=0.1)),

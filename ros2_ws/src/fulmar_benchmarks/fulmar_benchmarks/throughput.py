@@ -1,21 +1,23 @@
-"""How many control steps a second the core's batch makes, beside MuJoCo's own batch rollout.
+"""How many control steps a second the core's batch makes, beside MuJoCo's own batch rollout and JSBSim.
 
-Both are measured in turns and on the same number of cores, so that whatever else the machine does slows both; medians
+All are measured in turns and on the same number of cores, so that whatever else the machine does slows both; medians
 count. A step of the batch is a whole step of training: command, disturbances, motion, odometry, observation, reward
 and, where episodes end, new ones; worlds are shared out among processes. It is compiled (`training.compiled`), or
-carried out array by array. A step of MuJoCo (`mujoco_pace`) is its physics alone, over the same control period.
+carried out array by array. A step of MuJoCo (`mujoco_pace`) is its physics alone, over the same control period; so is
+one of JSBSim (`jsbsim_pace`), which flies the aircraft only, one in each process.
 """
 
 from __future__ import annotations
 
 import multiprocessing
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
+from itertools import pairwise
 from multiprocessing.connection import Connection
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -28,6 +30,15 @@ from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import Task
+
+# What is timed beside the batch, and the name of the ratio to it.
+MUJOCO, IN_WATER, BY_EULER, JSBSIM = "mujoco", "mujoco_with_water", "mujoco_euler", "jsbsim"
+RATIOS = {
+    MUJOCO: "ratio",
+    IN_WATER: "ratio_with_water",
+    BY_EULER: "ratio_with_euler",
+    JSBSIM: "ratio_with_jsbsim",
+}
 
 
 @dataclass(frozen=True)
@@ -130,8 +141,15 @@ class BatchPace:
             self.observation[over] = simulation.observe(over)
 
 
+class Pace(Protocol):
+    """What can be timed."""
+
+    def steps_per_s(self, seconds: float) -> float:
+        """Step for a while; returns how many control steps of single robots were made a second."""
+
+
 class SharedPace:
-    """Some processes that each step their share of the worlds at the same time."""
+    """Some processes that each step something at the same time."""
 
     def __init__(self, processes: int) -> None:
         """Start them; they wait for `take`."""
@@ -144,12 +162,19 @@ class SharedPace:
             self._processes[-1].start()
             theirs.close()
 
-    def take(self, robot: Robot, task: Task, scenario: Scenario, *, worlds: int, library: Library) -> None:
-        """Share out the worlds of another robot."""
-        bounds = np.linspace(0, worlds, len(self._pipes) + 1).astype(int)
-        for pipe, first, last in zip(self._pipes, bounds, bounds[1:], strict=False):
-            pipe.send((robot, task, scenario, int(last - first), library, int(first)))
+    def take(self, makers: Iterable[Callable[[], Pace]]) -> None:
+        """Let each process make what it is to step.
+
+        Raises:
+            ConfigError: One of them cannot.
+        """
+        for pipe, maker in zip(self._pipes, makers, strict=True):
+            pipe.send(maker)
         self._answers()
+
+    def __len__(self) -> int:
+        """How many processes."""
+        return len(self._pipes)
 
     def steps_per_s(self, seconds: float) -> float:
         """Step for a while; returns how many steps of single worlds were made a second by all together."""
@@ -174,8 +199,8 @@ class SharedPace:
 
 
 def _serve(pipe: Connection) -> None:
-    """What a process does: build worlds, or step them, on request."""
-    pace: BatchPace | None = None
+    """What a process does: make what it steps, or step it, on request."""
+    pace: Pace | None = None
     while True:
         try:
             order = pipe.recv()
@@ -186,11 +211,21 @@ def _serve(pipe: Connection) -> None:
                 assert pace is not None
                 pipe.send(pace.steps_per_s(order))
             else:
-                robot, task, scenario, worlds, library, first = order
-                pace = BatchPace(robot, task, scenario, worlds=worlds, library=library, first=first)
+                pace = order()
                 pipe.send(None)
         except ConfigError as error:
             pipe.send(error)
+
+
+def shared_worlds(
+    robot: Robot, task: Task, scenario: Scenario, *, worlds: int, library: Library, processes: int
+) -> list[Callable[[], Pace]]:
+    """The batch of each process, so that all of them have the worlds."""
+    bounds = np.linspace(0, worlds, processes + 1).astype(int)
+    return [
+        partial(BatchPace, robot, task, scenario, worlds=int(last - first), library=library, first=int(first))
+        for first, last in pairwise(bounds)
+    ]
 
 
 def measure(
@@ -211,16 +246,15 @@ def measure(
         scenario: What its worlds are drawn from.
         worlds: Of the batch, >= 1.
         library: Of the batch.
-        cores: Processes of the batch, and threads of MuJoCo's rollout.
+        cores: Processes of the batch and of JSBSim, and threads of MuJoCo's rollout.
         seconds: Of each measurement [s].
         rounds: Measurements of each, in turns.
         progress: Called after every round.
 
     Returns:
-        For each robot's name its `task`, MuJoCo's `mujoco_integrator` and `mujoco_step_s`, the medians
-        `batch_steps_per_s` and `mujoco_steps_per_s`, and their `ratio`; for robots on water also
-        `mujoco_with_water_steps_per_s` and `ratio_with_water`, for robots in space `mujoco_euler_steps_per_s` and
-        `ratio_with_euler`.
+        For each robot's name its `task` and medians: `batch_steps_per_s`, `<other>_steps_per_s` of what else moves it,
+        and its ratio to that, by the names of `RATIOS`; with MuJoCo also `mujoco_integrator` and `mujoco_step_s`.
+        Aircraft fly in JSBSim in MuJoCo's place, which has no air of theirs.
     """
     found: dict[str, dict[str, Any]] = {}
     with ExitStack() as stack:
@@ -230,33 +264,48 @@ def measure(
             stack.callback(shared.close)
         for robot, task in pairs:
             if shared is not None:
-                shared.take(robot, task, scenario, worlds=worlds, library=library)
+                shared.take(
+                    shared_worlds(
+                        robot, task, scenario, worlds=worlds, library=library, processes=len(shared)
+                    )
+                )
             batch = shared or BatchPace(robot, task, scenario, worlds=worlds, library=library)
-            rollout = MujocoPace(robot, threads=cores)
-            paces: list[MujocoPace | AfloatPace | SharedPace | BatchPace] = [batch, rollout]
-            other = ""
-            if robot.hydrodynamics is not None:
-                other = "water"
-                paces.append(AfloatPace(robot, task, scenario, worlds=worlds, threads=cores))
-            elif rollout.integrator == "RK4":
-                other = "euler"
-                paces.append(MujocoPace(robot, threads=cores, integrator="Euler"))
-            for pace in paces:
-                pace.steps_per_s(0.3 * seconds)  # caches and thread pools warm up
-            measured = []
-            for _ in range(rounds):
-                measured.append([pace.steps_per_s(seconds) for pace in paces])
-                progress()
-            ours, theirs, *more = (float(value) for value in np.median(np.array(measured), axis=0))
-            found[robot.name] = {
-                "task": task.name,
-                "mujoco_integrator": rollout.integrator,
-                "mujoco_step_s": rollout.step_s,
-                "batch_steps_per_s": ours,
-                "mujoco_steps_per_s": theirs,
-                "ratio": ours / theirs,
-            }
-            if more:
-                name = f"mujoco_{other}" if other == "euler" else f"mujoco_with_{other}"
-                found[robot.name] |= {f"{name}_steps_per_s": more[0], f"ratio_with_{other}": ours / more[0]}
+            with ExitStack() as peers:
+                others = _others(robot, task, scenario, worlds=worlds, cores=cores, stack=peers)
+                paces = [batch, *others.values()]
+                for pace in paces:
+                    pace.steps_per_s(0.3 * seconds)  # caches and thread pools warm up
+                measured = []
+                for _ in range(rounds):
+                    measured.append([pace.steps_per_s(seconds) for pace in paces])
+                    progress()
+            ours, *theirs = (float(value) for value in np.median(np.array(measured), axis=0))
+            figures: dict[str, Any] = {"task": task.name, "batch_steps_per_s": ours}
+            for (name, pace), its in zip(others.items(), theirs, strict=True):
+                figures |= {f"{name}_steps_per_s": its, RATIOS[name]: ours / its}
+                if name == MUJOCO and isinstance(pace, MujocoPace):
+                    figures |= {"mujoco_integrator": pace.integrator, "mujoco_step_s": pace.step_s}
+            found[robot.name] = figures
     return found
+
+
+def _others(
+    robot: Robot, task: Task, scenario: Scenario, *, worlds: int, cores: int, stack: ExitStack
+) -> dict[str, Pace]:
+    """What else moves a robot, by the names of `RATIOS`; the stack ends the processes."""
+    if robot.flies:
+        from fulmar_benchmarks.jsbsim_pace import JsbsimPace  # of an extra
+
+        flown = SharedPace(cores)
+        stack.callback(flown.close)
+        flown.take(cores * [partial(JsbsimPace, robot)])
+        return {JSBSIM: flown}
+    rollout = MujocoPace(robot, threads=cores)
+    if robot.hydrodynamics is not None:
+        return {
+            MUJOCO: rollout,
+            IN_WATER: AfloatPace(robot, task, scenario, worlds=worlds, threads=cores),
+        }
+    if rollout.integrator == "RK4":
+        return {MUJOCO: rollout, BY_EULER: MujocoPace(robot, threads=cores, integrator="Euler")}
+    return {MUJOCO: rollout}

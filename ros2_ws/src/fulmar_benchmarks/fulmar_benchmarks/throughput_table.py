@@ -21,8 +21,7 @@ def print_table(figures: dict[str, Any], output: Console) -> None:
         table.add_row(
             name,
             f"{found['batch_steps_per_s']:,.0f}",
-            f"{found['mujoco_steps_per_s']:,.0f}",
-            f"{found['ratio']:.1f}",
+            *_with_mujoco(found),
             *_otherwise(found),
         )
     output.print(table)
@@ -30,20 +29,31 @@ def print_table(figures: dict[str, Any], output: Console) -> None:
         f"MuJoCo of {', '.join(n for n, f in figures['robots'].items() if _method(f) == _method(found))}: "
         f"{_method(found)}"
         for found in figures["robots"].values()
+        if "ratio" in found
     ):
         output.print(line, markup=False, soft_wrap=True)
 
 
 def _method(found: dict[str, Any]) -> str:
-    """How MuJoCo integrates a robot."""
+    """How MuJoCo integrates a robot; empty for one that it does not."""
+    if "ratio" not in found:
+        return ""
     return f"{found['mujoco_integrator']}, steps of {found['mujoco_step_s']:g} s"
 
 
+def _with_mujoco(found: dict[str, Any]) -> tuple[str, str]:
+    """Figures of MuJoCo's rollout; none of aircraft."""
+    if "ratio" not in found:
+        return "", ""
+    return f"{found['mujoco_steps_per_s']:,.0f}", f"{found['ratio']:.1f}"
+
+
 def _otherwise(found: dict[str, Any]) -> tuple[str, ...]:
-    """Figures of robots on water and in space; none for others."""
+    """Figures of robots on water, in space and in the air; none for others."""
     for pace, ratio, how in (
         ("mujoco_with_water_steps_per_s", "ratio_with_water", "in water"),
         ("mujoco_euler_steps_per_s", "ratio_with_euler", "Euler"),
+        ("jsbsim_steps_per_s", "ratio_with_jsbsim", "JSBSim"),
     ):
         if ratio in found:
             return f"{how} {found[pace]:,.0f}", f"{found[ratio]:.1f}"

@@ -32,19 +32,25 @@ def throughput(
     ] = None,
     worlds: Annotated[int, option("N", "Worlds of the batch.", min=1)] = 4096,
     task: Annotated[
-        str | None, option("T", "Task of the batch; go_to_pose by default, in space go_to_pose_3d.")
+        str | None,
+        option(
+            "T", "Task of the batch; go_to_pose by default, in space go_to_pose_3d, of aircraft fly_hold."
+        ),
     ] = None,
     scenario: ScenarioOption = "randomised",
-    cores: Annotated[int, option("N", "Processes of the batch, and threads of MuJoCo's rollout.", min=1)] = 2,
+    cores: Annotated[
+        int, option("N", "Processes of the batch and of JSBSim, and threads of MuJoCo's.", min=1)
+    ] = 2,
     seconds: Annotated[float, option("S", "Time of each of the measurements [s].", min=0.05)] = 1.0,
     as_json: JsonOption = False,
 ) -> None:
-    """Measure environment steps a second of the core's batch and of MuJoCo's batch rollout.
+    """Measure environment steps a second of the core's batch, of MuJoCo's batch rollout and of JSBSim.
 
     A step of the batch has all that training needs: disturbances, odometry, observation, reward and new episodes.
     MuJoCo's is physics alone, with its own drag for water. Both are measured in turns in this run, on the same cores;
     the medians are printed. MuJoCo also rolls out ("otherwise") robots on water in the water of the plant, and robots
-    in space by Euler's method; the plant has Runge-Kutta's of fourth order.
+    in space by Euler's method; the plant has Runge-Kutta's of fourth order. Aircraft fly in JSBSim instead, one in a
+    process for each core, in its own light turbulence.
     Before that a step of each robot is compiled, which takes 10 to 30 s.
 
     Try:
@@ -61,7 +67,8 @@ def throughput(
             raise UnknownNameError(kind, name, known)
     names = read_names(robots or "all", "robot", config_names("robots"))
     pairs, the_scenario = _pairs(names, task, named=robots is not None), load_scenario(scenario)
-    require("mujoco", *([] if library == "numpy" else ["torch"]))
+    flown = ["jsbsim"] if any(robot.flies for robot, _ in pairs) else []
+    require("mujoco", *flown, *([] if library == "numpy" else ["torch"]))
     _check_machine(device, library, worlds, cores)
     from fulmar_benchmarks.throughput import Library, measure
     from fulmar_benchmarks.throughput_table import print_table
@@ -93,19 +100,26 @@ def throughput(
 def _pairs(names: Sequence[str], task: str | None, *, named: bool) -> list[tuple[Robot, Task]]:
     """Robots, each with its task; of a given task those that it fits, unless they were `named`."""
     from fulmar_core.robot import load_robot
-    from fulmar_core.spatial import SpatialState
     from fulmar_core.tasks import load_task
 
     robots = [load_robot(name) for name in names]
     if task is None:
-        kinds = {True: "go_to_pose_3d", False: "go_to_pose"}
-        return [(robot, load_task(kinds[robot.state_type is SpatialState])) for robot in robots]
+        return [(robot, load_task(_usual_task(robot))) for robot in robots]
     the_task = load_task(task)
     if not named:
         robots = [robot for robot in robots if robot.state_type is the_task.state_type]
     for robot in robots:
         the_task.check(robot)
     return [(robot, the_task) for robot in robots]
+
+
+def _usual_task(robot: Robot) -> str:
+    """Name of the task that a robot's batch plays by default."""
+    from fulmar_core.spatial import SpatialState
+
+    if robot.flies:
+        return "fly_hold"
+    return "go_to_pose_3d" if robot.state_type is SpatialState else "go_to_pose"
 
 
 def _fastest(device: str) -> str:

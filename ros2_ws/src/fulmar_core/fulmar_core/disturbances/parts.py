@@ -98,11 +98,14 @@ class Air:
 
     wind: Range = (0.0, 0.0)  # steady, level, from anywhere [m/s]
     turbulence: float = 0.0  # wind at 20 ft that it comes from: 7.7 light, 15.4 moderate, 23.1 severe [m/s]
+    least_turbulence: float = 1.0  # of any episode, as a share of `turbulence` [-]
     altitude: float = 0.0  # of the ground or the water above mean sea level [m]
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.wind[0] <= self.wind[1] or self.turbulence < 0.0:
             raise ValueError("'wind' must be [low, high] with 0 <= low <= high, 'turbulence' not negative.")
+        if not 0.0 <= self.least_turbulence <= 1.0:
+            raise ValueError(f"'least_turbulence' = {self.least_turbulence:g} must lie in [0, 1].")
         if not -1000.0 <= self.altitude <= 11_000.0:
             raise ValueError(f"'altitude' = {self.altitude:g} m must lie between -1000 and 11000.")
 

@@ -60,7 +60,11 @@ class FlightDynamics(SpatialDynamics):
         keys = xp.floor(draws.uniform(0.0, KEYS, 2)).T
         zero = xp.zeros_like(body.mass)
         wind = xp.stack((speed * xp.cos(bearing), speed * xp.sin(bearing), zero))
-        around = {"wind": wind, "turbulence": zero + air.turbulence, "gust_keys": keys}
+        if air.least_turbulence < 1.0:
+            turbulence = draws.uniform(air.least_turbulence * air.turbulence, air.turbulence)
+        else:
+            turbulence = zero + air.turbulence
+        around = {"wind": wind, "turbulence": turbulence, "gust_keys": keys}
         own = dict(zip(SpatialWorld.names(), body.parts(), strict=True))
         return FlightWorld(**own, **around, altitude=zero + air.altitude)
 
