@@ -56,7 +56,7 @@ class FlightReward:
 
     near: float  # times exp(-e / 0.5 m)
     nearer: float  # times exp(-e / 0.08 m)
-    side: float  # times (exp(-|s| / 0.5 m) + exp(-|s| / 5 m)) / 2: the wider part leads back those that drift away
+    side: float  # times (exp(-|s| / 0.3 m) + exp(-|s| / 3 m)) / 2: the wider part leads back those that drift away
     speed: float  # times exp(-|speed error| / 2 m/s)
     upright: float  # times cos(roll)
     turning: float  # times -|turn rate|
@@ -226,7 +226,7 @@ class FollowReference(Task[SpatialState]):
         return weighted_sum(
             (w.near, lambda: xp.exp(-e / 0.5)),
             (w.nearer, lambda: xp.exp(-e / 0.08)),
-            (0.5 * w.side, lambda: xp.exp(-s / 0.5) + xp.exp(-s / 5.0)),
+            (0.5 * w.side, lambda: xp.exp(-s / 0.3) + xp.exp(-s / 3.0)),
             (w.speed, lambda: xp.exp(-slow / 2.0)),
             (w.upright, lambda: xp.cos(euler_of(after.quat)[0])),
             (-w.turning, lambda: length(after.rate)),
