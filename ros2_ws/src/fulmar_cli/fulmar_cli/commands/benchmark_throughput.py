@@ -99,27 +99,19 @@ def throughput(
 
 def _pairs(names: Sequence[str], task: str | None, *, named: bool) -> list[tuple[Robot, Task]]:
     """Robots, each with its task; of a given task those that it fits, unless they were `named`."""
+    from fulmar_benchmarks.usual_task import usual_task
     from fulmar_core.robot import load_robot
     from fulmar_core.tasks import load_task
 
     robots = [load_robot(name) for name in names]
     if task is None:
-        return [(robot, load_task(_usual_task(robot))) for robot in robots]
+        return [(robot, load_task(usual_task(robot))) for robot in robots]
     the_task = load_task(task)
     if not named:
         robots = [robot for robot in robots if robot.state_type is the_task.state_type]
     for robot in robots:
         the_task.check(robot)
     return [(robot, the_task) for robot in robots]
-
-
-def _usual_task(robot: Robot) -> str:
-    """Name of the task that a robot's batch plays by default."""
-    from fulmar_core.spatial import SpatialState
-
-    if robot.flies:
-        return "fly_hold"
-    return "go_to_pose_3d" if robot.state_type is SpatialState else "go_to_pose"
 
 
 def _fastest(device: str) -> str:
