@@ -8,22 +8,17 @@ climb rate, heading for a drift, bank for a bend (thesis §5.5.2 has the LQR; th
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
-from fulmar_core.actuators.control_surfaces import ControlSurfaces
-from fulmar_core.attitude import from_euler, product, rotation_error
 from fulmar_core.controllers.controller import Inputs
-from fulmar_core.controllers.flight_observer import FlightObserver, ObserverNoise
-from fulmar_core.controllers.flight_reference import SmoothReference
-from fulmar_core.controllers.law import Law
+from fulmar_core.controllers.flight_law import FlightLaw
+from fulmar_core.controllers.flight_observer import ObserverNoise
+from fulmar_core.controllers.flight_reference import Aim
 from fulmar_core.controllers.lqr import regulator
-from fulmar_core.dynamics.hydrodynamics import GRAVITY
 from fulmar_core.flight.schedule import FlightModel, Schedule
 from fulmar_core.robot import Robot
 from fulmar_core.spatial import SpatialState
-from fulmar_core.tasks.follow_reference import FollowReference
 
 
 @dataclass(frozen=True)
@@ -54,7 +49,7 @@ class FlightWeights:
             raise ValueError("weights must not be negative.")
 
 
-class FlightLqi(Law):
+class FlightLqi(FlightLaw):
     """Linear-quadratic regulator of an aircraft, with integral action where the weights have any."""
 
     law = "lqi"
@@ -64,21 +59,12 @@ class FlightLqi(Law):
 
     def bind(self) -> None:
         """See `Law.bind`."""
-        if not isinstance(self.robot.actuators, ControlSurfaces) or self.robot.airframe is None:
-            raise ValueError("the law flies aircraft; this robot is none.")
-        if not isinstance(self.task, FollowReference):
-            raise ValueError(f"the law follows references, and '{self.task.name}' has none.")
-        self._craft = self.robot.actuators
-        self._speed = self.robot.airframe.speed
-        self._dt = self.robot.timing.substeps(self.control_hz) * self.robot.timing.physics_dt
-        self._reference = SmoothReference(self.task, over_s=self.gains.smooth_s, dt=self._dt)
-        noise = self.gains.observer
-        self._observer = None if noise is None else FlightObserver(self.robot, noise, self._dt)
+        self.follow(smooth_s=self.gains.smooth_s, observer=self.gains.observer)
 
     def prepare(self) -> None:
         """Solve for the gains at every height."""
         self._integrates = max(self.gains.height_integral, self.gains.side_integral) > 0.0
-        self._schedule = Schedule(self.robot, self._speed, self._dt, self._gain)
+        self.schedule = Schedule(self.robot, self._speed, self._dt, self._gain)
 
     def _gain(self, model: FlightModel) -> np.ndarray:
         g, dt, count = self.gains, self._dt, len(model.a)
@@ -96,77 +82,77 @@ class FlightLqi(Law):
     def reset(self) -> None:
         """Forget the past."""
         super().reset()
-        self._reference.reset()
-        if self._observer is not None:
-            self._observer.reset()
         self._servos: np.ndarray | None = None
         self._sums: np.ndarray | None = None
 
     def command(self, inputs: Inputs) -> np.ndarray:
         """Choose commands; shapes as in `Controller.act`."""
-        aim, state = self._reference.at(inputs), inputs.state
-        assert isinstance(state, SpatialState)
-        if self._observer is not None:
-            state = self._observer.update(state, inputs)
-        count = len(aim.place)
+        aim, state = self.see(inputs)
+        return self.answer(state, aim, self.servos_after(inputs))
+
+    def servos_after(self, inputs: Inputs) -> np.ndarray:
+        """Deflections and thrust levels, then rates of the servos, as of the commands that were sent, shape (n, k)."""
+        count = len(inputs.previous)
         if self._servos is None or len(self._servos) != count:
-            self._servos = np.concatenate(
-                (inputs.previous, np.zeros((count, self._craft.positions))), axis=-1
-            )
+            still = np.zeros((count, self._craft.positions))
+            self._servos = np.concatenate((inputs.previous, still), axis=-1)
             self._sums = np.zeros((count, 2))
         else:
             self._servos = self._followed(self._servos, inputs.previous)
-        assert self._sums is not None
+        return self._servos
+
+    def answer(self, state: SpatialState, aim: Aim, servos: np.ndarray) -> np.ndarray:
+        """Commands for n craft, before the actuators' limits, shape (n, m).
+
+        Args:
+            state: Believed, shapes (n,).
+            aim: Of n craft.
+            servos: As of `servos_after`.
+        """
         limit = self.gains.error_limit
         off = np.clip(np.stack((state.y, state.z), axis=-1) - aim.place, -limit, limit)
-        x = np.concatenate((off, self._motion(state, aim.rate, aim.bend), self._actuators(aim)), axis=-1)
+        level = self.level(self.schedule, aim)
+        x = np.concatenate(
+            (off, self.motion(self.schedule, state, aim), self._actuators(servos, level)), axis=-1
+        )
         if self._integrates:
+            assert self._sums is not None  # as of `servos_after`
             x = np.concatenate((x, self._sums), axis=-1)
-        gain = self._schedule.array(aim.place[:, 1])
-        wanted = self._trimmed(aim) - np.einsum("nij,nj->ni", gain, x)
-        if self._integrates:
             free = np.abs(off) < limit
             self._sums = self._sums + self._dt * np.where(free, off, 0.0)
-        return np.asarray(wanted)
+        gain = self.schedule.array(aim.place[:, 1])
+        return np.asarray(level - np.einsum("nij,nj->ni", gain, x))
 
-    def _motion(self, state: SpatialState, rate: np.ndarray, bend: np.ndarray) -> np.ndarray:
-        """Departures of attitude, velocity and turn rate, shape (n, 9)."""
-        drift, climb = rate.T
-        speed = self._speed
-        heading, rise, bank = np.arctan2(drift, speed), -climb / speed, -bend[:, 0] / GRAVITY
-        level = self._schedule.quat(state.z)
-        aimed = product(from_euler(bank, rise, heading), tuple(level.T))
-        turned = rotation_error(aimed, state.quat)
-        velocity = state.vx - speed, state.vy - drift, state.vz - climb
-        rates = state.wx, state.wy + bend[:, 1] / speed, state.wz - bend[:, 0] / speed
-        return np.stack((*turned, *velocity, *rates), axis=-1)
+    def answers(
+        self, states: SpatialState, aim: Aim, servos: np.ndarray, *, share: float = 1.0
+    ) -> np.ndarray:
+        """Same as `answer`, of k states of each of n craft, without integral action, shape (n k, m).
 
-    def _trimmed(self, aim: Any) -> np.ndarray:
-        """Commands of the trim, with the thrust that a climb takes, shape (n, m)."""
-        command = self._schedule.command(aim.place[:, 1])
-        surfaces = self._craft.positions
-        thrust = self.robot.body.mass * GRAVITY * aim.rate[:, 1] / self._speed
-        command[:, surfaces:] += (thrust / self._slope)[:, None]
-        return command
+        Args:
+            states: Shapes (n k,), those of one craft side by side.
+            aim: Of n craft.
+            servos: Of every state, shape (n k, ...).
+            share: Of the answer to departures; 0: commands of level flight alone [-].
+        """
+        count = len(aim.place)
+        each = len(states.x) // count
+        own = Aim(*(np.repeat(part, each, axis=0) for part in (aim.place, aim.rate, aim.bend)))
+        limit = self.gains.error_limit
+        off = np.clip(np.stack((states.y, states.z), axis=-1) - own.place, -limit, limit)
+        level = np.repeat(self.level(self.schedule, aim), each, axis=0)
+        x = np.concatenate(
+            (off, self.motion(self.schedule, states, own), self._actuators(servos, level)), axis=-1
+        )
+        gain = self.schedule.array(aim.place[:, 1])[..., : x.shape[-1]]
+        back = x.reshape(count, each, -1) @ gain.transpose(0, 2, 1)
+        return np.asarray(level - share * back.reshape(count * each, -1))
 
-    @property
-    def _slope(self) -> float:
-        """Thrust of all motors per throttle at the cruising speed [N]."""
-        at, density = np.array([self._speed]), np.array([1.225])
-        total = 0.0
-        for motor in self._craft.motors:
-            low, high = (float(motor.engine.thrust_at(np.array([t]), at, density)[0]) for t in (0.3, 0.5))
-            total += (high - low) / 0.2
-        return total
-
-    def _actuators(self, aim: Any) -> np.ndarray:
-        """Departures of deflections, their rates, and levels, as of the commands that were sent, shape (n, k)."""
-        assert self._servos is not None
+    def _actuators(self, servos: np.ndarray, level: np.ndarray) -> np.ndarray:
+        """Departures of deflections, their rates, and levels, shape (n, k); servos as of `servos_after`."""
         surfaces, motors = self._craft.positions, len(self._craft.motors)
-        trim = self._trimmed(aim)
-        places = self._servos[:, :surfaces] - trim[:, :surfaces]
-        levels = self._servos[:, surfaces : surfaces + motors] - trim[:, surfaces:]
-        return np.concatenate((places, self._servos[:, surfaces + motors :], levels), axis=-1)
+        places = servos[:, :surfaces] - level[:, :surfaces]
+        levels = servos[:, surfaces : surfaces + motors] - level[:, surfaces:]
+        return np.concatenate((places, servos[:, surfaces + motors :], levels), axis=-1)
 
     def _followed(self, servos: np.ndarray, command: np.ndarray) -> np.ndarray:
         """Where servos and motors are a control step after a command, shape (n, m + surfaces)."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -39,11 +40,15 @@ class SmoothReference:
 
     def at(self, inputs: Inputs) -> Aim:
         """The aim of now; `inputs` as of a controller."""
+        return self.ahead(inputs, (0.0,))[0]
+
+    def ahead(self, inputs: Inputs, times_s: Sequence[float]) -> list[Aim]:
+        """The aims after some times from now [s]; `inputs` as of a controller."""
         targets = np.asarray(inputs.goal.targets, dtype=float)
         now = np.asarray(reference_of(inputs.goal), dtype=float)
         if targets.shape[-2] == 1:
             still = np.zeros((len(now), 2))
-            return Aim(now[:, 2:4], now[:, 5:7], still)
+            return [Aim(now[:, 2:4], now[:, 5:7], still)] * len(times_s)
         if (
             self._targets is None
             or self._targets.shape != targets.shape
@@ -51,10 +56,11 @@ class SmoothReference:
         ):
             self._targets = targets.copy()
             self._paths = self._smoothed(targets[..., 1:3])
-        step = np.clip(np.round(now[:, 0] / self._dt).astype(int), 0, self._paths[0].shape[1] - 1)
-        each = np.arange(len(now))
-        place, rate, bend = (path[each, step] for path in self._paths)
-        return Aim(place, rate, bend)
+        last, each, found = self._paths[0].shape[1] - 1, np.arange(len(now)), []
+        for time in times_s:
+            step = np.clip(np.round((now[:, 0] + time) / self._dt).astype(int), 0, last)
+            found.append(Aim(*(path[each, step] for path in self._paths)))
+        return found
 
     def _smoothed(self, places: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Place, rate and bend at every control step, each (n, steps, 2)."""
