@@ -15,7 +15,13 @@ from policy_server.controllers import Choice, load_controller
 
 def make_controller(robot: Robot, task: Task, settings: ControllerSettings) -> Controller:
     """Load the controller that the parameters of a node name."""
-    choice = Choice(settings.control_rate(robot), settings.policy, settings.trusted_keys, settings.excitation)
+    choice = Choice(
+        settings.control_rate(robot),
+        settings.policy,
+        settings.trusted_keys,
+        settings.excitation,
+        settings.seed,
+    )
     return load_controller(settings.controller, robot, task, choice)
 
 

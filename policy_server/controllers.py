@@ -32,6 +32,7 @@ class Choice:
     policy: str = ""  # folder of a bundle; empty: the shipped one
     trusted_keys: str = ""  # file or folder of public keys, one of which must have signed the bundle
     excitation: str = ""  # goal file of torques, for `excite` on satellites; empty: our own profile
+    seed: int = 0  # of the noise that a controller draws
 
 
 @dataclass(frozen=True)
@@ -44,6 +45,7 @@ class ControllerEntry:
     needs: tuple[str, ...] = ()  # modules that an extra brings
     strives: bool = True  # whether it means to meet the goal
     runs_bundle: bool = False  # whether a learned policy drives
+    draws: bool = False  # whether its commands depend on a seed
     is_law: bool = False  # whether it has gains, and may take over from a policy that is refused
     is_external: bool = False  # whether it is a node of the user's own, which Fulmar neither loads nor starts
 
@@ -65,15 +67,15 @@ def _any_pair(robot: Robot, task: Task) -> None:
 
 
 def _load_law(law: str | None, robot: Robot, task: Task, choice: Choice) -> Controller:
-    return load_classical(robot, task, control_hz=choice.control_hz, law=law)
+    return load_classical(robot, task, control_hz=choice.control_hz, law=law, seed=choice.seed)
 
 
 def _check_law(law: str | None, robot: Robot, task: Task) -> None:
     check_pair(robot, task, law=law)
 
 
-def _law(title: str, law: str | None) -> ControllerEntry:
-    return ControllerEntry(title, partial(_load_law, law), partial(_check_law, law), is_law=True)
+def _law(title: str, law: str | None, *, draws: bool = False) -> ControllerEntry:
+    return ControllerEntry(title, partial(_load_law, law), partial(_check_law, law), is_law=True, draws=draws)
 
 
 def _load_excite(robot: Robot, task: Task, choice: Choice) -> Controller:
@@ -116,6 +118,8 @@ CONTROLLERS = {
     ),
     "lqr": _law("linear-quadratic regulator with valve allocation", "lqr"),
     "lqi": _law("linear-quadratic regulator of aircraft with integral action", "lqi"),
+    "mppi": _law("predictive control of aircraft by the mean of many random flights", "mppi", draws=True),
+    "pid": _law("cascaded loops of aircraft", "pid"),
     "pd": _law("proportional-derivative control of bodies in space and satellites", "pd"),
     "adaptive": _law("control of a satellite's attitude with its estimated inertia", "adaptive"),
     "mpc": _law("predictive control that tries combinations of valves", "mpc"),

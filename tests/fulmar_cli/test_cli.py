@@ -75,6 +75,8 @@ def test_the_list_is_one_json_object(fulmar):
         "policy",
         "lqr",
         "lqi",
+        "mppi",
+        "pid",
         "pd",
         "adaptive",
         "mpc",

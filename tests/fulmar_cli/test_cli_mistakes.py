@@ -46,8 +46,8 @@ def broken_configs(tmp_path, monkeypatch):
         (["run", "leatherback", "--controller", "lqr"], "controller 'lqr' is for robots with thrusters"),
         (
             [*RUN, "--controller", "fuzzy"],
-            "unknown controller 'fuzzy'. Known: adaptive, classical, excite, external, lqi, lqr, lqr_drift, mpc, pd, "
-            "policy.",
+            "unknown controller 'fuzzy'. Known: adaptive, classical, excite, external, lqi, lqr, lqr_drift, mpc, "
+            "mppi, pd, pid, policy.",
         ),
         (
             ["evaluate", "floating_platform", "go_to_pose", "--controller", "pd"],

@@ -185,6 +185,7 @@ def _settings(
             rate=rate,
             goals_streamed=bool(info.get("goals")),
             excitation=str(info.get("excitation") or ""),
+            seed=int(info.get("seed") or 0),
             fallback=str(guards.get("fallback") or ""),
             estop=bool(guards.get("estop")),
             max_run_time_s=max_run_time_s,

@@ -62,6 +62,8 @@ def controller_spec(plan: RunPlan) -> NodeSpec:
     }
     if plan.excitation:
         parameters["excitation"] = plan.excitation
+    if controller_entry(plan.controller).draws:
+        parameters["seed"] = plan.seed
     guards = plan.guards
     if controller_entry(plan.controller).runs_bundle:
         texts = {

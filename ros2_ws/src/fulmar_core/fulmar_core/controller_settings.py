@@ -34,6 +34,7 @@ class ControllerSettings:
     goals_streamed: bool = False  # a goal node sends the goal with each odometry; lock step waits for it
     fallback: str = ""  # classical controller that takes over when a policy is refused, or its commands are
     excitation: str = ""  # goal file of torques, for `excite` on satellites; empty: our own profile
+    seed: int = 0  # of the noise of a controller that draws any
     trusted_keys: str = ""  # file or folder of public keys: no bundle runs that none of them has signed
     estop: bool = False  # nothing moves before an e-stop message is received
     unattended: bool = (
@@ -54,8 +55,9 @@ class ControllerSettings:
                 raise ValueError(f"{name} = {getattr(self, name)} must be a finite number, at least 0.")
         if self.rate == 0.0:
             raise ValueError(f"rate = {self.rate:g} must be greater than 0.")
-        if self.overruns_to_stop < 0:
-            raise ValueError(f"overruns_to_stop = {self.overruns_to_stop} must not be negative.")
+        for name in ("overruns_to_stop", "seed"):
+            if getattr(self, name) < 0:
+                raise ValueError(f"{name} = {getattr(self, name)} must not be negative.")
         if not 1 <= self.copies <= MOST_COPIES:
             raise ValueError(f"copies = {self.copies} must be from 1 to {MOST_COPIES}.")
         if self.area != NO_AREA:

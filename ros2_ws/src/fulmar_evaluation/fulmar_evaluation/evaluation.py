@@ -55,7 +55,7 @@ class Trial:
         from policy_server.controllers import Choice, load_controller
 
         plan = self.plan
-        choice = Choice(plan.control_hz, plan.policy)
+        choice = Choice(plan.control_hz, plan.policy, seed=plan.seed)
         return load_controller(plan.controller, self.robot, self.task, choice)
 
     def drawn(self, numbers: np.ndarray) -> Episode:

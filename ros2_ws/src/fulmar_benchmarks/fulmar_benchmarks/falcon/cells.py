@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from fulmar_benchmarks.falcon.published import BESIDE
-from fulmar_core.controllers.classical import gains_of
+from fulmar_core.controllers.classical import FLIGHT_LAWS, gains_of
 from fulmar_core.controllers.controller import Controller
-from fulmar_core.controllers.flight_lqi import FlightLqi, FlightLqr
+from fulmar_core.controllers.flight_mppi import FlightMppi
 from fulmar_core.disturbances.parts import Air, Sensing
 from fulmar_core.disturbances.scenario import Scenario
 from fulmar_core.flight.turbulence import CLASSES
@@ -22,7 +23,8 @@ from fulmar_core.trajectories import Trajectories
 from policy_server.controllers import Choice, load_controller
 
 TASKS = ("hold", *PATHS)
-CONTROLLERS = ("lqi", "lqr", "policy")
+CONTROLLERS = ("lqi", "lqr", "mppi", "pid", "policy")
+RANDOM = ("mppi",)  # controllers that draw: flights with exact state differ by their seeds
 LATE_S = 0.02  # delay of measurements in `delay` and `all`
 NOISY = 2.0  # times the noise of the sensors: the mild row of FALCON-S
 SETTLED_M = 0.1  # a flight has settled once it stays so near to its reference
@@ -69,21 +71,24 @@ def controller_of(robot: Robot, cell: Cell) -> Controller:
     task = load_task(f"fly_{cell.task}")
     if cell.controller == "policy":
         return load_controller("policy", robot, task, Choice(0.0))
-    weights = gains_of(robot, cell.controller)
+    gains = gains_of(robot, cell.controller)
     if cell.scenario == "exact":
-        weights = replace(weights, observer=None)
-    law = FlightLqr if cell.controller == "lqr" else FlightLqi
-    return law(robot, task, weights, name=cell.controller)
+        gains = replace(gains, observer=None)
+    law = FLIGHT_LAWS[cell.controller].law(robot, task, gains, name=cell.controller)
+    if isinstance(law, FlightMppi):
+        law.seeds = tuple(range(cell.seed, cell.seed + cell.episodes))
+    return law
 
 
 def fly(cell: Cell) -> dict[str, Any]:
     """Fly a cell; its figures, JSON-ready, see `fulmar benchmark falcon --help`."""
     robot, task = load_robot(cell.robot), load_task(f"fly_{cell.task}")
     controller = controller_of(robot, cell)
+    begun = time.perf_counter()
     run = roll_out_in_batch(
         controller, robot, task, SCENARIOS[cell.scenario], episodes=cell.episodes, seed=cell.seed
     )
-    found = figures(run, cell.task, robot)
+    found = figures(run, cell.task, robot) | {"wall_s": time.perf_counter() - begun}
     published = BESIDE.get(cell.controller, {}).get(cell.task)
     return found | {"thesis": published.as_json() if published else {}}
 

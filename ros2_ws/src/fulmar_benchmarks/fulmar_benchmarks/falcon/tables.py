@@ -11,9 +11,9 @@ from fulmar_benchmarks.falcon.campaign import requirements
 def lines(document: dict[str, Any]) -> list[str]:
     """Every figure beside the thesis', then what is required."""
     found = [
-        f"{document['robot']}, seed {document['seed']}; RMSE per axis in m, of the thesis in brackets",
+        f"{document['robot']}, seed {document['seed']}; RMSE per axis in m, of the thesis in brackets (*: crashed)",
         f"{'task':5} {'by':7} {'scenario':8} {'RMSE':>16} {'worst':>8} {'altitude':>8} {'peak':>7} {'settles':>8} "
-        f"{'energy':>7} {'alive':>6}",
+        f"{'energy':>7} {'alive':>6} {'wall s':>7}",
     ]
     for task, controllers in document["tasks"].items():
         for controller, scenarios in controllers.items():
@@ -22,12 +22,14 @@ def lines(document: dict[str, Any]) -> list[str]:
                     found.append(f"{task:5} {controller:7} {scenario:8} {each['error']}")
                     continue
                 thesis = each["thesis"].get("rmse_per_axis_m")
-                beside = f"({thesis:.3f})" if thesis is not None else ""
+                crash = "*" if each["thesis"].get("crashed") else ""
+                beside = f"({thesis:.3f}{crash})" if thesis is not None else ""
                 found.append(
                     f"{task:5} {controller:7} {scenario:8} {_number(each['rmse_per_axis_m'], 4):>8}{beside:>8} "
                     f"{_number(each['rmse_per_axis_worst_m'], 4):>8} {_number(each['altitude_rmse_m'], 4):>8} "
                     f"{_number(each['peak_error_m'], 3):>7} {_number(each['settling_s'], 2):>8} "
-                    f"{_number(each['energy'], 3):>7} {each['survival']:>6.2f}"
+                    f"{_number(each['energy'], 3):>7} {each['survival']:>6.2f} "
+                    f"{_number(each['wall_s'], 1):>7}"
                 )
     ground = document["ground_effect"]
     found.append("mean squared throttle in level flight over height, and of the thesis (Table 5.2):")

@@ -19,12 +19,12 @@ from fulmar_core.seeds import EVALUATION_SEED
 def falcon(
     robot: Annotated[str, option("NAME", "An aircraft.")] = "airship_v7",
     tasks: Annotated[str, option("T,...", "Out of hold and a to f, or all.")] = "all",
-    controllers: Annotated[str, option("C,...", "Out of lqi, lqr and policy, or all.")] = "all",
+    controllers: Annotated[str, option("C,...", "Out of lqi, lqr, mppi, pid and policy, or all.")] = "all",
     scenarios: Annotated[
         str, option("S,...", "Out of exact, calm, noise, delay, light, severe and all, or `every`.")
     ] = "every",
     episodes: Annotated[
-        int, option("N", "Flights of each cell; with exact state they are all alike.", min=1)
+        int, option("N", "Flights of each cell; 1 with exact state, at most 5 of mppi.", min=1)
     ] = 10,
     seed: SeedOption = EVALUATION_SEED,
     out: Annotated[Path, option("DIR", "Folder of the report and its figures.")] = Path(
@@ -40,11 +40,15 @@ def falcon(
     exact (state as it is), calm (sensors of 100 Hz with 0.05 m, 0.05 m/s, 0.01 rad, 0.01 rad/s), calm with twice the
     noise, a delay of 20 ms, light or severe Dryden turbulence, or noise, delay and light turbulence in `all`.
     `rmse_per_axis_m` is √(mean e² / 3), as the thesis prints it, `rmse_m` √(mean e²), medians over the flights that
-    survive. A flight survives if the hull touches no water and no angle of attack goes beyond 1.5 times the stall's.
+    survive, and `wall_s` what the flights of a cell took side by side. Where no scenarios are named mppi flies `exact`
+    alone, in 5 flights that differ by the seeds of its noise. A flight survives if the hull touches no water and no
+    angle of attack goes beyond 1.5 times the stall's.
 
     Try:
 
     fulmar benchmark falcon --tasks a,d --controllers lqi --scenarios exact,calm --json
+
+    fulmar benchmark falcon --tasks a,b,c,d,e,f --controllers lqi,mppi,pid --scenarios exact
     """
     from fulmar_benchmarks.falcon.campaign import Request, run_falcon
     from fulmar_benchmarks.falcon.cells import CONTROLLERS, SCENARIOS, TASKS
@@ -60,6 +64,7 @@ def falcon(
         tuple(read_names(tasks, "task", TASKS)),
         tuple(read_names(controllers, "controller", CONTROLLERS)),
         chosen,
+        ("exact",) if scenarios == "every" else chosen,
         episodes,
         seed,
         jobs or len(os.sched_getaffinity(0)),

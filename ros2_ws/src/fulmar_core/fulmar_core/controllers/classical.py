@@ -6,7 +6,7 @@ The explicit table. Another law is one file here and one entry below.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +35,9 @@ from fulmar_core.controllers.flight_lqi import (
     flight_lqi_weights,
     flight_lqr_weights,
 )
+from fulmar_core.controllers.flight_mppi import FlightMppi, MppiSettings, mppi_settings
+from fulmar_core.controllers.flight_pid import FlightPid, FlightPidGains
+from fulmar_core.controllers.flight_pid_gains import flight_pid_gains
 from fulmar_core.controllers.law import Law
 from fulmar_core.controllers.line_of_sight import LineOfSight, LineOfSightGains
 from fulmar_core.controllers.lqr import Lqr, LqrWeights
@@ -100,6 +103,8 @@ ATTITUDE_LAWS = {
 FLIGHT_LAWS = {
     "lqi": Entry(FlightLqi, FlightWeights, ("follow_reference",), flight_lqi_weights),
     "lqr": Entry(FlightLqr, FlightWeights, ("follow_reference",), flight_lqr_weights),
+    "mppi": Entry(FlightMppi, MppiSettings, ("follow_reference",), mppi_settings),
+    "pid": Entry(FlightPid, FlightPidGains, ("follow_reference",), flight_pid_gains),
 }
 FLYING_FAMILIES = tuple(kind for kind, each in FAMILIES.items() if each.flies)
 TURNING_FAMILIES = tuple(kind for kind, each in FAMILIES.items() if each.turns_only)
@@ -221,7 +226,7 @@ def has_law(robot: Robot, task: Task) -> bool:
 
 
 def load_classical(
-    robot: Robot, task: Task, *, control_hz: float | None = None, law: str | None = None
+    robot: Robot, task: Task, *, control_hz: float | None = None, law: str | None = None, seed: int = 0
 ) -> Law:
     """The law for a robot and a task, with the gains that `gains_of` finds.
 
@@ -230,6 +235,7 @@ def load_classical(
         task: The task.
         control_hz: Command rate; the robot's own by default [Hz].
         law: Name of the law; by default the one of the robot's family, called "classical".
+        seed: Of the noise of a law that draws any; added to the one of its gains.
 
     Raises:
         ConfigError: No law for the pair, no gains for this robot, a mistake in them, or a rate that the physics
@@ -237,8 +243,11 @@ def load_classical(
     """
     check_pair(robot, task, law=law)
     entry = entry_of(robot, law)
+    gains = gains_of(robot, law)
+    if seed and isinstance(gains, MppiSettings):
+        gains = replace(gains, seed=gains.seed + seed)
     try:
-        return entry.law(robot, task, gains_of(robot, law), control_hz=control_hz, name=law or "classical")
+        return entry.law(robot, task, gains, control_hz=control_hz, name=law or "classical")
     except ValueError as error:
         hz = control_hz or robot.timing.control_hz
         raise ConfigError(f"{entry.law.law} for '{robot.name}' at {hz:g} Hz: {error}") from error

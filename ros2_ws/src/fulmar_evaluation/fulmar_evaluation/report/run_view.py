@@ -18,6 +18,8 @@ DISPLAY_NAMES = {
     "lqr": "LQR",
     "pd": "PD",
     "mpc": "MPC",
+    "mppi": "MPPI",
+    "pid": "PID",
     "lqr_drift": "DRIFT's LQR",
     "policy": "policy",
     "classical": "classical law",

@@ -30,9 +30,9 @@ def answers_of(
     hz = course.settings.control_rate(course.robot)
 
     def load(bundle: str) -> Controller:
-        return load_controller(
-            name, course.robot, course.task, Choice(hz, bundle, excitation=course.settings.excitation)
-        )
+        settings = course.settings
+        choice = Choice(hz, bundle, excitation=settings.excitation, seed=settings.seed)
+        return load_controller(name, course.robot, course.task, choice)
 
     law, fallback = course.settings.fallback, None
     if controller_entry(name).runs_bundle and law:  # nothing else has one in the node

@@ -1,0 +1,133 @@
+"""Many flights of a craft into the future, on the core's own dynamics in still air, and what they cost."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from fulmar_core.actuators.flight_actuation import FlightActuation
+from fulmar_core.attitude import length
+from fulmar_core.controllers.flight_lqi import FlightLqr
+from fulmar_core.controllers.flight_reference import Aim
+from fulmar_core.flight.dynamics import FlightDynamics
+from fulmar_core.flight.trim import still_air
+from fulmar_core.motion import actuation_of
+from fulmar_core.robot import Robot
+from fulmar_core.rotation import Array
+from fulmar_core.spatial import SpatialState
+
+WORST = 1e12  # of a second of a flight that is no number [-]
+
+
+@dataclass(frozen=True)
+class FlightCost:
+    """What a second of flight costs; FALCON-S has a hundredth of these numbers for each step of 10 ms."""
+
+    height: float = 400.0  # per m away from the reference
+    side: float = 1000.0  # per m
+    turning: float = 300.0  # per rad/s of the three turn rates together
+    speed: float = 450.0  # per m/s away from the cruising speed
+    sideslip: float = 5.0  # times e^(2 |sideslip in degrees|) - 1
+    lost: float = 1e9  # in the water, or beyond `alpha_deg` either way
+    alpha_deg: float = 5.0  # angles of attack beyond count as lost [deg]
+
+    def __post_init__(self) -> None:
+        if min(self.height, self.side, self.turning, self.speed, self.sideslip, self.lost) < 0.0:
+            raise ValueError("costs must not be negative.")
+        if self.alpha_deg <= 0.0:
+            raise ValueError(f"alpha_deg = {self.alpha_deg:g} must be greater than 0.")
+
+
+class FlightRollouts:
+    """Flights of some craft side by side; those of one craft begin alike and differ by their corrections."""
+
+    def __init__(
+        self, robot: Robot, law: FlightLqr, cost: FlightCost, *, step_s: float, share: float
+    ) -> None:
+        """Prepare.
+
+        Args:
+            robot: An aircraft.
+            law: That flights follow.
+            cost: What they are measured by.
+            step_s: Time step [s].
+            share: Of the law's answer to departures that they follow; 0: commands of level flight alone [-].
+        """
+        assert robot.airframe is not None  # as of `FlightLaw.follow`
+        timing = replace(robot.timing, physics_dt=step_s, control_hz=1.0 / step_s)
+        self._robot = replace(robot, timing=timing)
+        self._dynamics = FlightDynamics(self._robot, turbulent=False)
+        self._law, self._cost, self._dt, self._share = law, cost, step_s, share
+        self._speed, self._lowest = robot.airframe.speed, -robot.hull_span[0]
+        self._world: Any = still_air(self._robot, 1)
+
+    def fly(
+        self, state: SpatialState, servos: np.ndarray, aims: Sequence[Aim], corrections: np.ndarray
+    ) -> np.ndarray:
+        """Cost of every flight.
+
+        Args:
+            state: Of n craft, shapes (n,).
+            servos: As of `FlightLqi.servos_after`, shape (n, ...).
+            aims: At the beginning and after each step.
+            corrections: Added to the commands of each step, shape (steps, n, flights, m).
+
+        Returns:
+            Shape (n, flights).
+        """
+        steps, count, each, commands = corrections.shape
+        total = count * each
+        if len(self._world.mass) != total:
+            self._world = still_air(self._robot, total)
+        state = state.mapped(lambda part: np.repeat(part, each))
+        actuation = actuation_of(self._robot, np.repeat(servos[:, :commands].T, each, axis=1))
+        assert isinstance(actuation, FlightActuation)  # of every aircraft
+        actuation.servo_rates = np.repeat(servos[:, commands:].T, each, axis=1)
+        still, cost = (np.zeros(total),) * 3, np.zeros(total)
+        for step in range(steps):
+            now = np.concatenate((actuation.applied, actuation.servo_rates)).T
+            wanted = self._followed(state, aims[step], now) + corrections[step].reshape(total, commands)
+            actuation.begin(np.asarray(self._robot.actuators.limited(wanted)).T.copy(), self._world, None)
+            state = self._dynamics.move(
+                state, actuation, self._world, still, substeps=1, latest_s=0.0, off_centre=False
+            )
+            cost += self._dt * self._per_second(state, np.repeat(aims[step + 1].place, each, axis=0))
+        return cost.reshape(count, each)
+
+    def _followed(self, states: SpatialState, aim: Aim, servos: np.ndarray) -> np.ndarray:
+        if self._share == 0.0:
+            level = self._law.level(self._law.schedule, aim)
+            return np.repeat(level, len(states.x) // len(level), axis=0)
+        return self._law.answers(states, aim, servos, share=self._share)
+
+    def _per_second(self, state: SpatialState, place: np.ndarray) -> np.ndarray:
+        """Cost of a second in a state, shape (total,)."""
+        c = self._cost
+        ahead, left, up = state.velocity_in_body
+        speed = length(state.velocity)
+        alpha = np.degrees(np.arctan2(-up, ahead))
+        slip = np.degrees(np.abs(np.arctan2(left, np.hypot(ahead, up))))
+        cost = c.height * np.abs(state.z - place[:, 1]) + c.side * np.abs(state.y - place[:, 0])
+        cost += c.turning * _sum_of_sizes(state.rate) + c.speed * np.abs(speed - self._speed)
+        cost += c.sideslip * np.expm1(np.minimum(2.0 * slip, 20.0))
+        # The dynamics stop a craft in the water where it was before it touched it.
+        lost = (state.z <= self._lowest) | (speed == 0.0) | (np.abs(alpha) > c.alpha_deg)
+        return np.where(np.isfinite(cost), cost + c.lost * lost, WORST)
+
+
+def _sum_of_sizes(parts: tuple[Array, ...]) -> np.ndarray:
+    return np.asarray(sum(np.abs(part) for part in parts))
+
+
+def loss_angle(robot: Robot) -> float:
+    """Angle of attack that flights avoid: the end of what the coefficients are for, or most of the stall's [deg]."""
+    assert robot.airframe is not None
+    coefficients, stall = robot.airframe.aerodynamics, 0.75 * robot.airframe.stall_deg
+    if coefficients.alpha_range is None:
+        return stall
+    end = coefficients.alpha_range[1]
+    return min(end if coefficients.unit == "deg" else math.degrees(end), stall)
