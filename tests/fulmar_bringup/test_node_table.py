@@ -20,6 +20,15 @@ PLAN = RunPlan("floating_platform", "go_to_pose", "lqr", "mujoco", 50.0)
 SYSTEMS = pytest.mark.parametrize("system", config_names("systems"))
 
 
+def test_only_a_controller_that_draws_gets_the_seed_of_the_run():
+    plan = replace(PLAN, robot="airship_v7", task="fly_a", seed=3)
+    rows = {
+        name: controller_spec(replace(plan, controller=name)).parameters for name in ("mppi", "pid", "lqi")
+    }
+    assert rows["mppi"]["seed"] == 3
+    assert "seed" not in rows["pid"] | rows["lqi"]
+
+
 def by_name(nodes):
     return {node.name: node for node in nodes}
 

@@ -43,7 +43,23 @@ class Request:
 
 def run_falcon(request: Request, progress: Progress) -> dict[str, Any]:
     """Fly every cell, and put the figures together; JSON-ready."""
-    cells = [
+    cells = cells_of(request)
+    flown = mapped(_fly, [(cell,) for cell in cells], jobs=request.jobs, progress=progress)
+    tasks: dict[str, Any] = {}
+    for cell, figures in zip(cells, flown, strict=True):
+        tasks.setdefault(cell.task, {}).setdefault(cell.controller, {})[cell.scenario] = figures
+    return {
+        "robot": request.robot,
+        "seed": request.seed,
+        "episodes": request.episodes,
+        "tasks": tasks,
+        "ground_effect": ground_effect(request.robot),
+    }
+
+
+def cells_of(request: Request) -> list[Cell]:
+    """What is flown, in its order; of policies only those that are shipped."""
+    return [
         Cell(
             request.robot,
             task,
@@ -57,17 +73,6 @@ def run_falcon(request: Request, progress: Progress) -> dict[str, Any]:
         for scenario in (request.random_scenarios if controller in RANDOM else request.scenarios)
         if controller != "policy" or shipped_policy(request.robot, f"fly_{task}") is not None
     ]
-    flown = mapped(_fly, [(cell,) for cell in cells], jobs=request.jobs, progress=progress)
-    tasks: dict[str, Any] = {}
-    for cell, figures in zip(cells, flown, strict=True):
-        tasks.setdefault(cell.task, {}).setdefault(cell.controller, {})[cell.scenario] = figures
-    return {
-        "robot": request.robot,
-        "seed": request.seed,
-        "episodes": request.episodes,
-        "tasks": tasks,
-        "ground_effect": ground_effect(request.robot),
-    }
 
 
 def _episodes(request: Request, controller: str, scenario: str) -> int:

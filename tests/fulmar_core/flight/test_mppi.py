@@ -1,0 +1,119 @@
+"""MPPI of aircraft: what it holds, that a seed repeats a flight, and which settings are refused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fulmar_benchmarks.falcon.cells import SCENARIOS, Cell, fly
+from fulmar_core.controllers.classical import load_classical
+from fulmar_core.controllers.flight_lqi import FlightLqr
+from fulmar_core.controllers.flight_mppi import FlightMppi, mppi_settings
+from fulmar_core.controllers.flight_reference import Aim
+from fulmar_core.controllers.flight_rollouts import FlightCost, FlightRollouts
+from fulmar_core.errors import ConfigError
+from fulmar_core.flight.trim import find_trim
+from fulmar_core.robot import load_robot
+from fulmar_core.rollout import roll_out_in_batch
+from fulmar_core.tasks import load_task
+
+ROBOT = load_robot("airship_v7")
+TASK = load_task("fly_a").fitted(ROBOT)
+SETTINGS = replace(mppi_settings(ROBOT), observer=None)
+FEW = replace(SETTINGS, rollouts=8, horizon_s=0.4)
+
+
+def flown(settings, *, seconds, seeds=(0,)):
+    """Flights along (a) with exact state, one for each seed."""
+    law = FlightMppi(ROBOT, TASK, settings)
+    law.seeds = seeds
+    task = replace(TASK, episode_s=seconds)
+    return roll_out_in_batch(law, ROBOT, task, SCENARIOS["exact"], episodes=len(seeds), seed=1)
+
+
+def test_it_stays_within_three_centimetres_over_the_water():
+    run = flown(SETTINGS, seconds=1.0)
+    assert not run.touching.any()
+    assert np.max(run.position_error) <= 0.03
+
+
+def test_without_the_law_it_flies_by_its_plans_alone():
+    open_loop = replace(SETTINGS, feedback=0.0, noise=(0.05, 0.05, 0.05, 0.1, 0.1), temperature=3.0)
+    run = flown(open_loop, seconds=1.0)
+    assert not run.touching.any()
+    assert np.max(run.position_error) <= 0.15
+
+
+def test_a_seed_repeats_a_flight_and_another_seed_does_not():
+    first, again, other = (flown(FEW, seconds=0.2, seeds=(seed,)) for seed in (3, 3, 4))
+    np.testing.assert_array_equal(first.shares, again.shares)
+    assert np.abs(np.asarray(first.shares) - np.asarray(other.shares)).max() > 1e-3
+
+
+def test_craft_side_by_side_fly_as_each_would_alone_with_its_seed():
+    both = flown(FEW, seconds=0.2, seeds=(3, 4))
+    for row, seed in enumerate((3, 4)):
+        alone = flown(FEW, seconds=0.2, seeds=(seed,))
+        np.testing.assert_allclose(both.shares[row], alone.shares[0], atol=1e-6)
+
+
+def test_the_seed_of_a_run_is_that_of_the_noise_and_part_of_the_identity():
+    laws = [load_classical(ROBOT, TASK, law="mppi", seed=seed) for seed in (0, 5)]
+    assert [law.seeds for law in laws] == [(0,), (5,)]
+    assert laws[0].metadata()["sha256"] != laws[1].metadata()["sha256"]
+
+
+def test_a_flight_into_the_water_costs_more_than_any_other():
+    weights = replace(SETTINGS.law, observer=None)
+    rollouts = FlightRollouts(ROBOT, FlightLqr(ROBOT, TASK, weights), FlightCost(), step_s=0.04, share=0.0)
+    trim = find_trim(ROBOT, 28.0, 1.0)
+    state = trim.state.mapped(lambda part: np.asarray(part)[None])
+    servos = np.concatenate((trim.command, np.zeros(3)))[None]
+    aim = Aim(np.array([[0.0, 1.0]]), np.zeros((1, 2)), np.zeros((1, 2)))
+    corrections = np.zeros((25, 1, 2, 5))
+    corrections[:, 0, 1, 0] = 0.3  # nose down
+    level, diving = rollouts.fly(state, servos, [aim] * 26, corrections)[0]
+    assert level < 10.0
+    assert diving > 1e7
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"step_s": 0.05}, "step_s = 0.05 must be greater than 0, and at most 0.04 s"),
+        ({"plan_hz": 10.0}, "plan_hz = 10 must be at least 20"),
+        ({"rollouts": 7}, "rollouts = 7 must be an even number"),
+        ({"knot_s": 3.0}, "step_s <= knot_s <= horizon_s"),
+        ({"temperature": 0.0}, "temperature and every noise must be greater than 0"),
+        ({"noise": (0.1, 0.0)}, "temperature and every noise must be greater than 0"),
+        ({"feedback": 2.0}, r"feedback = 2 must lie in \[0, 1\]"),
+        ({"seed": -1}, "seed = -1 must not be negative"),
+        ({"cost": {"height": -1.0}}, "costs must not be negative"),
+    ],
+)
+def test_settings_that_make_no_sense_are_refused(changed, said):
+    with pytest.raises(ValueError, match=said):
+        if "cost" in changed:
+            changed = {"cost": FlightCost(**changed["cost"])}
+        replace(SETTINGS, **changed)
+
+
+def test_noise_has_one_number_for_each_command():
+    with pytest.raises(ValueError, match="'noise' needs 5 numbers: elevator, aileron, rudder, throttle_left"):
+        FlightMppi(ROBOT, TASK, replace(SETTINGS, noise=(0.1, 0.1)))
+
+
+def test_it_is_for_aircraft():
+    boat = load_robot("kingfisher")
+    with pytest.raises(ConfigError, match=r"'mppi' is for robots with control_surfaces"):
+        load_classical(boat, load_task("go_to_position"), law="mppi")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("task", ["a", "d", "e"])
+def test_five_seeds_stay_within_three_centimetres_rms_for_a_minute(task):
+    found = fly(Cell("airship_v7", task, "mppi", "exact", 5, 3))
+    assert found["survival"] == 1.0
+    assert found["rmse_per_axis_worst_m"] <= 0.03
