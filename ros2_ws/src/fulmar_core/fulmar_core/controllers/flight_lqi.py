@@ -109,16 +109,13 @@ class FlightLqi(FlightLaw):
             aim: Of n craft.
             servos: As of `servos_after`.
         """
-        limit = self.gains.error_limit
-        off = np.clip(np.stack((state.y, state.z), axis=-1) - aim.place, -limit, limit)
         level = self.level(self.schedule, aim)
-        x = np.concatenate(
-            (off, self.motion(self.schedule, state, aim), self._actuators(servos, level)), axis=-1
-        )
+        x = self._departures(state, aim, servos, level)
         if self._integrates:
             assert self._sums is not None  # as of `servos_after`
+            off = x[:, :2]
             x = np.concatenate((x, self._sums), axis=-1)
-            free = np.abs(off) < limit
+            free = np.abs(off) < self.gains.error_limit
             self._sums = self._sums + self._dt * np.where(free, off, 0.0)
         gain = self.schedule.array(aim.place[:, 1])
         return np.asarray(level - np.einsum("nij,nj->ni", gain, x))
@@ -137,15 +134,18 @@ class FlightLqi(FlightLaw):
         count = len(aim.place)
         each = len(states.x) // count
         own = Aim(*(np.repeat(part, each, axis=0) for part in (aim.place, aim.rate, aim.bend)))
-        limit = self.gains.error_limit
-        off = np.clip(np.stack((states.y, states.z), axis=-1) - own.place, -limit, limit)
         level = np.repeat(self.level(self.schedule, aim), each, axis=0)
-        x = np.concatenate(
-            (off, self.motion(self.schedule, states, own), self._actuators(servos, level)), axis=-1
-        )
+        x = self._departures(states, own, servos, level)
         gain = self.schedule.array(aim.place[:, 1])[..., : x.shape[-1]]
         back = x.reshape(count, each, -1) @ gain.transpose(0, 2, 1)
         return np.asarray(level - share * back.reshape(count * each, -1))
+
+    def _departures(self, state: SpatialState, aim: Aim, servos: np.ndarray, level: np.ndarray) -> np.ndarray:
+        """Departures from level flight along an aim, those of the place cut, shape (n, k)."""
+        limit = self.gains.error_limit
+        off = np.clip(np.stack((state.y, state.z), axis=-1) - aim.place, -limit, limit)
+        parts = off, self.motion(self.schedule, state, aim), self._actuators(servos, level)
+        return np.concatenate(parts, axis=-1)
 
     def _actuators(self, servos: np.ndarray, level: np.ndarray) -> np.ndarray:
         """Departures of deflections, their rates, and levels, shape (n, k); servos as of `servos_after`."""

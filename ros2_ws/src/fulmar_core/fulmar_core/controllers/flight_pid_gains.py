@@ -1,8 +1,8 @@
 """Gains of the cascaded PID of an aircraft by rule, from its linear model at cruise.
 
-The innermost loops get natural frequencies, their damping counts what the air damps already, and each loop outside is
-slower by a fixed ratio. Of the frequencies that are tried the one is taken with which the slowest mode of the whole
-craft, servos and motors included, dies out fastest while every oscillation is damped well.
+The innermost loops turn the craft like an oscillator of some frequency and damping, of which the air brings its part.
+Of those and of the frequencies of the place that are tried, the gains are those of the fastest place with which every
+mode of the whole craft, servos, motors and integrals included, is damped well.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 
@@ -61,33 +61,18 @@ class _Loops:
         """Limits, and the gains of the airspeed, which motors set."""
         lag = max((motor.lag_s for motor in self._craft.motors), default=0.0)
         speed, size = min(0.5, 0.25 / max(lag, 0.01)), self._frame.span / 5.0
-        return FlightPidGains(
-            **dict.fromkeys(
-                (
-                    "height",
-                    "height_integral",
-                    "climb",
-                    "pitch",
-                    "pitch_rate",
-                    "side",
-                    "side_integral",
-                    "drift",
-                ),
-                0.0,
-            ),
-            path_lag_s=-1.0 / float(self._rates[8, 8]),
-            roll=0.0,
-            roll_rate=0.0,
-            yaw_rate=0.0,
-            speed=speed,
-            speed_integral=0.1 * speed * speed,
-            height_limit=0.5 * size,
-            side_limit=2.0 * size,
-            pitch_limit_deg=3.0,
-            bank_limit_deg=20.0,
-            smooth_s=0.6,
-            observer=ObserverNoise() if self._robot.sensors.odometry.position.std > 0.0 else None,
-        )
+        found = dict.fromkeys((field.name for field in fields(FlightPidGains)), 0.0) | {
+            "path_lag_s": -1.0 / float(self._rates[8, 8]),
+            "speed": speed,
+            "speed_integral": 0.1 * speed * speed,
+            "height_limit": 0.5 * size,
+            "side_limit": 2.0 * size,
+            "pitch_limit_deg": 3.0,
+            "bank_limit_deg": 20.0,
+            "smooth_s": 0.6,
+        }
+        noisy = self._robot.sensors.odometry.position.std > 0.0
+        return FlightPidGains(**found | {"observer": ObserverNoise() if noisy else None})  # type: ignore[arg-type]
 
     def along(self, gains: FlightPidGains, inner: Inner, outer: float) -> FlightPidGains:
         """Gains of pitch and height, of the loop of the pitch, and a frequency of the height [rad/s]."""
@@ -131,11 +116,11 @@ class _Loops:
         surfaces: Sequence[str],
         sums: Sequence[int],
     ) -> FlightPidGains:
-        """Gains of the best frequency; of the slowest one tried where none is damped well.
+        """Gains of the fastest place with which every mode is damped well; where there are none, those damped best.
 
         Args:
             gains: Gains of the rest.
-            laid_out: Gains of a frequency.
+            laid_out: Gains of an inner loop and a frequency of the place.
             motion: States that the loops are about.
             surfaces: That they deflect.
             sums: Their integrals.
