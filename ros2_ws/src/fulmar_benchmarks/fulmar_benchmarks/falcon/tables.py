@@ -12,7 +12,7 @@ def lines(document: dict[str, Any]) -> list[str]:
     """Every figure beside the thesis', then what is required."""
     found = [
         f"{document['robot']}, seed {document['seed']}; RMSE per axis in m, of the thesis in brackets (*: crashed)",
-        f"{'task':5} {'by':7} {'scenario':8} {'RMSE':>16} {'worst':>8} {'altitude':>8} {'peak':>7} {'settles':>8} "
+        f"{'task':5} {'by':7} {'scenario':8} {'RMSE':>17} {'worst':>8} {'altitude':>8} {'peak':>7} {'settles':>8} "
         f"{'energy':>7} {'alive':>6} {'wall s':>7}",
     ]
     for task, controllers in document["tasks"].items():
@@ -25,7 +25,7 @@ def lines(document: dict[str, Any]) -> list[str]:
                 crash = "*" if each["thesis"].get("crashed") else ""
                 beside = f"({thesis:.3f}{crash})" if thesis is not None else ""
                 found.append(
-                    f"{task:5} {controller:7} {scenario:8} {_number(each['rmse_per_axis_m'], 4):>8}{beside:>8} "
+                    f"{task:5} {controller:7} {scenario:8} {_number(each['rmse_per_axis_m'], 4):>8}{beside:>9} "
                     f"{_number(each['rmse_per_axis_worst_m'], 4):>8} {_number(each['altitude_rmse_m'], 4):>8} "
                     f"{_number(each['peak_error_m'], 3):>7} {_number(each['settling_s'], 2):>8} "
                     f"{_number(each['energy'], 3):>7} {each['survival']:>6.2f} "
