@@ -63,6 +63,11 @@ class MockBackend:
         self._state = self._state.stopped()
         return self._sample(ticks)
 
+    @property
+    def time_s(self) -> float:
+        """Simulated time since the episode began [s]."""
+        return self._ticks * self.robot.timing.physics_dt
+
     def make_safe(self) -> None:
         """Nothing to do: a command acts only during a step."""
 
@@ -80,8 +85,6 @@ class MockBackend:
         self._ticks += ticks
         truth = self._state[0].to_rigid()
         wheels = wheel_speeds_of(self.robot, self._world.actuation)
-        others = self._sensors.measure(
-            Truth(truth, wheels=wheels, air=self._air()), self._ticks * self.robot.timing.physics_dt
-        )
+        others = self._sensors.measure(Truth(truth, wheels=wheels, air=self._air()), self.time_s)
         things = {name: pose[0] for name, pose in self._poses.items()}
         return Sample({"odometry": Reading(truth), **others}, truth, things)

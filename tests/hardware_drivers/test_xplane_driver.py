@@ -1,0 +1,345 @@
+"""The driver of X-Plane against an emulated one at a UDP port: flight, and peers that vanish or lie."""
+
+from __future__ import annotations
+
+import re
+import socket
+import struct
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fulmar_core.errors import ConfigError, DeviceError
+from fulmar_core.rotation import rotate
+from hardware_drivers.driver_backend import DriverBackend, backend_of
+from hardware_drivers.presence import check_presence
+from hardware_drivers.settings import Geodetic, XPlane, load_hardware
+from hardware_drivers.xplane_driver import XPlaneDriver
+from tests.hardware_drivers.xplane_bench import ROBOT, START, Peer, XPlaneBench, episode_at, trim, until
+
+ORIGIN = Geodetic(49.5, -3.0)
+SILENT_S = 0.2
+
+
+def settings_of(address: str, **more: object) -> XPlane:
+    return replace(XPlane("xplane", address, origin=ORIGIN, silent_s=SILENT_S), **more)
+
+
+@pytest.fixture
+def bench():
+    bench = XPlaneBench()
+    yield bench
+    bench.stop()
+
+
+@pytest.fixture
+def driver(bench):
+    driver = backend_of(ROBOT, XPlaneDriver(ROBOT, settings_of(bench.device.address), patience_s=5.0))
+    yield driver
+    driver.close()
+
+
+def fly(driver: DriverBackend, seconds: float, command: Callable = lambda _sample: trim()):
+    """Fly with a command a hundred times a second; returns the last sample."""
+    sample = driver.step(trim())
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        sample = driver.step(command(sample))
+        time.sleep(0.01)
+    return sample
+
+
+def begin(driver: DriverBackend) -> None:
+    driver.reset(episode_at(START), seed=0)
+
+
+def test_x_plane_stands_still_until_the_flight_begins_and_after_its_end(bench, driver):
+    place = bench.sample.truth.position_in_world
+    time.sleep(0.1)
+    assert bench.device.paused
+    assert (bench.sample.truth.position_in_world == place).all()
+    begin(driver)
+    until(lambda: not bench.device.paused)
+    fly(driver, 0.2)
+    assert np.linalg.norm(bench.sample.truth.position_in_world - place) > 3.0
+    driver.close()
+    until(lambda: bench.device.paused)
+    assert bench.command == pytest.approx(ROBOT.actuators.safe_command)
+
+
+def test_every_command_moves_its_own_actuator_as_far_as_it_says(bench, driver):
+    commands = [*(0.5 * np.diag(ROBOT.actuators.scale)), trim(), ROBOT.actuators.safe_command]
+    for command in commands:
+        driver.step(command)
+        until(lambda command=command: np.allclose(bench.command, command, atol=1e-6))
+
+
+def test_stick_and_pedals_are_x_plane_s_own_on_the_wire():
+    """Nose down is a stick ahead, the right wing down a stick to the right, the nose to the left the left pedal."""
+    heard: dict[bytes, bytes] = {}
+    with Peer(lambda datagram: heard.__setitem__(datagram[:4], datagram)) as peer:
+        driver = XPlaneDriver(ROBOT, settings_of(peer.address), patience_s=5.0)
+        driver.write(np.array([1.0, 0.5, 1.0, 0.25, 0.75]) * ROBOT.actuators.scale)
+        until(lambda: {b"CTRL", b"DREF"} <= set(heard))
+        driver.close()
+    assert heard[b"CTRL"] == bytes.fromhex("4354524c00 000080bf 0000003f 000080bf 008079c4 ff 008079c4 00")
+    assert heard[b"DREF"] == b"DREF\0\x20sim/flightmodel/engine/ENGN_thro\x02\0\0\x80\x3e\0\0\x40\x3f"
+
+
+def test_odometry_inertial_unit_and_air_data_follow_the_aircraft(bench, driver):
+    begin(driver)
+    bank = trim() + np.array([0.0, 0.1, 0.0, 0.0, 0.0])  # to the right
+    sample = fly(driver, 0.5, lambda _sample: bank)
+    found, true = sample.odometry, bench.sample.truth
+    assert np.linalg.norm(true.position_in_world[:2] - START[:2]) > 10.0
+    assert rotate(true.quat_xyzw, np.array([0.0, 1.0, 0.0]))[2] > 0.05  # the left wing is up
+    assert found.position_in_world == pytest.approx(true.position_in_world, abs=1.5)  # 28 m/s, 50 ms old
+    assert found.velocity_in_world == pytest.approx(true.velocity_in_world, abs=0.5)
+    assert np.abs(found.quat_xyzw @ true.quat_xyzw) == pytest.approx(1.0, abs=1e-3)
+    assert found.angular_velocity_in_body == pytest.approx(true.angular_velocity_in_body, abs=0.1)
+    assert np.linalg.norm(sample.imu.specific_force) == pytest.approx(9.8, abs=2.0)
+    air = sample.readings["air_data"]
+    assert air.value.names == ("airspeed", "alpha", "beta", "height")
+    assert air.value.values == pytest.approx(bench.sample.readings["air_data"].value.values, abs=0.3)
+    assert 0 <= time.time_ns() - sample.stamp_ns < 250_000_000
+
+
+def wait_for_the_end(driver: DriverBackend | XPlaneDriver) -> str:
+    """Why the driver gives up; until then, no lie comes through."""
+    with pytest.raises(DeviceError) as found:
+        for _ in range(200):
+            odometry = (driver.step(trim()) if isinstance(driver, DriverBackend) else driver.read()).odometry
+            assert np.linalg.norm(odometry.position_in_world[:2]) < 300.0
+            assert np.linalg.norm(odometry.velocity_in_world) < 60.0
+            time.sleep(0.01)
+    return str(found.value)
+
+
+def safe_at(bench: XPlaneBench) -> None:
+    """Neutral surfaces and idle throttles have arrived."""
+    until(lambda: np.allclose(bench.command, ROBOT.actuators.safe_command), timeout_s=0.5)
+
+
+def test_an_x_plane_that_vanishes_is_one_line_and_a_safe_command(bench, driver):
+    begin(driver)
+    fly(driver, 0.1)
+    assert bench.command.any()
+    bench.device.mute = True
+    line = wait_for_the_end(driver)
+    driver.make_safe()
+    assert re.fullmatch(
+        r"X-Plane at udp://127\.0\.0\.1:\d+: no report for 2\d\d ms \(limit 200 ms\)\. Does X-Plane run there, "
+        r"not paused, with the plugin XPlaneConnect\?",
+        line,
+    )
+    safe_at(bench)
+
+
+def posi(change: Callable[[list], None]) -> Callable[[bytes], bytes]:
+    """A lie about the place alone."""
+
+    def lie(answer: bytes) -> bytes:
+        if not answer.startswith(b"POSI"):
+            return answer
+        fields = list(struct.unpack("<4sxB3d4f", answer))
+        change(fields)
+        return struct.pack("<4sxB3d4f", *fields)
+
+    return lie
+
+
+def resp(number: int, value: float) -> Callable[[bytes], bytes]:
+    """A lie about one value of the second answer."""
+
+    def lie(answer: bytes) -> bytes:
+        if not answer.startswith(b"RESP"):
+            return answer
+        at = 6 + 5 * number
+        return answer[:at] + struct.pack("<Bf", 1, value) + answer[at + 5 :]
+
+    return lie
+
+
+def far(fields: list) -> None:
+    fields[2] += 0.05  # of latitude: 5.6 km
+
+
+def nowhere(fields: list) -> None:
+    fields[4] = float("nan")
+
+
+def coarse(answer: bytes) -> bytes:
+    if not answer.startswith(b"POSI"):
+        return answer
+    return struct.pack("<4sxB7f", *struct.unpack("<4sxB3d4f", answer))
+
+
+LIES = {
+    "an altitude that is no number": (posi(nowhere), "POSI of 46 bytes: a number is not finite"),
+    "a jump of 5 km": (posi(far), r"its place jumped by 55\d\d\.\d m within"),
+    "a velocity of 900 m/s": (resp(0, 900.0), r"its speed 90\d\.\d\d m/s is beyond the possible 56 m/s"),
+    "a turn rate that is infinite": (resp(6, float("inf")), "a number is not finite"),
+    "a turn rate of 40 rad/s": (resp(7, 2300.0), r"its turn rate 40\.\d\d rad/s is beyond the possible 8"),
+    "answers that are cut": (lambda answer: answer[:-3], "POSI of 43 bytes: must have 46|RESP of"),
+    "answers of another protocol": (lambda answer: b"RREF," + answer[5:], "is no head of a datagram"),
+    "counts that lie": (
+        lambda answer: answer[:5] + b"\xff" + answer[6:],
+        "a count goes beyond its end|aircraft 255",
+    ),
+    "unknown references": (
+        lambda answer: answer[:6] + b"\0" + answer[11:] if answer.startswith(b"RESP") else answer,
+        "RESP has no value of sim/flightmodel/position/local_vx",
+    ),
+    "places in float32": (coarse, "install XPlaneConnect 1.3"),
+    "questions in the place of answers": (lambda _answer: b"GETP\0\0", "AskPosition was not asked for"),
+}
+
+
+FAST = ("an altitude that is no number", "a jump of 5 km", "a velocity of 900 m/s", "answers that are cut")
+
+
+@pytest.mark.parametrize(
+    "name", [*FAST, *(pytest.param(n, marks=pytest.mark.slow) for n in LIES if n not in FAST)]
+)
+def test_what_an_x_plane_that_lies_says_is_never_flown_by_and_one_line_says_why(name):
+    lie, says = LIES[name]
+    with Peer() as peer:
+        driver = XPlaneDriver(ROBOT, settings_of(peer.address, silent_s=0.08), patience_s=5.0)
+        driver.begin(0.0, 0.0, 0.0)
+        try:
+            time.sleep(0.03)
+            driver.read()
+            peer.lie = lie
+            line = wait_for_the_end(driver)
+            assert re.search(
+                rf"no report for \d+ ms \(limit 80 ms\); \d+ refused, the last: .*({says})", line
+            )
+            assert "\n" not in line
+            assert re.search(says, driver.health()["warning"])
+            assert int(driver.health()["refused_datagrams"]) > 1
+        finally:
+            driver.close()
+
+
+def test_an_x_plane_that_lies_gets_the_safe_command(bench, driver):
+    begin(driver)
+    fly(driver, 0.05)
+    assert bench.command.any()
+    bench.device.lie = LIES["a jump of 5 km"][0]
+    wait_for_the_end(driver)
+    driver.make_safe()
+    safe_at(bench)
+
+
+@pytest.fixture
+def peer():
+    with Peer() as peer:
+        yield peer
+
+
+def driver_of(peer: Peer, **more: object) -> Iterator[XPlaneDriver]:
+    driver = XPlaneDriver(ROBOT, settings_of(peer.address, **more), patience_s=5.0)
+    try:
+        driver.begin(3.0, 2.0, 0.0)
+        time.sleep(0.05)
+        driver.read()
+        yield driver
+    finally:
+        driver.close()
+
+
+def test_without_an_origin_odometry_begins_at_the_start_and_height_stays_above_the_water(peer):
+    for driver in driver_of(peer, origin=None, elevation=1.5):
+        here = driver.read().odometry.position_in_world
+        assert here[0] == pytest.approx(3.0, abs=1e-3)
+        assert 2.0 < here[1] < 5.0  # it flies to the north
+        assert here[2] == pytest.approx(5.0 - 1.5)
+
+
+def test_an_x_plane_that_is_paused_in_flight_is_lost(peer):
+    for driver in driver_of(peer, silent_s=0.3):
+        peer.lie = resp(13, 0.5)  # its clock
+        assert "the last: X-Plane's time stands still. Does" in wait_for_the_end(driver)
+
+
+def test_a_gap_that_is_shorter_than_the_limit_is_flown_through(peer):
+    for driver in driver_of(peer):
+        peer.lie = lambda _answer: b""
+        for _ in range(10):
+            time.sleep(0.01)
+            driver.read()
+        before, peer.lie = time.time_ns(), lambda answer: answer
+        until(lambda before=before, driver=driver: driver.read().stamp_ns > before, timeout_s=0.5)
+
+
+def test_one_datagram_that_is_spoilt_changes_nothing(peer):
+    for driver in driver_of(peer):
+        spoilt = iter([True])
+        peer.lie = lambda answer, spoilt=spoilt: posi(far)(answer) if next(spoilt, False) else answer
+        until(
+            lambda driver=driver: driver.health() == {"refused_datagrams": "1", "warning": ""}, timeout_s=0.5
+        )
+        assert driver.read().odometry.position_in_world[:2] == pytest.approx((0.0, 10.0), abs=10.0)
+
+
+def test_datagrams_of_a_stranger_are_not_received(peer):
+    for driver in driver_of(peer):
+        address = driver._port._socket.getsockname()
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
+            for _ in range(50):
+                stranger.sendto(b"POSI\0 nonsense", address)
+        time.sleep(0.05)
+        assert driver.health()["refused_datagrams"] == "0"
+
+
+def free_port() -> int:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def test_nobody_at_the_other_end_is_refused_with_a_hint(monkeypatch):
+    address = f"udp://127.0.0.1:{free_port()}"
+    with pytest.raises(
+        DeviceError, match=r"said nothing that can be read for 0\.1 s\. Does X-Plane run there"
+    ):
+        XPlaneDriver(ROBOT, settings_of(address), patience_s=0.1)
+    monkeypatch.setattr("hardware_drivers.presence.CONNECT_S", 0.1)
+    with pytest.raises(DeviceError, match=rf"{address}: no answer within 0\.1 s\. Does X-Plane run there"):
+        check_presence(settings_of(address))
+
+
+def test_an_x_plane_that_answers_is_present(peer, monkeypatch):
+    check_presence(settings_of("udp://127.0.0.1:9"), peer.address)
+    peer.lie = lambda _answer: b"HTTP/1.1 400"
+    monkeypatch.setattr("hardware_drivers.presence.CONNECT_S", 0.1)
+    with pytest.raises(DeviceError, match=r"no answer within 0\.1 s; what came: b'HTTP/' is no head"):
+        check_presence(settings_of(peer.address))
+
+
+MINE = "title: t\nrobot: ROBOT\ndriver: {kind: xplane, MORE}\n"
+
+
+@pytest.mark.parametrize(
+    ("robot", "more", "says"),
+    [
+        (
+            "airship_v7",
+            "port: tcp://localhost:1",
+            r"must be udp://host:port; the plugin listens at port 49009",
+        ),
+        ("airship_v7", "silent_s: 60", "silent_s from 0.05 to 10 s"),
+        ("airship_v7", "rate_hz: 0", "rate_hz must be from 1 to 1000 Hz"),
+        ("airship_v7", "elevation: .nan", "elevation"),
+        ("airship_v7", "orign: {latitude: 1, longitude: 1}", "Did you mean 'origin'"),
+        ("kingfisher", "silent_s: 1", "driver 'xplane' cannot move 'kingfisher', which has propellers"),
+    ],
+)
+def test_a_mistake_in_the_file_is_reported(tmp_path, robot, more, says):
+    path = tmp_path / "mine.yaml"
+    path.write_text(MINE.replace("ROBOT", robot).replace("MORE", more))
+    with pytest.raises(ConfigError, match=says):
+        load_hardware(str(path))
