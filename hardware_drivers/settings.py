@@ -204,7 +204,8 @@ class XPlane:
 
     kind: Literal["xplane"]
     port: str = "udp://127.0.0.1:49009"  # of the plugin
-    origin: Geodetic | None = None  # where `odom` begins; None: where the aircraft is at the start
+    # Where `odom` begins, with x to the east; None: where the aircraft is at the start, with x ahead
+    origin: Geodetic | None = None
     elevation: float = 0.0  # of z = 0, the water or the runway, above mean sea level [m]
     rate_hz: float = 100.0  # of what is asked for; X-Plane answers once a frame
     silent_s: float = 0.5  # an X-Plane that sends nothing new and believable for so long is lost [s]

@@ -34,7 +34,7 @@ from hardware_drivers.xplane_messages import (
     Values,
 )
 from hardware_drivers.xplane_protocol import MalformedError, decode, encode
-from hardware_drivers.xplane_state import ASKED, Flight, flight_of, unbelievable
+from hardware_drivers.xplane_state import ASKED, Flight, Placed, flight_of, unbelievable
 
 THROTTLES = "sim/flightmodel/engine/ENGN_thro"  # of each engine, from the left, 0 to 1
 # A positive elevator lowers the nose and a positive rudder turns it left; stick and pedals do the opposite.
@@ -60,7 +60,7 @@ class XPlaneDriver(DeviceDriver):
         self._feedback = Feedback(f"X-Plane at {settings.port}", settings.silent_s, hint=HINT)
         origin = settings.origin
         self._frame = LocalFrame(origin.latitude, origin.longitude) if origin else None
-        self._shift = np.array([0.0, 0.0, -settings.elevation])  # from the local frame to `odom` [m]
+        self._odom = Placed.unmoved(settings.elevation)
         self._position: Position | None = None
         self._believed: tuple[RigidBodyState, int] | None = None  # in the local frame, and when [ns]
         self._time_s: float | None = None  # of X-Plane, in the last believed report
@@ -78,10 +78,9 @@ class XPlaneDriver(DeviceDriver):
             raise
 
     def begin(self, x: float, y: float, heading: float) -> None:
-        """Let X-Plane run; without an origin, set the aircraft's position in `odom`. See `DeviceDriver`."""
+        """Let X-Plane run; without an origin, set the aircraft's pose in `odom`. See `DeviceDriver`."""
         if self._settings.origin is None:
-            here = self._feedback.measured.position_in_world - self._shift
-            self._shift = np.array([x - here[0], y - here[1], self._shift[2]])
+            self._odom = Placed.at(self._feedback.measured, x, y, heading, self._settings.elevation)
         self._running = True
         self._send(Simulation(RUN))
 
@@ -159,13 +158,7 @@ class XPlaneDriver(DeviceDriver):
 
     def _report(self, flight: Flight, now_ns: int) -> Report:
         """A report of the sensors that the robot's file has."""
-        state, sensors = flight.state, self._robot.sensors.specs
-        state = RigidBodyState(
-            state.position_in_world + self._shift,
-            state.quat_xyzw,
-            state.velocity_in_world,
-            state.angular_velocity_in_body,
-        )
+        state, sensors = self._odom.seen(flight.state), self._robot.sensors.specs
         others = {}
         if AIR_DATA in sensors:
             others[AIR_DATA] = Reading(_chosen(flight.air, sensors[AIR_DATA].names), stamp_ns=now_ns)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fulmar_core.robot import Limits
-from fulmar_core.rotation import rotate_inverse
+from fulmar_core.rotation import from_yaw, multiply, rotate, rotate_inverse
 from fulmar_core.safety.input_gate import JUMP_M, InputGate, Measurement
 from fulmar_core.sensors.air_data import AirData, AirDataSpec
 from fulmar_core.sensors.imu import ImuSample
@@ -76,6 +76,36 @@ def flight_of(position: Position, answer: Values, frame: LocalFrame) -> Flight:
     force = rotate_inverse(quat, np.array([ax, -az, ay + G]))
     air = np.array([airspeed, math.radians(alpha), -math.radians(beta), height])
     return Flight(state, ImuSample(force, rates), AirData(AirDataSpec.NAMES, air), time_s)
+
+
+@dataclass(frozen=True)
+class Placed:
+    """Where `odom` begins, and where its x axis points."""
+
+    origin: np.ndarray  # (3,) in the local frame [m]
+    place: np.ndarray  # (3,) of that in `odom` [m]
+    turn: np.ndarray  # (4,) from the local frame, about z
+
+    @classmethod
+    def unmoved(cls, elevation: float) -> Placed:
+        """The local frame itself, with z from an elevation above mean sea level on [m]."""
+        return cls(np.array([0.0, 0.0, elevation]), np.zeros(3), from_yaw(np.zeros(())))
+
+    @classmethod
+    def at(cls, seen: RigidBodyState, x: float, y: float, heading: float, elevation: float) -> Placed:
+        """The frame in which an aircraft, seen unmoved, is at a place [m] and heading [rad]."""
+        east, north, _ = seen.position_in_world
+        turn = from_yaw(np.asarray(heading - float(seen.yaw)))
+        return cls(np.array([east, north, elevation]), np.array([x, y, 0.0]), turn)
+
+    def seen(self, state: RigidBodyState) -> RigidBodyState:
+        """A state of the local frame in `odom`."""
+        return RigidBodyState(
+            self.place + rotate(self.turn, state.position_in_world - self.origin),
+            np.asarray(multiply(self.turn, state.quat_xyzw)),
+            rotate(self.turn, state.velocity_in_world),
+            state.angular_velocity_in_body,
+        )
 
 
 def shown_at(state: RigidBodyState, frame: LocalFrame, elevation: float) -> Position:

@@ -18,9 +18,10 @@ from fulmar_core.state import RigidBodyState
 LATITUDE, LONGITUDE = (
     49.5,
     -3.0,
-)  # [deg] of the simulator's origin, at sea level: that of configs/hardware/xplane.yaml
+)  # [deg] of the simulator's origin, at sea level; any place will do
 EQUATORIAL_M, POLAR_M = 6378137.0, 6356752.314245
 LONGEST = 4096
+BUFFER = 2**18  # bytes of what comes while the emulator does not read, of a second about
 UNCHANGED = -998.0
 PLACE = "sim/flightmodel/position/"
 ENGINES = "sim/flightmodel/engine/ENGN_thro"
@@ -48,6 +49,7 @@ class XPlaneEmulator:
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.bind(("127.0.0.1", port))
         self._socket.setblocking(False)
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER)
         self.address = f"udp://127.0.0.1:{self._socket.getsockname()[1]}"
         self._stick = dict.fromkeys(("elevator", "aileron", "rudder"), 0.0)  # pitch, roll and yaw, -1 to 1
         self._throttles = [0.0] * len(self._actuators.motors)

@@ -251,12 +251,14 @@ def driver_of(peer: Peer, **more: object) -> Iterator[XPlaneDriver]:
         driver.close()
 
 
-def test_without_an_origin_odometry_begins_at_the_start_and_height_stays_above_the_water(peer):
+def test_without_an_origin_odometry_begins_at_the_start_pose_and_height_stays_above_the_water(peer):
+    """The peer flies to the north, which is where its pose of (3, 2) m and 0° points."""
     for driver in driver_of(peer, origin=None, elevation=1.5):
-        here = driver.read().odometry.position_in_world
-        assert here[0] == pytest.approx(3.0, abs=1e-3)
-        assert 2.0 < here[1] < 5.0  # it flies to the north
-        assert here[2] == pytest.approx(5.0 - 1.5)
+        odometry = driver.read().odometry
+        assert odometry.position_in_world[1:] == pytest.approx((2.0, 5.0 - 1.5), abs=1e-3)
+        assert 3.0 < odometry.position_in_world[0] < 7.0
+        assert odometry.velocity_in_world == pytest.approx((28.0, 0.0, 0.0), abs=1e-3)
+        assert odometry.yaw == pytest.approx(0.0, abs=1e-6)
 
 
 def test_an_x_plane_that_is_paused_in_flight_is_lost(peer):
