@@ -79,14 +79,14 @@ def test_every_command_moves_its_own_actuator_as_far_as_it_says(bench, driver):
 
 def test_stick_and_pedals_are_x_plane_s_own_on_the_wire():
     """Nose down is a stick ahead, the right wing down a stick to the right, the nose to the left the left pedal."""
-    heard: dict[bytes, bytes] = {}
-    with Peer(lambda datagram: heard.__setitem__(datagram[:4], datagram)) as peer:
+    received: dict[bytes, bytes] = {}
+    with Peer(lambda datagram: received.__setitem__(datagram[:4], datagram)) as peer:
         driver = XPlaneDriver(ROBOT, settings_of(peer.address), patience_s=5.0)
         driver.write(np.array([1.0, 0.5, 1.0, 0.25, 0.75]) * ROBOT.actuators.scale)
-        until(lambda: {b"CTRL", b"DREF"} <= set(heard))
+        until(lambda: {b"CTRL", b"DREF"} <= set(received))
         driver.close()
-    assert heard[b"CTRL"] == bytes.fromhex("4354524c00 000080bf 0000003f 000080bf 008079c4 ff 008079c4 00")
-    assert heard[b"DREF"] == b"DREF\0\x20sim/flightmodel/engine/ENGN_thro\x02\0\0\x80\x3e\0\0\x40\x3f"
+    assert received[b"CTRL"] == bytes.fromhex("4354524c00 000080bf 0000003f 000080bf 008079c4 ff 008079c4 00")
+    assert received[b"DREF"] == b"DREF\0\x20sim/flightmodel/engine/ENGN_thro\x02\0\0\x80\x3e\0\0\x40\x3f"
 
 
 def test_odometry_inertial_unit_and_air_data_follow_the_aircraft(bench, driver):

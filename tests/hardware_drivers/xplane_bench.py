@@ -71,9 +71,9 @@ class Peer:
         lie: Spoils the answers: takes each datagram, and gives the one to send; empty: none.
     """
 
-    def __init__(self, hear: Callable[[bytes], object] = lambda _datagram: None) -> None:
-        """Listen on a free port; `hear` gets every datagram."""
-        self._hear = hear
+    def __init__(self, receive: Callable[[bytes], object] = lambda _datagram: None) -> None:
+        """Listen on a free port; `receive` gets every datagram."""
+        self._receive = receive
         self.lie: Callable[[bytes], bytes] = lambda answer: answer
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.bind(("127.0.0.1", 0))
@@ -99,7 +99,7 @@ class Peer:
                 question, sender = self._socket.recvfrom(4096)
             except TimeoutError:
                 continue
-            self._hear(question)
+            self._receive(question)
             answer = self._answer(question[:4], time.monotonic() - began)
             answer = answer and self.lie(answer)
             if answer:

@@ -58,6 +58,14 @@ def test_lqi_holds_one_metre_through_the_protocol(ros_domain: RosDomain, tmp_pat
     with next((tmp_path / "flight").glob("*.mcap")).open("rb") as stream:
         reader = make_reader(stream)
         channels = {channel.topic for channel in reader.get_summary().channels.values()}
+    received: list[bytes] = []
+    with Peer(received.append) as peer:
+        asked = ("bag", "play", "flight", "--to", "xplane", "--port", str(peer.port), "--rate", "8")
+        shown = fulmar(*asked, env=ros_domain.env, cwd=tmp_path)
+    assert shown.returncode == 0, shown.stderr
+    heights = [struct.unpack_from("<d", found, 22)[0] for found in received if found.startswith(b"POSI")]
+    assert len(heights) > 30
+    assert heights == pytest.approx([1.0] * len(heights), abs=0.5)
     own = {"odom", "imu/data", "air_data", "actuators/state", "emulator/actuators"}
     assert {f"/{ROBOT}/{name}" for name in own} <= channels
 
@@ -113,12 +121,12 @@ def test_an_x_plane_that_lies_ends_the_node_with_one_line_after_the_safe_command
     ros_domain: RosDomain, group: ProcessGroup
 ) -> None:
     """Nonsense in the place of the altitude, after two seconds of truth."""
-    heard: list[bytes] = []
-    with Peer(heard.append) as peer:
+    received: list[bytes] = []
+    with Peer(received.append) as peer:
         group.start(plant_spec(PLAN, port=peer.address))
-        until(lambda: any(found.startswith(b"CTRL") for found in heard), STARTS_S)
+        until(lambda: any(found.startswith(b"CTRL") for found in received), STARTS_S)
         time.sleep(1.0)
-        assert any(struct.unpack_from("<4f", found, 5)[0] for found in heard if found.startswith(b"CTRL"))
+        assert any(struct.unpack_from("<4f", found, 5)[0] for found in received if found.startswith(b"CTRL"))
         peer.lie = lambda answer: answer[:22] + b"\xff" * 8 + answer[30:] if answer[:1] == b"P" else answer
         until(lambda: group.ended() is not None, STARTS_S)
         time.sleep(0.1)
@@ -127,19 +135,19 @@ def test_an_x_plane_that_lies_ends_the_node_with_one_line_after_the_safe_command
     assert re.search(
         r"no report for 5\d\d ms .* refused, the last: POSI of 46 bytes: a number is not finite", line
     )
-    sticks = [found for found in heard if found.startswith(b"CTRL")]
-    throttles = [found for found in heard if found.startswith(b"DREF")]
+    sticks = [found for found in received if found.startswith(b"CTRL")]
+    throttles = [found for found in received if found.startswith(b"DREF")]
     assert [struct.unpack_from("<3f", found, 5) for found in sticks[-3:]] == [(0.0, 0.0, 0.0)] * 3
     assert all(found.endswith(struct.pack("<2f", 0.0, 0.0)) for found in throttles[-3:])
-    assert heard[-1] == b"SIMU\0\1" or b"SIMU\0\1" in heard[-4:]
+    assert received[-1] == b"SIMU\0\1" or b"SIMU\0\1" in received[-4:]
 
 
 def test_an_x_plane_that_is_no_emulator_is_flown_without_a_goal(
     ros_domain: RosDomain, tmp_path: Path
 ) -> None:
     """The peer obeys nothing, so the height is missed, but the run has no failure; references begin at the craft."""
-    heard: list[bytes] = []
-    with Peer(heard.append) as peer:
+    received: list[bytes] = []
+    with Peer(received.append) as peer:
         path = tmp_path / "mine.yaml"
         path.write_text(f"title: t\nrobot: {ROBOT}\ndriver: {{kind: xplane, port: '{peer.address}'}}\n")
         asked = ("run", ROBOT, "--backend", "hardware", "--hardware", str(path), "--duration", "3", "--json")
@@ -148,7 +156,7 @@ def test_an_x_plane_that_is_no_emulator_is_flown_without_a_goal(
     assert summary["failure"] is None, done.stderr
     assert summary["steps"] > 200
     assert summary["final_position_error_m"] == pytest.approx(4.0, abs=0.01)
-    assert any(found.startswith(b"DREF") for found in heard)
+    assert any(found.startswith(b"DREF") for found in received)
 
 
 def test_a_missing_x_plane_is_one_line_before_anything_starts(ros_domain: RosDomain, tmp_path: Path) -> None:
