@@ -336,7 +336,7 @@ MINE = "title: t\nrobot: ROBOT\ndriver: {kind: xplane, MORE}\n"
         ("airship_v7", "silent_s: 60", "silent_s from 0.05 to 10 s"),
         ("airship_v7", "rate_hz: 0", "rate_hz must be from 1 to 1000 Hz"),
         ("airship_v7", "elevation: .nan", "elevation"),
-        ("airship_v7", "orign: {latitude: 1, longitude: 1}", "Did you mean 'origin'"),
+        ("airship_v7", "origi: {latitude: 1, longitude: 1}", "Did you mean 'origin'"),
         ("kingfisher", "silent_s: 1", "driver 'xplane' cannot move 'kingfisher', which has propellers"),
     ],
 )
