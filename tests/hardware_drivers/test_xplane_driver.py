@@ -21,7 +21,7 @@ from hardware_drivers.xplane_driver import XPlaneDriver
 from tests.hardware_drivers.xplane_bench import ROBOT, START, Peer, XPlaneBench, episode_at, trim, until
 
 ORIGIN = Geodetic(49.5, -3.0)
-SILENT_S = 0.2
+SILENT_S = 0.3
 
 
 def settings_of(address: str, **more: object) -> XPlane:
@@ -56,15 +56,17 @@ def begin(driver: DriverBackend) -> None:
     driver.reset(episode_at(START), seed=0)
 
 
-def test_x_plane_stands_still_until_the_flight_begins_and_after_its_end(bench, driver):
+def test_x_plane_stands_still_until_the_flight_begins_and_after_its_end(bench):
+    """It runs when the driver comes, as X-Plane does."""
+    bench.device.paused = False
+    driver = backend_of(ROBOT, XPlaneDriver(ROBOT, settings_of(bench.device.address), patience_s=5.0))
+    until(lambda: bench.device.paused)
     place = bench.sample.truth.position_in_world
     time.sleep(0.1)
-    assert bench.device.paused
     assert (bench.sample.truth.position_in_world == place).all()
     begin(driver)
     until(lambda: not bench.device.paused)
-    fly(driver, 0.2)
-    assert np.linalg.norm(bench.sample.truth.position_in_world - place) > 3.0
+    until(lambda: driver.step(trim()) and np.linalg.norm(bench.sample.truth.position_in_world - place) > 1.0)
     driver.close()
     until(lambda: bench.device.paused)
     assert bench.command == pytest.approx(ROBOT.actuators.safe_command)
@@ -89,22 +91,33 @@ def test_stick_and_pedals_are_x_plane_s_own_on_the_wire():
     assert received[b"DREF"] == b"DREF\0\x20sim/flightmodel/engine/ENGN_thro\x02\0\0\x80\x3e\0\0\x40\x3f"
 
 
-def test_odometry_inertial_unit_and_air_data_follow_the_aircraft(bench, driver):
+def banked(bench: XPlaneBench) -> bool:
+    """Whether the left wing is up."""
+    return bool(rotate(bench.sample.truth.quat_xyzw, np.array([0.0, 1.0, 0.0]))[2] > 0.05)
+
+
+def test_odometry_inertial_unit_and_air_data_follow_the_aircraft(bench):
+    """A turn to the right, frozen: what the driver then has is the very last frame."""
+    settings = settings_of(bench.device.address, silent_s=5.0)
+    driver = backend_of(ROBOT, XPlaneDriver(ROBOT, settings, patience_s=5.0))
     begin(driver)
-    bank = trim() + np.array([0.0, 0.1, 0.0, 0.0, 0.0])  # to the right
-    sample = fly(driver, 0.5, lambda _sample: bank)
+    bank = trim() + np.array([0.0, 0.1, 0.0, 0.0, 0.0])
+    until(lambda: driver.step(bank) and banked(bench))
+    bench.device.paused = True
+    sample = fly(driver, 0.15, lambda _sample: bank)
+    driver.close()
     found, true = sample.odometry, bench.sample.truth
-    assert np.linalg.norm(true.position_in_world[:2] - START[:2]) > 10.0
-    assert rotate(true.quat_xyzw, np.array([0.0, 1.0, 0.0]))[2] > 0.05  # the left wing is up
-    assert found.position_in_world == pytest.approx(true.position_in_world, abs=1.5)  # 28 m/s, 50 ms old
-    assert found.velocity_in_world == pytest.approx(true.velocity_in_world, abs=0.5)
-    assert np.abs(found.quat_xyzw @ true.quat_xyzw) == pytest.approx(1.0, abs=1e-3)
-    assert found.angular_velocity_in_body == pytest.approx(true.angular_velocity_in_body, abs=0.1)
-    assert np.linalg.norm(sample.imu.specific_force) == pytest.approx(9.8, abs=2.0)
+    assert np.linalg.norm(true.position_in_world[:2] - START[:2]) > 2.0
+    assert found.position_in_world == pytest.approx(true.position_in_world, abs=1e-4)
+    assert found.velocity_in_world == pytest.approx(true.velocity_in_world, abs=1e-4)
+    assert np.abs(found.quat_xyzw @ true.quat_xyzw) == pytest.approx(1.0, abs=1e-9)
+    assert found.angular_velocity_in_body == pytest.approx(true.angular_velocity_in_body, abs=1e-4)
+    assert sample.imu.angular_velocity == pytest.approx(true.angular_velocity_in_body, abs=1e-4)
+    assert sample.imu.specific_force[2] == pytest.approx(9.8, abs=2.0)
     air = sample.readings["air_data"]
     assert air.value.names == ("airspeed", "alpha", "beta", "height")
-    assert air.value.values == pytest.approx(bench.sample.readings["air_data"].value.values, abs=0.3)
-    assert 0 <= time.time_ns() - sample.stamp_ns < 250_000_000
+    assert air.value.values == pytest.approx(bench.sample.readings["air_data"].value.values, abs=1e-4)
+    assert 0 <= time.time_ns() - sample.stamp_ns < 2_000_000_000
 
 
 def wait_for_the_end(driver: DriverBackend | XPlaneDriver) -> str:
@@ -120,18 +133,17 @@ def wait_for_the_end(driver: DriverBackend | XPlaneDriver) -> str:
 
 def safe_at(bench: XPlaneBench) -> None:
     """Neutral surfaces and idle throttles have arrived."""
-    until(lambda: np.allclose(bench.command, ROBOT.actuators.safe_command), timeout_s=0.5)
+    until(lambda: np.allclose(bench.command, ROBOT.actuators.safe_command), timeout_s=5.0)
 
 
 def test_an_x_plane_that_vanishes_is_one_line_and_a_safe_command(bench, driver):
     begin(driver)
-    fly(driver, 0.1)
-    assert bench.command.any()
+    until(lambda: driver.step(trim()) and bench.command.any())
     bench.device.mute = True
     line = wait_for_the_end(driver)
     driver.make_safe()
     assert re.fullmatch(
-        r"X-Plane at udp://127\.0\.0\.1:\d+: no report for 2\d\d ms \(limit 200 ms\)\. Does X-Plane run there, "
+        r"X-Plane at udp://127\.0\.0\.1:\d+: no report for \d+ ms \(limit 300 ms\).*\. Does X-Plane run there, "
         r"not paused, with the plugin XPlaneConnect\?",
         line,
     )
@@ -204,30 +216,20 @@ FAST = ("an altitude that is no number", "a jump of 5 km", "a velocity of 900 m/
 @pytest.mark.parametrize(
     "name", [*FAST, *(pytest.param(n, marks=pytest.mark.slow) for n in LIES if n not in FAST)]
 )
-def test_what_an_x_plane_that_lies_says_is_never_flown_by_and_one_line_says_why(name):
+def test_what_an_x_plane_that_lies_says_is_never_flown_by_and_one_line_says_why(peer, name):
     lie, says = LIES[name]
-    with Peer() as peer:
-        driver = XPlaneDriver(ROBOT, settings_of(peer.address, silent_s=0.08), patience_s=5.0)
-        driver.begin(0.0, 0.0, 0.0)
-        try:
-            time.sleep(0.03)
-            driver.read()
-            peer.lie = lie
-            line = wait_for_the_end(driver)
-            assert re.search(
-                rf"no report for \d+ ms \(limit 80 ms\); \d+ refused, the last: .*({says})", line
-            )
-            assert "\n" not in line
-            assert re.search(says, driver.health()["warning"])
-            assert int(driver.health()["refused_datagrams"]) > 1
-        finally:
-            driver.close()
+    for driver in driver_of(peer):
+        peer.lie = lie
+        line = wait_for_the_end(driver)
+        assert re.search(rf"no report for \d+ ms \(limit 300 ms\); \d+ refused, the last: .*({says})", line)
+        assert "\n" not in line
+        assert re.search(says, driver.health()["warning"])
+        assert int(driver.health()["refused_datagrams"]) > 1
 
 
 def test_an_x_plane_that_lies_gets_the_safe_command(bench, driver):
     begin(driver)
-    fly(driver, 0.05)
-    assert bench.command.any()
+    until(lambda: driver.step(trim()) and bench.command.any())
     bench.device.lie = LIES["a jump of 5 km"][0]
     wait_for_the_end(driver)
     driver.make_safe()
@@ -262,7 +264,7 @@ def test_without_an_origin_odometry_begins_at_the_start_pose_and_height_stays_ab
 
 
 def test_an_x_plane_that_is_paused_in_flight_is_lost(peer):
-    for driver in driver_of(peer, silent_s=0.3):
+    for driver in driver_of(peer):
         peer.lie = resp(13, 0.5)  # its clock
         assert "the last: X-Plane's time stands still. Does" in wait_for_the_end(driver)
 
@@ -274,13 +276,15 @@ def test_a_gap_that_is_shorter_than_the_limit_is_flown_through(peer):
             time.sleep(0.01)
             driver.read()
         before, peer.lie = time.time_ns(), lambda answer: answer
-        until(lambda before=before, driver=driver: driver.read().stamp_ns > before, timeout_s=0.5)
+        until(lambda before=before, driver=driver: driver.read().stamp_ns > before, timeout_s=5.0)
 
 
 def test_one_datagram_that_is_spoilt_changes_nothing(peer):
     for driver in driver_of(peer):
-        spoilt = iter([True])
-        peer.lie = lambda answer, spoilt=spoilt: posi(far)(answer) if next(spoilt, False) else answer
+        spoilt = iter([posi(far)])
+        peer.lie = lambda answer, spoilt=spoilt: (
+            next(spoilt, bytes)(answer) if answer.startswith(b"POSI") else answer
+        )
         until(
             lambda driver=driver: driver.health() == {"refused_datagrams": "1", "warning": ""}, timeout_s=0.5
         )
