@@ -14,7 +14,6 @@ from fulmar_core.robot import Robot
 from fulmar_core.sensors.air_data import NAME as AIR_DATA
 from fulmar_core.sensors.air_data import AirData
 from fulmar_core.sensors.reading import Reading
-from fulmar_core.state import RigidBodyState
 from hardware_drivers.driver import DeviceDriver
 from hardware_drivers.earth_frame import LocalFrame
 from hardware_drivers.feedback import Feedback, Report
@@ -62,8 +61,8 @@ class XPlaneDriver(DeviceDriver):
         self._frame = LocalFrame(origin.latitude, origin.longitude) if origin else None
         self._odom = Placed.unmoved(settings.elevation)
         self._position: Position | None = None
-        self._believed: tuple[RigidBodyState, int] | None = None  # in the local frame, and when [ns]
-        self._time_s: float | None = None  # of X-Plane, in the last believed report
+        self._believed: tuple[Flight, int, int] | None = None  # and when, by steady and wall clock [ns]
+        self._placing = threading.Lock()  # no report is placed by an `odom` that has just moved
         self._running, self._refused = False, 0  # before it runs, a person may move the aircraft
         self._over = threading.Event()
         self._port = open_port(settings.port, 0, patience_s)
@@ -79,9 +78,13 @@ class XPlaneDriver(DeviceDriver):
 
     def begin(self, x: float, y: float, heading: float) -> None:
         """Let X-Plane run; without an origin, set the aircraft's pose in `odom`. See `DeviceDriver`."""
-        if self._settings.origin is None:
-            self._odom = Placed.at(self._feedback.measured, x, y, heading, self._settings.elevation)
-        self._running = True
+        with self._placing:
+            assert self._believed is not None  # as of the first report
+            flight, _, stamp_ns = self._believed
+            if self._settings.origin is None:
+                self._odom = Placed.at(flight.state, x, y, heading, self._settings.elevation)
+            self._feedback.put(self._report(flight, stamp_ns))
+            self._running = True
         self._send(Simulation(RUN))
 
     def write(self, command: np.ndarray) -> None:
@@ -144,16 +147,22 @@ class XPlaneDriver(DeviceDriver):
         if self._frame is None:
             self._frame = LocalFrame(position.latitude, position.longitude)
         flight = flight_of(position, values, self._frame)
+        with self._placing:
+            self._believe(flight, now_ns)
+
+    def _believe(self, flight: Flight, now_ns: int) -> None:
+        """Report a frame if it is new, and no lie."""
         steady_ns, last = time.monotonic_ns(), self._believed if self._running else None
-        if last is not None and flight.time_s == self._time_s:  # no new frame
+        if last is not None and flight.time_s == last[0].time_s:  # no new frame
             if steady_ns - last[1] > STILL_NS:
                 self._feedback.refuse("X-Plane's time stands still")
             return
-        reason = unbelievable(flight.state, steady_ns, last, self._robot.limits)
+        before = None if last is None else (last[0].state, last[1])
+        reason = unbelievable(flight.state, steady_ns, before, self._robot.limits)
         if reason:
             self._refuse(reason)
             return
-        self._time_s, self._believed = flight.time_s, (flight.state, steady_ns)
+        self._believed = flight, steady_ns, now_ns
         self._feedback.put(self._report(flight, now_ns))
 
     def _report(self, flight: Flight, now_ns: int) -> Report:

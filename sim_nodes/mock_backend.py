@@ -85,6 +85,8 @@ class MockBackend:
         self._ticks += ticks
         truth = self._state[0].to_rigid()
         wheels = wheel_speeds_of(self.robot, self._world.actuation)
-        others = self._sensors.measure(Truth(truth, wheels=wheels, air=self._air()), self.time_s)
+        others = self._sensors.measure(
+            Truth(truth, wheels=wheels, air=self._air()), self._ticks * self.robot.timing.physics_dt
+        )
         things = {name: pose[0] for name, pose in self._poses.items()}
         return Sample({"odometry": Reading(truth), **others}, truth, things)

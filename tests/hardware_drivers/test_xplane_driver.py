@@ -263,6 +263,18 @@ def test_without_an_origin_odometry_begins_at_the_start_pose_and_height_stays_ab
         assert odometry.yaw == pytest.approx(0.0, abs=1e-6)
 
 
+def test_the_very_first_report_of_a_flight_is_in_the_frame_of_its_start(peer):
+    """The safe controller takes heading and height from it."""
+    driver = XPlaneDriver(ROBOT, settings_of(peer.address, origin=None), patience_s=5.0)
+    try:
+        driver.begin(3.0, 2.0, 0.5)
+        odometry = driver.read().odometry
+    finally:
+        driver.close()
+    assert odometry.yaw == pytest.approx(0.5, abs=1e-6)
+    assert odometry.position_in_world == pytest.approx((3.0, 2.0, 5.0), abs=2.0)
+
+
 def test_an_x_plane_that_is_paused_in_flight_is_lost(peer):
     for driver in driver_of(peer):
         peer.lie = resp(13, 0.5)  # its clock
