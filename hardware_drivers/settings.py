@@ -207,7 +207,7 @@ class XPlane:
     # Where `odom` begins, with x to the east; None: where the aircraft is at the start, with x ahead
     origin: Geodetic | None = None
     elevation: float = 0.0  # of z = 0, the water or the runway, above mean sea level [m]
-    rate_hz: float = 100.0  # of what is asked for; X-Plane answers once a frame
+    rate_hz: float = 250.0  # of questions at most; there is one for each frame of X-Plane
     silent_s: float = 0.5  # an X-Plane that sends nothing new and believable for so long is lost [s]
 
     def __post_init__(self) -> None:

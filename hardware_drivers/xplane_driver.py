@@ -39,6 +39,7 @@ THROTTLES = "sim/flightmodel/engine/ENGN_thro"  # of each engine, from the left,
 # A positive elevator lowers the nose and a positive rudder turns it left; stick and pedals do the opposite.
 STICK = {"elevator": -1.0, "aileron": 1.0, "rudder": -1.0}
 STILL_NS = 150_000_000  # between two frames of an X-Plane that runs there is less
+AGAIN_S = 0.03  # a question without an answer for so long is lost
 HINT = "Does X-Plane run there, not paused, with the plugin XPlaneConnect?"
 
 
@@ -64,7 +65,7 @@ class XPlaneDriver(DeviceDriver):
         self._believed: tuple[Flight, int, int] | None = None  # and when, by steady and wall clock [ns]
         self._placing = threading.Lock()  # no report is placed by an `odom` that has just moved
         self._running, self._refused = False, 0  # before it runs, a person may move the aircraft
-        self._over = threading.Event()
+        self._over, self._answered = threading.Event(), threading.Event()
         self._port = open_port(settings.port, 0, patience_s)
         self._reader = Reader(self._port, self._take, self._feedback.fail)
         self._asking = threading.Thread(target=self._ask, name="X-Plane asker", daemon=True)
@@ -118,7 +119,10 @@ class XPlaneDriver(DeviceDriver):
         self._port.write(encode(message))
 
     def _ask(self) -> None:
+        """Ask as soon as an answer has come: once a frame, and never more than X-Plane works off."""
         while not self._over.wait(1.0 / self._settings.rate_hz):
+            self._answered.wait(AGAIN_S)
+            self._answered.clear()
             try:
                 self._send(AskPosition())
                 self._send(AskReferences(ASKED))
@@ -133,6 +137,7 @@ class XPlaneDriver(DeviceDriver):
             if isinstance(message, Position):
                 self._position = message
             elif isinstance(message, Values):
+                self._answered.set()
                 self._answer(message, now_ns)
             else:
                 raise MalformedError(f"{type(message).__name__} was not asked for")
