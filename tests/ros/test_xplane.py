@@ -48,7 +48,19 @@ def group() -> Iterator[ProcessGroup]:
 
 def test_lqi_holds_one_metre_through_the_protocol(ros_domain: RosDomain, tmp_path: Path) -> None:
     """The command of the manual; evaluated by where the emulated craft really is."""
-    asked = ("run", ROBOT, "--backend", "hardware", "--hardware", "xplane", "--emulate", "--duration", "8")
+    asked = (
+        "run",
+        ROBOT,
+        "--controller",
+        "lqi",
+        "--backend",
+        "hardware",
+        "--hardware",
+        "xplane",
+        "--emulate",
+        "--duration",
+        "8",
+    )
     done = fulmar(*asked, "--record", "flight", "--json", env=ros_domain.env, cwd=tmp_path)
     summary = json_of(done.stdout)
     assert summary["failure"] is None, done.stderr
@@ -150,7 +162,19 @@ def test_an_x_plane_that_is_no_emulator_is_flown_without_a_goal(
     with Peer(received.append) as peer:
         path = tmp_path / "mine.yaml"
         path.write_text(f"title: t\nrobot: {ROBOT}\ndriver: {{kind: xplane, port: '{peer.address}'}}\n")
-        asked = ("run", ROBOT, "--backend", "hardware", "--hardware", str(path), "--duration", "3", "--json")
+        asked = (
+            "run",
+            ROBOT,
+            "--controller",
+            "lqi",
+            "--backend",
+            "hardware",
+            "--hardware",
+            str(path),
+            "--duration",
+            "3",
+            "--json",
+        )
         done = fulmar(*asked, "--record", "flight", env=ros_domain.env, cwd=tmp_path)
     summary = json_of(done.stdout)
     assert summary["failure"] is None, done.stderr
@@ -162,7 +186,7 @@ def test_an_x_plane_that_is_no_emulator_is_flown_without_a_goal(
 def test_a_missing_x_plane_is_one_line_before_anything_starts(ros_domain: RosDomain, tmp_path: Path) -> None:
     path = tmp_path / "mine.yaml"
     path.write_text(f"title: t\nrobot: {ROBOT}\ndriver: {{kind: xplane, port: 'udp://127.0.0.1:9'}}\n")
-    asked = ("run", ROBOT, "--backend", "hardware", "--hardware", str(path))
+    asked = ("run", ROBOT, "--controller", "lqi", "--backend", "hardware", "--hardware", str(path))
     done = fulmar(*asked, env=ros_domain.env, cwd=tmp_path)
     assert done.returncode == 1
     assert "udp://127.0.0.1:9: no answer within 0.7 s. Does X-Plane run there" in done.stderr
