@@ -18,6 +18,7 @@ from hardware_drivers.settings import (
     ThrustTopic,
     ValveTopic,
     VelocityTopic,
+    XPlane,
 )
 
 
@@ -37,7 +38,7 @@ def make_device(robot: Robot, hardware: Hardware, *, port: str, patience_s: floa
     settings = hardware.driver
     if hardware.robot != robot.name:
         raise ConfigError(f"the hardware file is of '{hardware.robot}', the robot is '{robot.name}'.")
-    if isinstance(settings, (GpioValves, Kobuki, KingfisherNmea, MavlinkBoat, OwnDriver)) and port:
+    if isinstance(settings, (GpioValves, Kobuki, KingfisherNmea, MavlinkBoat, XPlane, OwnDriver)) and port:
         settings = replace(settings, port=port)
     if isinstance(settings, GpioValves):
         from hardware_drivers.thruster_driver import ThrusterDriver, ValveDriver
@@ -56,6 +57,10 @@ def make_device(robot: Robot, hardware: Hardware, *, port: str, patience_s: floa
         from hardware_drivers.mavlink_driver import MavlinkDriver
 
         return backend_of(robot, MavlinkDriver(robot, settings, patience_s=patience_s))
+    if isinstance(settings, XPlane):
+        from hardware_drivers.xplane_driver import XPlaneDriver
+
+        return backend_of(robot, XPlaneDriver(robot, settings, patience_s=patience_s))
     if isinstance(settings, OwnDriver):
         from hardware_drivers.own_driver import make_own_driver
 
@@ -85,8 +90,11 @@ MOVES_ON: dict[type, str] = {
     GpioValves: "VALVES",
     ValveTopic: "VALVES",
     ThrustTopic: "PROPELLERS",
+    XPlane: "AIRCRAFT",
     OwnDriver: "ACTUATORS",
 }
+SUPPLY = "build in a supply that closes without the driver (docs/hardware.md)"
+INSTEAD: dict[type, str] = {XPlane: "X-Plane flies on with the last commands; its key P pauses it"}
 
 
 def own_watchdog(driver: Driver) -> OwnWatchdog | None:
@@ -101,7 +109,5 @@ def when_the_driver_dies(driver: Driver) -> str:
     watchdog = own_watchdog(driver)
     if watchdog is not None:
         return f"if the driver dies, stopped within {watchdog.within_s:g} s by {watchdog.by}"
-    return (
-        f"{UNPROTECTED} {MOVES_ON[type(driver)]} WHEN IT DIES: build in a supply that closes without the driver "
-        "(docs/hardware.md)"
-    )
+    instead = INSTEAD.get(type(driver), SUPPLY)
+    return f"{UNPROTECTED} {MOVES_ON[type(driver)]} WHEN IT DIES: {instead}"

@@ -1,4 +1,4 @@
-"""Local frame and attitude of boats: from WGS 84 and north-east-down to ROS' east-north-up."""
+"""Local frame and attitude of boats and aircraft: from WGS 84 and north-east-down to ROS' east-north-up, and back."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from fulmar_core.attitude import euler_of
 from fulmar_core.rotation import from_yaw, multiply
 
 # WGS 84.
@@ -30,6 +31,11 @@ class LocalFrame:
         east = (longitude - self._longitude + 180.0) % 360.0 - 180.0
         return east * self._east, (latitude - self._latitude) * self._north
 
+    def degrees(self, east: float, north: float) -> tuple[float, float]:
+        """Latitude and longitude of a place east and north of the origin [m, m], longitude from -180 to 180 [deg]."""
+        longitude = self._longitude + east / self._east
+        return self._latitude + north / self._north, (longitude + 180.0) % 360.0 - 180.0
+
 
 def attitude(roll: float, pitch: float, heading: float) -> np.ndarray:
     """The attitude that sailors describe.
@@ -46,3 +52,10 @@ def attitude(roll: float, pitch: float, heading: float) -> np.ndarray:
     nose = np.array([0.0, math.sin(-0.5 * pitch), 0.0, math.cos(0.5 * pitch)])
     heel = np.array([math.sin(0.5 * roll), 0.0, 0.0, math.cos(0.5 * roll)])
     return np.asarray(multiply(multiply(yaw, nose), heel))
+
+
+def sailed_angles(quat_xyzw: np.ndarray) -> tuple[float, float, float]:
+    """Roll, pitch and heading that `attitude` makes an attitude of, shape (4,); heading from 0 to 2 pi [rad]."""
+    x, y, z, w = (np.asarray(part, dtype=float) for part in quat_xyzw)
+    roll, pitch, yaw = (float(angle) for angle in euler_of((x, y, z, w)))
+    return roll, -pitch, (0.5 * math.pi - yaw) % (2.0 * math.pi)

@@ -41,14 +41,16 @@ class Report:
 class Feedback:
     """Newest report of a device, and its age."""
 
-    def __init__(self, device: str, silent_s: float) -> None:
+    def __init__(self, device: str, silent_s: float, *, hint: str = "") -> None:
         """Begin with none.
 
         Args:
             device: Its name, for messages.
             silent_s: A device without a report for so long is gone [s].
+            hint: What to look at when it is silent; cable, switch, port and baud rate by default.
         """
-        self._device, self._silent_ns = device, round(silent_s * 1e9)
+        self._device, self._silent_ns, self._hint = device, round(silent_s * 1e9), hint
+        self._refused, self._refusal = 0, ""
         self._changed = threading.Condition()
         self._newest: Report | None = None
         self._came_ns = 0
@@ -58,7 +60,19 @@ class Feedback:
         """Store a report; called by the reading thread."""
         with self._changed:
             self._newest, self._came_ns = report, time.monotonic_ns()
+            self._refused, self._refusal = 0, ""
             self._changed.notify_all()
+
+    def refuse(self, reason: str) -> None:
+        """Count a report that cannot be believed; a device that sends no other is silent, and says why."""
+        with self._changed:
+            self._refused, self._refusal = self._refused + 1, reason
+
+    @property
+    def refusal(self) -> str:
+        """Why the last report was refused; empty where a good one came after it."""
+        with self._changed:
+            return self._refusal
 
     def fail(self, reason: str) -> None:
         """End the reports with a reason; called by the reading thread."""
@@ -75,10 +89,9 @@ class Feedback:
         with self._changed:
             self._changed.wait_for(lambda: self._newest is not None or self._failure, timeout_s)
             if self._newest is None:
-                why = self._failure or f"said nothing that can be read for {timeout_s:g} s"
-                raise DeviceError(
-                    f"{self._device}: {why}. Is it switched on, and is this the right port and baud rate?"
-                )
+                why = self._failure or f"said nothing that can be read for {timeout_s:g} s{self._refusals}"
+                hint = self._hint or "Is it switched on, and is this the right port and baud rate?"
+                raise DeviceError(f"{self._device}: {why}. {hint}")
 
     @property
     def measured(self) -> RigidBodyState:
@@ -95,14 +108,20 @@ class Feedback:
         """
         with self._changed:
             newest, age_ns, failure = self._newest, time.monotonic_ns() - self._came_ns, self._failure
+            refusals = self._refusals
         if failure:
             raise DeviceError(f"{self._device}: {failure}")
         if newest is None or age_ns > self._silent_ns:
             raise DeviceError(
-                f"{self._device}: no report for {age_ns / 1e6:.0f} ms "
-                f"(limit {self._silent_ns / 1e6:.0f} ms). Is the cable in, and the device on?"
+                f"{self._device}: no report for {age_ns / 1e6:.0f} ms (limit {self._silent_ns / 1e6:.0f} ms)"
+                f"{refusals}. {self._hint or 'Is the cable in, and the device on?'}"
             )
         return newest
+
+    @property
+    def _refusals(self) -> str:
+        """How many reports were refused since the last good one, and why; to be read with the lock held."""
+        return f"; {self._refused} refused, the last: {self._refusal}" if self._refused else ""
 
 
 FORGET = 512  # reports after which the least delay is looked for anew, so that a drifting clock is followed

@@ -10,7 +10,15 @@ from pathlib import Path
 
 from fulmar_core.errors import DeviceError
 from hardware_drivers.gpio import FILE_CHIP, line_of
-from hardware_drivers.settings import Driver, GpioValves, KingfisherNmea, Kobuki, MavlinkBoat, OwnDriver
+from hardware_drivers.settings import (
+    Driver,
+    GpioValves,
+    KingfisherNmea,
+    Kobuki,
+    MavlinkBoat,
+    OwnDriver,
+    XPlane,
+)
 
 CONNECT_S = 0.7  # a host that has not accepted a connection by then is reported as absent [s]
 TCP = ("tcp://", "tcp:")
@@ -20,7 +28,7 @@ UDP = ("udpin:", "udpout:", "udp:", "udpbcast:")
 def check_presence(driver: Driver, port: str = "") -> None:
     """Reject a driver whose port does not exist; takes under a second.
 
-    A device that exists and is silent passes: the driver waits for its first report.
+    A device that exists and is silent passes: the driver waits for its first report. X-Plane has to answer.
 
     Args:
         driver: The driver of a hardware file.
@@ -31,6 +39,10 @@ def check_presence(driver: Driver, port: str = "") -> None:
     """
     if isinstance(driver, GpioValves):
         _check_chip(port or driver.port, driver.every_line)
+    elif isinstance(driver, XPlane):
+        from hardware_drivers.xplane_link import XPlaneLink
+
+        XPlaneLink(port or driver.port, within_s=CONNECT_S).close()
     elif isinstance(driver, OwnDriver) and "/gpiochip" in (port or driver.port):
         _check_chip(port or driver.port, ())
     elif isinstance(driver, (Kobuki, KingfisherNmea, MavlinkBoat, OwnDriver)) and (port or driver.port):

@@ -199,6 +199,29 @@ class MavlinkBoat:
 
 
 @dataclass(frozen=True)
+class XPlane:
+    """An aircraft in X-Plane, by the UDP protocol of the plugin XPlaneConnect."""
+
+    kind: Literal["xplane"]
+    port: str = "udp://127.0.0.1:49009"  # of the plugin
+    # Where `odom` begins, with x to the east; None: where the aircraft is at the start, with x ahead
+    origin: Geodetic | None = None
+    elevation: float = 0.0  # of z = 0, the water or the runway, above mean sea level [m]
+    rate_hz: float = 250.0  # of questions at most; there is one for each frame of X-Plane
+    silent_s: float = 0.5  # an X-Plane that sends nothing new and believable for so long is lost [s]
+
+    def __post_init__(self) -> None:
+        if not self.port.startswith("udp://"):
+            raise ValueError(
+                f"port = '{self.port}' must be udp://host:port; the plugin listens at port 49009."
+            )
+        if not (1.0 <= self.rate_hz <= 1000.0 and 0.05 <= self.silent_s <= 10.0):
+            raise ValueError("rate_hz must be from 1 to 1000 Hz and silent_s from 0.05 to 10 s.")
+        if not -500.0 <= self.elevation <= 9000.0:
+            raise ValueError("elevation must be from -500 to 9000 m.")
+
+
+@dataclass(frozen=True)
 class OwnDriver:
     """A class of the user's own, by its dotted path; see `hardware_drivers.driver.DeviceDriver`."""
 
@@ -230,21 +253,31 @@ class OwnDriver:
 
 
 Driver = (
-    GpioValves | ValveTopic | Kobuki | VelocityTopic | KingfisherNmea | MavlinkBoat | ThrustTopic | OwnDriver
+    GpioValves
+    | ValveTopic
+    | Kobuki
+    | VelocityTopic
+    | KingfisherNmea
+    | MavlinkBoat
+    | ThrustTopic
+    | XPlane
+    | OwnDriver
 )
 NEEDS: dict[type, tuple[str, ...]] = {  # modules of the extra `hardware`
     GpioValves: ("gpiod",),
     Kobuki: ("serial",),
     KingfisherNmea: ("serial",),
     MavlinkBoat: ("pymavlink",),
+    XPlane: ("serial",),  # beside serial ports, `ports` has those of UDP
 }
 TOPIC_DRIVERS = (ValveTopic, VelocityTopic, ThrustTopic)
 SEEN_FROM_OUTSIDE = (GpioValves, ValveTopic)  # drivers of robots that only motion capture localises
-MEASURES = (Kobuki, KingfisherNmea, MavlinkBoat)  # drivers whose device measures odometry
+MEASURES = (Kobuki, KingfisherNmea, MavlinkBoat, XPlane)  # drivers whose device measures odometry
 FITS = {
     "thrusters": (GpioValves, ValveTopic),
     "differential_drive": (Kobuki, VelocityTopic),
     "propellers": (KingfisherNmea, MavlinkBoat, ThrustTopic),
+    "control_surfaces": (XPlane,),
 }
 
 

@@ -1,4 +1,7 @@
-"""Node that emulates a robot's hardware: a device that speaks its protocol, and MuJoCo behind it."""
+"""Node that emulates a robot's hardware: a device that speaks its protocol, and a simulator behind it.
+
+That is MuJoCo, or, behind X-Plane, the core's own flight dynamics.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +20,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float32MultiArray
 
 from fulmar_core.backend import Backend, Sample
-from fulmar_core.disturbances.scenario import load_scenario
+from fulmar_core.disturbances.scenario import Scenario, load_scenario
 from fulmar_core.errors import FAILED, ConfigError, UnknownNameError
 from fulmar_core.process import PLANT_PRIORITY, take_priority, take_priority_with_helpers
 from fulmar_core.robot import Robot, load_robot
@@ -37,10 +40,15 @@ from sim_nodes.emulators.kingfisher import KingfisherEmulator
 from sim_nodes.emulators.kobuki import KobukiEmulator
 from sim_nodes.emulators.outputs import BASE_TIMEOUT_S, NO_TIMEOUT_S, TopicDevice, ValveBank, ValveNode
 from sim_nodes.emulators.wiring import STRAIGHT, Wiring
+from sim_nodes.emulators.xplane import XPlaneEmulator
+from sim_nodes.mock_backend import MockBackend
 from sim_nodes.mujoco_backend import MujocoBackend
 from sim_nodes.on_air import OnAir
 
-DEVICES = ("valves", "kobuki", "kingfisher", "ardupilot", "valve_topic", "velocity_topic", "thrust_topic")
+XPLANE = "xplane"
+DEVICES = (
+    "valves", "kobuki", "kingfisher", "ardupilot", XPLANE, "valve_topic", "velocity_topic", "thrust_topic",
+)  # fmt: skip
 NONE = -1  # an empty list has no type in ROS
 CATCH_UP = 25  # ticks at most after a pause of the process; simulated time loses the rest
 
@@ -87,11 +95,10 @@ class EmulatorNode(Node):
         self._request_exit = request_exit
         robot = load_robot(self.settings.robot)
         scenario = load_scenario(self.settings.scenario)
-        simulator = MujocoBackend.of(robot, load_task(self.settings.task), scenario)
-        self.device = make_emulator(robot, simulator, self.settings)
-        self._backend: Backend = simulator
+        self._backend: Backend
+        self._backend, self.device = make_emulation(robot, scenario, self.settings)
         if isinstance(self.device, (ValveBank, ValveNode)) and self.settings.bearing:
-            self._backend = OnAir(simulator, scenario)
+            self._backend = OnAir(self._backend, scenario)
         self._sample = self._backend.reset(first_episode(robot, self.settings), seed=self.settings.seed)
         self._wiring = Wiring(
             robot,
@@ -142,7 +149,8 @@ class EmulatorNode(Node):
             if isinstance(self._backend, OnAir) and isinstance(self.device, (ValveBank, ValveNode)):
                 self._backend.set_bearing(self.device.air)
             due = int((now_s - began_s) / dt) - ticks
-            for _ in range(max(1, min(due, CATCH_UP))):
+            paused = isinstance(self.device, XPlaneEmulator) and self.device.paused
+            for _ in range(0 if paused else max(1, min(due, CATCH_UP))):
                 self._sample = self._backend.step(command)
             ticks += max(1, due)
             self.device.report(self._sample, now_s)
@@ -186,6 +194,18 @@ def values_of(message: Any) -> list[float]:
         return [float(value[0] if isinstance(value, bytes) else value) for value in message.data]
     twist = getattr(message, "twist", message)
     return [twist.linear.x, twist.angular.z]
+
+
+def make_emulation(
+    robot: Robot, scenario: Scenario, settings: EmulatorSettings
+) -> tuple[MockBackend | MujocoBackend, EmulatedDevice]:
+    """The simulator and the emulated device of the parameters; raises ConfigError as `make_emulator`."""
+    task = load_task(settings.task)
+    if settings.device == XPLANE:
+        core = MockBackend(robot, things=task.things)
+        return core, XPlaneEmulator(robot, lambda: core.time_s, _number(settings.link, "udp"))
+    simulator = MujocoBackend.of(robot, task, scenario)
+    return simulator, make_emulator(robot, simulator, settings)
 
 
 def make_emulator(robot: Robot, backend: MujocoBackend, settings: EmulatorSettings) -> EmulatedDevice:

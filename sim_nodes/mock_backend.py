@@ -63,6 +63,11 @@ class MockBackend:
         self._state = self._state.stopped()
         return self._sample(ticks)
 
+    @property
+    def time_s(self) -> float:
+        """Simulated time since the episode began [s]."""
+        return self._ticks * self.robot.timing.physics_dt
+
     def make_safe(self) -> None:
         """Nothing to do: a command acts only during a step."""
 

@@ -16,7 +16,7 @@ from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool
 
-from fulmar_bringup.commissioning.commission import WIRINGS, Request, commission, is_right, rewired
+from fulmar_bringup.commissioning.commission import PULSED, WIRINGS, Request, commission, is_right, rewired
 from fulmar_bringup.commissioning.hardware_file import command_of, line_of, wires_of, with_line, write_line
 from fulmar_bringup.commissioning.session import Session
 from fulmar_core.errors import ConfigError, RunFailed
@@ -45,7 +45,17 @@ def test_a_family_that_no_procedure_moves_is_refused_before_anything_starts(tmp_
         commission(Request(str(path), pulses=True), print)
 
 
-@pytest.mark.parametrize("name", config_names("hardware"))
+def test_an_aircraft_has_no_wires_to_pulse():
+    with pytest.raises(ConfigError, match="no pulses are known for 'airship_v7', which has control_surfaces"):
+        commission(Request("xplane", pulses=True), print)
+
+
+def pulsed(name: str) -> bool:
+    """Whether a hardware file is of a robot that commissioning moves."""
+    return load_robot(load_hardware(name).robot).actuators.kind in PULSED
+
+
+@pytest.mark.parametrize("name", [name for name in config_names("hardware") if pulsed(name)])
 def test_a_wire_s_command_reaches_that_wire_alone(name):
     hardware = load_hardware(name)
     robot = load_robot(hardware.robot)

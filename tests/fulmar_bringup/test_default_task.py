@@ -7,8 +7,11 @@ from pathlib import Path
 import pytest
 
 from fulmar_bringup.goal_plan import check_heading, default_task
+from fulmar_bringup.plan_checks import usual_controller
 from fulmar_cli.commands.values import read_goal
 from fulmar_core.errors import ConfigError
+from fulmar_core.robot import load_robot
+from fulmar_core.tasks import load_task
 
 
 @pytest.mark.parametrize(
@@ -66,3 +69,14 @@ def test_a_goal_has_two_or_three_numbers():
     for text in ("1", "1,2,3,4", "1,nan", "a,b"):
         with pytest.raises(ConfigError, match="two or three finite numbers"):
             read_goal(text)
+
+
+def test_an_aircraft_holds_its_height_by_lqi_where_no_policy_is_shipped(monkeypatch):
+    assert default_task("navion", "policy") == "fly_hold"
+    robot, task = load_robot("navion"), load_task("fly_hold")
+    monkeypatch.setattr("fulmar_bringup.plan_checks.shipped_policy", lambda *_names: None)
+    assert usual_controller("policy", None, robot, task) == "lqi"
+    assert usual_controller("lqr", None, robot, task) == "lqr"
+    assert usual_controller("policy", Path("mine"), robot, task) == "policy"
+    monkeypatch.setattr("fulmar_bringup.plan_checks.shipped_policy", lambda *_names: Path("shipped"))
+    assert usual_controller("policy", None, robot, task) == "policy"

@@ -19,6 +19,7 @@ from hardware_drivers.settings import (
     ThrustTopic,
     ValveTopic,
     VelocityTopic,
+    XPlane,
 )
 
 Parameters = Mapping[str, bool | str | list[int] | list[str]]
@@ -68,6 +69,9 @@ def emulation_of(hardware: Hardware, folder: Path) -> Emulation:
             "bearing": driver.bearing is not None,
         }
         return Emulation("valves", str(pins), f"file://{pins}", more)
+    if isinstance(driver, XPlane):
+        number = _free_port(socket.SOCK_DGRAM)
+        return Emulation(driver.kind, f"udp:{number}", f"udp://127.0.0.1:{number}")
     more = {"sides": list(driver.wiring)}
     if isinstance(driver, MavlinkBoat):
         number = _free_port(socket.SOCK_DGRAM)

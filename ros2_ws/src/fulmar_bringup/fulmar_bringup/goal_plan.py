@@ -115,7 +115,7 @@ def default_task(
 ) -> str:
     """Name of the task that a goal asks for: a place is a position, with angles it is a pose, as without a goal.
 
-    A satellite turns to a goal, and without one points to the Earth.
+    A satellite turns to a goal, and without one points to the Earth. An aircraft holds its height.
 
     The goal is as `State.NUMBERS` of the robot; a bundle that was given is checked later. Without a hardware file the
     robot has to have its own.
@@ -127,6 +127,8 @@ def default_task(
         default_hardware(robot, hardware)
     if load_robot(robot).actuators.turns_only:
         return POINT if goal is None else SLEW
+    if load_robot(robot).flies:
+        return HOLD
     form = load_robot(robot).state_type
     pose, position = (name + form.SUFFIX for name in (POSE, POSITION))
     asked = position if goal is not None and len(goal) == form.AXES else pose
@@ -187,6 +189,7 @@ def check_heading(task: str, goal: tuple[float, ...]) -> str:
 DEFAULT_TASKS = {Positions: POSITION, Poses: POSE}  # all others are about velocities
 EXCITED = "point_inertial"  # while a satellite plays torques
 POINT, SLEW = "point", "slew"  # of a satellite, without and with a goal
+HOLD = "fly_hold"  # of an aircraft
 GOALS_HZ = 10.0  # of a goal node, at most
 TRIED = 720  # places along a path where a step is measured
 SHOWN = 400  # points of a path that a record carries along

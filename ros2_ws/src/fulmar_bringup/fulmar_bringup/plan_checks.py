@@ -240,9 +240,10 @@ def _split_estimators(asked: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def usual_controller(controller: str, policy: Path | None, robot: Robot, task: Task) -> str:
-    """The controller that was asked for, or the classical one in the place of a policy that no satellite has."""
-    wanted = controller == POLICY and policy is None and robot.actuators.turns_only
-    return "classical" if wanted and shipped_policy(robot.name, task.name) is None else controller
+    """The controller that was asked for, or another one in the place of a policy that a satellite or aircraft lacks."""
+    instead = "classical" if robot.actuators.turns_only else "lqi" if robot.flies else controller
+    wanted = controller == POLICY and policy is None
+    return instead if wanted and shipped_policy(robot.name, task.name) is None else controller
 
 
 def with_usual_estimators(guards: Guards, robot: Robot, scenario: Scenario, backend: str) -> Guards:

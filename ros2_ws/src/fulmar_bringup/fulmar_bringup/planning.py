@@ -186,7 +186,8 @@ def plan_run(
     if hardware and not emulate:
         # Where a robot stands is where its odometry begins.
         start = start or whole_pose((0.0,) * the_robot.state_type.AXES, the_robot, "--start")
-        if goal is None and goals is None and not goals_later:
+        # References of aircraft begin where the craft is, and no single goal holds one.
+        if goal is None and goals is None and not goals_later and not the_task.flies:
             raise ConfigError("a real robot goes nowhere by chance: say where with --goal or --goals.")
     if goals is not None and goal is not None:
         raise ConfigError("--goals brings its own goals; it takes no --goal.")

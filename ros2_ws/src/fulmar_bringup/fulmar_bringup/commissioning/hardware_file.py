@@ -14,7 +14,7 @@ from fulmar_core.actuators.thrusters import Thrusters
 from fulmar_core.atomic_write import write_whole
 from fulmar_core.errors import ConfigError
 from fulmar_core.robot import Robot
-from hardware_drivers.settings import GpioValves, Hardware, OwnDriver, ValveTopic
+from hardware_drivers.settings import GpioValves, Hardware, OwnDriver, ValveTopic, XPlane
 from hardware_drivers.wiring import SIDES
 
 WHEEL_SPEED = 0.1  # of the rim of one wheel, our value: a step of some centimetres [m/s]
@@ -38,6 +38,7 @@ def wires_of(hardware: Hardware) -> list[Wire]:
         return [Wire(f"value {number}", nozzle) for number, nozzle in enumerate(driver.order, start=1)]
     if isinstance(driver, OwnDriver) and driver.order:
         return [Wire(f"channel {number}", nozzle) for number, nozzle in enumerate(driver.order)]
+    assert not isinstance(driver, XPlane)  # there are no pulses for aircraft
     return [
         Wire(f"{channel} channel", SIDES.index(side.removeprefix("-")), -1.0 if side.startswith("-") else 1.0)
         for channel, side in zip(SIDES, driver.wiring, strict=True)
