@@ -23,8 +23,11 @@ HALF = 0.5  # of the thesis' RMSE, which exact state must stay below
 WITH_SENSORS = {"a": 0.03, "d": 0.03, "e": 0.03}  # limits with sensors; elsewhere the thesis' own [m]
 MPPI_LIMIT = {"a": 0.03, "d": 0.03, "e": 0.03}  # of MPPI with exact state [m]
 SEEDS = 5  # of a controller that draws, with exact state
-STEADY = ("hold", "a", "d", "e", "f")  # tasks that must survive noise, delay and light turbulence
+HOLD = "hold"  # the task whose flights begin at different heights
+STEADY = (HOLD, "a", "d", "e", "f")  # tasks that must survive noise, delay and light turbulence
 SURVIVAL = 0.95
+# Of a policy that holds a height: altitude RMSE with the start and after 10 s [m], and survival, by scenario.
+POLICY_LIMITS = {"calm": (0.12, 0.04, 0.99), "light": (0.20, None, 0.97)}
 
 
 @dataclass(frozen=True)
@@ -39,6 +42,7 @@ class Request:
     episodes: int
     seed: int
     jobs: int
+    policy: str = ""  # folder of a bundle; empty: the shipped ones
 
 
 def run_falcon(request: Request, progress: Progress) -> dict[str, Any]:
@@ -65,19 +69,22 @@ def cells_of(request: Request) -> list[Cell]:
             task,
             controller,
             scenario,
-            _episodes(request, controller, scenario),
+            _episodes(request, task, controller, scenario),
             request.seed,
+            request.policy,
         )
         for task in request.tasks
         for controller in request.controllers
         for scenario in (request.random_scenarios if controller in RANDOM else request.scenarios)
-        if controller != "policy" or shipped_policy(request.robot, f"fly_{task}") is not None
+        if controller != "policy"
+        or request.policy
+        or shipped_policy(request.robot, f"fly_{task}") is not None
     ]
 
 
-def _episodes(request: Request, controller: str, scenario: str) -> int:
-    """Flights of a cell; with exact state those of a controller that draws nothing are all alike."""
-    if scenario != "exact":
+def _episodes(request: Request, task: str, controller: str, scenario: str) -> int:
+    """Flights of a cell; with exact state those along a path of a controller that draws nothing are all alike."""
+    if scenario != "exact" or task == HOLD:
         return request.episodes
     return min(request.episodes, SEEDS) if controller in RANDOM else 1
 
@@ -133,6 +140,30 @@ def requirements(document: dict[str, Any]) -> list[tuple[str, str, str, bool]]:
                         f"{found['survival']:.2f}",
                         good,
                     )
+                )
+        if task == HOLD:
+            rows += _policy_rows(controllers.get("policy", {}))
+    return rows
+
+
+def _policy_rows(scenarios: dict[str, Any]) -> list[tuple[str, str, str, bool]]:
+    rows = []
+    for scenario, (whole, late, survival) in POLICY_LIMITS.items():
+        found = scenarios.get(scenario, {})
+        if found.get("survival") is None:
+            continue
+        about = f"policy, hold, {scenario}, {found['episodes']} flights"
+        alive = found["survival"]
+        rows.append((f"{about}: survival", f">= {survival:g}", f"{alive:.3f}", alive >= survival))
+        for name, what, limit in (
+            ("altitude_rmse_m", "altitude RMSE", whole),
+            ("late_altitude_rmse_m", "same after 10 s", late),
+        ):
+            if limit is not None:
+                rmse = found[name]
+                shown = "crashed" if rmse is None else f"{rmse:.4f} m"
+                rows.append(
+                    (f"{about}: {what}", f"<= {limit:g} m", shown, rmse is not None and rmse <= limit)
                 )
     return rows
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,12 +16,13 @@ from fulmar_core.controllers.flight_mppi import FlightMppi
 from fulmar_core.disturbances.parts import Air, Sensing
 from fulmar_core.disturbances.scenario import Scenario
 from fulmar_core.flight.turbulence import CLASSES
+from fulmar_core.policy_bundle import read_passport
 from fulmar_core.references.flight_paths import PATHS
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.rollout import roll_out_in_batch
 from fulmar_core.tasks import load_task
 from fulmar_core.trajectories import Trajectories
-from policy_server.controllers import Choice, load_controller
+from policy_server.controllers import Choice, load_controller, shipped_policy
 
 TASKS = ("hold", *PATHS)
 CONTROLLERS = ("lqi", "lqr", "mppi", "pid", "policy")
@@ -60,6 +62,7 @@ class Cell:
     scenario: str
     episodes: int
     seed: int
+    policy: str = ""  # folder of a bundle; empty: the shipped one
 
 
 def controller_of(robot: Robot, cell: Cell) -> Controller:
@@ -70,7 +73,9 @@ def controller_of(robot: Robot, cell: Cell) -> Controller:
     """
     task = load_task(f"fly_{cell.task}")
     if cell.controller == "policy":
-        return load_controller("policy", robot, task, Choice(0.0))
+        folder = Path(cell.policy) if cell.policy else shipped_policy(robot.name, task.name)
+        rate = read_passport(folder).control_hz if folder is not None else robot.timing.control_hz
+        return load_controller("policy", robot, task, Choice(rate, policy=cell.policy))
     gains = gains_of(robot, cell.controller)
     if cell.scenario == "exact":
         gains = replace(gains, observer=None)
@@ -96,6 +101,7 @@ def fly(cell: Cell) -> dict[str, Any]:
 def figures(run: Trajectories, task: str, robot: Robot) -> dict[str, Any]:
     """Figures of some flights: medians over those that survive, and the share that does.
 
+    Altitude RMSE is over all flights that survive together.
     Per axis and over all: √(mean ‖e‖² / 3) and √(mean ‖e‖²) of the way to the reference, of which that ahead is 0.
     """
     error = np.asarray(run.position_error, dtype=float)
@@ -109,6 +115,9 @@ def figures(run: Trajectories, task: str, robot: Robot) -> dict[str, Any]:
     settled = np.where(near.any(axis=1), np.argmax(near, axis=1) * run.control_dt, np.nan)
     late = times > WITHOUT_START_S
 
+    def pooled(squares: np.ndarray) -> float | None:
+        return float(np.sqrt(np.mean(squares[alive]))) if alive.any() and squares.size else None
+
     def median(values: np.ndarray) -> float | None:
         kept = values[alive & np.isfinite(values)]
         return float(np.median(kept)) if kept.size else None
@@ -117,8 +126,8 @@ def figures(run: Trajectories, task: str, robot: Robot) -> dict[str, Any]:
         "rmse_per_axis_m": median(rmse / np.sqrt(3.0)),
         "rmse_per_axis_worst_m": float(rmse[alive].max() / np.sqrt(3.0)) if alive.any() else None,
         "rmse_m": median(rmse),
-        "altitude_rmse_m": median(np.sqrt(np.mean(off**2, axis=1))),
-        "late_altitude_rmse_m": median(np.sqrt(np.mean(off[:, late] ** 2, axis=1))) if late.any() else None,
+        "altitude_rmse_m": pooled(off**2),
+        "late_altitude_rmse_m": pooled(off[:, late] ** 2),
         "settling_s": median(settled),
         "peak_error_m": median(error.max(axis=1)),
         "energy": median(np.mean(throttles**2, axis=(1, 2))),

@@ -9,7 +9,14 @@ from typing import Annotated
 
 from fulmar_bringup.console import log_line, print_result, write_line
 from fulmar_bringup.progress import work_bar
-from fulmar_cli.commands.arguments import JobsOption, JsonOption, SeedOption, invoked_command, option
+from fulmar_cli.commands.arguments import (
+    JobsOption,
+    JsonOption,
+    PolicyOption,
+    SeedOption,
+    invoked_command,
+    option,
+)
 from fulmar_cli.commands.benchmark_campaign import ReportOption
 from fulmar_cli.commands.values import read_names
 from fulmar_cli.extras import require
@@ -24,8 +31,9 @@ def falcon(
         str, option("S,...", "Out of exact, calm, noise, delay, light, severe and all, or `every`.")
     ] = "every",
     episodes: Annotated[
-        int, option("N", "Flights of each cell; 1 with exact state, at most 5 of mppi.", min=1)
+        int, option("N", "Flights of each cell; 1 with exact state on a path, at most 5 of mppi.", min=1)
     ] = 10,
+    policy: PolicyOption = None,
     seed: SeedOption = EVALUATION_SEED,
     out: Annotated[Path, option("DIR", "Folder of the report and its figures.")] = Path(
         "runs/benchmark/falcon"
@@ -48,6 +56,8 @@ def falcon(
 
     fulmar benchmark falcon --tasks a,d --controllers lqi --scenarios exact,calm --json
 
+    fulmar benchmark falcon --tasks hold --controllers policy --scenarios calm,light --episodes 256
+
     fulmar benchmark falcon --tasks a,b,c,d,e,f --controllers lqi,mppi,pid --scenarios exact
     """
     from fulmar_benchmarks.falcon.campaign import Request, run_falcon
@@ -68,6 +78,7 @@ def falcon(
         episodes,
         seed,
         jobs or len(os.sched_getaffinity(0)),
+        str(policy or ""),
     )
     with work_bar("flights") as progress:
         document = run_falcon(request, progress)
