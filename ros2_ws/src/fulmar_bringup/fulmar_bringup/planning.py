@@ -164,7 +164,7 @@ def plan_run(
     the_robot, the_task = load_robot(robot), load_task(task)
     goal = goal and whole_pose(goal, the_robot, "--goal")
     start = start and whole_pose(start, the_robot, "--start")
-    hz = checked_rate(the_robot, control_hz or default_control_hz(robot, task, controller, backend))
+    hz = checked_rate(the_robot, control_hz or default_control_hz(robot, task, controller, backend, policy))
     if not lockstep:
         check_beat(hz, rate)
     watched = checked_guards(default_guards(controller, backend, hardware), guards, the_robot, the_task)

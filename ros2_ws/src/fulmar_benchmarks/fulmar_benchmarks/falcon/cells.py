@@ -10,19 +10,19 @@ from typing import Any
 import numpy as np
 
 from fulmar_benchmarks.falcon.published import BESIDE
+from fulmar_bringup.system import usual_rate
 from fulmar_core.controllers.classical import FLIGHT_LAWS, gains_of
 from fulmar_core.controllers.controller import Controller
 from fulmar_core.controllers.flight_mppi import FlightMppi
 from fulmar_core.disturbances.parts import Air, Sensing
 from fulmar_core.disturbances.scenario import Scenario
 from fulmar_core.flight.turbulence import CLASSES
-from fulmar_core.policy_bundle import read_passport
 from fulmar_core.references.flight_paths import PATHS
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.rollout import roll_out_in_batch
 from fulmar_core.tasks import load_task
 from fulmar_core.trajectories import Trajectories
-from policy_server.controllers import Choice, load_controller, shipped_policy
+from policy_server.controllers import Choice, load_controller
 
 TASKS = ("hold", *PATHS)
 CONTROLLERS = ("lqi", "lqr", "mppi", "pid", "policy")
@@ -73,8 +73,7 @@ def controller_of(robot: Robot, cell: Cell) -> Controller:
     """
     task = load_task(f"fly_{cell.task}")
     if cell.controller == "policy":
-        folder = Path(cell.policy) if cell.policy else shipped_policy(robot.name, task.name)
-        rate = read_passport(folder).control_hz if folder is not None else robot.timing.control_hz
+        rate = usual_rate(robot.name, task.name, "policy", Path(cell.policy) if cell.policy else None)
         return load_controller("policy", robot, task, Choice(rate, policy=cell.policy))
     gains = gains_of(robot, cell.controller)
     if cell.scenario == "exact":
