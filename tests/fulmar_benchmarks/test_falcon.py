@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from fulmar_benchmarks.falcon.campaign import Request, cells_of, requirements
@@ -19,6 +21,30 @@ def test_a_controller_that_draws_flies_five_seeds_with_exact_state_and_others_on
     assert flown == {("mppi", "exact"): 5, ("pid", "exact"): 1, ("pid", "calm"): 10, ("pid", "light"): 10}
     few = cells_of(request("mppi", random_scenarios=("exact", "calm"), episodes=2))
     assert [cell.episodes for cell in few] == [2, 2]
+
+
+def test_flights_that_hold_a_height_begin_apart_so_exact_state_takes_as_many():
+    holding = replace(request("lqi"), tasks=("hold",))
+    assert [cell.episodes for cell in cells_of(holding)] == [10, 10, 10]
+
+
+@pytest.mark.parametrize(
+    ("scenario", "change", "good"),
+    [
+        ("calm", {}, True),
+        ("calm", {"altitude_rmse_m": 0.13}, False),
+        ("calm", {"late_altitude_rmse_m": 0.05}, False),
+        ("calm", {"survival": 0.98}, False),
+        ("light", {"altitude_rmse_m": 0.19, "late_altitude_rmse_m": 0.19, "survival": 0.97}, True),
+        ("light", {"altitude_rmse_m": 0.21}, False),
+        ("light", {"altitude_rmse_m": None, "survival": 0.0}, False),
+    ],
+)
+def test_a_policy_must_hold_its_height_and_survive(scenario, change, good):
+    held = {"altitude_rmse_m": 0.1, "late_altitude_rmse_m": 0.03, "survival": 1.0, "episodes": 256}
+    rows = requirements({"tasks": {"hold": {"policy": {scenario: held | change}}}})
+    assert rows
+    assert all(met for *_, met in rows) is good
 
 
 @pytest.mark.parametrize(

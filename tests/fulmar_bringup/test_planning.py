@@ -29,6 +29,12 @@ def test_what_was_not_said_comes_from_files_and_the_seed(plan):
     assert request.plan.policy == ""
 
 
+def test_a_policy_runs_at_the_rate_that_it_was_trained_at(plan):
+    craft = {"robot": "airship_v7", "task": "fly_hold", "backend": "mujoco"}
+    assert plan(**craft, controller="policy").plan.control_hz == 25.0
+    assert plan(**craft, controller="lqi").plan.control_hz == 100.0
+
+
 def test_one_seed_gives_one_plan_and_another_seed_another(plan):
     assert plan(seed=7) == plan(seed=7)
     assert plan(seed=7).goal != plan(seed=8).goal
