@@ -7,6 +7,7 @@ climb rate, heading for a drift, bank for a bend (thesis §5.5.2 has the LQR; th
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -154,10 +155,15 @@ class FlightLqi(FlightLaw):
         levels = servos[:, surfaces : surfaces + motors] - level[:, surfaces:]
         return np.concatenate((places, servos[:, surfaces + motors :], levels), axis=-1)
 
+    @functools.cached_property
+    def _servo_matrix(self) -> np.ndarray:
+        """How a servo goes on in a control step, shape (2, 2)."""
+        return self._craft.servo_matrix(self._dt)
+
     def _followed(self, servos: np.ndarray, command: np.ndarray) -> np.ndarray:
         """Where servos and motors are a control step after a command, shape (n, m + surfaces)."""
         surfaces, motors = self._craft.positions, len(self._craft.motors)
-        matrix = self._craft.servo_matrix(self._dt)
+        matrix = self._servo_matrix
         off = servos[:, :surfaces] - command[:, :surfaces]
         rates = servos[:, surfaces + motors :]
         places = command[:, :surfaces] + matrix[0, 0] * off + matrix[0, 1] * rates
