@@ -18,6 +18,7 @@ from fulmar_core.references.flight_paths import PATHS
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
 from fulmar_core.spatial import SpatialState
+from fulmar_core.tasks.flight_terms import is_lost
 from fulmar_core.tasks.task import Task
 from fulmar_core.tasks.terms import Errors, Tolerance, weighted_sum
 
@@ -235,11 +236,7 @@ class FollowReference(Task[SpatialState]):
 
     def collides(self, state: SpatialState, goal: Goal, robot: Robot) -> Array | None:
         """Whether the hull touches the water, or the craft is stalled beyond recovery; see `Task.collides`."""
-        assert robot.airframe is not None  # as of `check`
-        ahead, _, up = state.velocity_in_body
-        xp = array_namespace(ahead)
-        lost = xp.abs(xp.atan2(-up, ahead)) > math.radians(robot.airframe.lost_deg)
-        return (state.z + robot.hull_span[0] <= 0.0) | lost | ~xp.isfinite(state.z)
+        return is_lost(state, robot)
 
     def penalty(self, state: SpatialState, goal: Goal, robot: Robot) -> Array | None:
         """What the loss of the craft costs a learner; see `Task.penalty`."""
