@@ -20,8 +20,8 @@ FIGURES = {
 
 @pytest.fixture
 def brief(monkeypatch):
-    """Flights of two seconds in the place of a minute, in this process."""
-    monkeypatch.setattr(cells, "load_task", lambda name: replace(load_task(name), episode_s=2.0))
+    """Flights of a second in the place of a minute, in this process."""
+    monkeypatch.setattr(cells, "load_task", lambda name: replace(load_task(name), episode_s=1.0))
     monkeypatch.setattr(
         "fulmar_benchmarks.falcon.campaign.mapped",
         lambda work, given, **_: [work(*each) for each in given],

@@ -52,6 +52,7 @@ ALIKE = {
     "fly_d",
     "fly_e",
     "fly_f",
+    "fly_path",
     "fly_recover",
 }
 ROBOTS, TASKS = (

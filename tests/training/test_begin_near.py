@@ -52,6 +52,7 @@ def test_a_new_policy_answers_with_about_the_trim_whatever_it_observes(algorithm
         )
 
 
+@pytest.mark.slow
 def test_craft_of_a_new_policy_stay_above_the_water_for_a_second_and_without_it_they_do_not():
     ended = []
     for action in (first_action(ROBOT, HOLD), None):

@@ -113,10 +113,10 @@ class FlightHold(FlightLqi):
         return np.asarray((1.0 - share) * values[low] + share * values[low + 1])
 
     def _aim(self, inputs: Inputs) -> Aim:
-        """What the goals ask for."""
+        """What the goals ask for; speeds that the task does not have count as its nearest."""
         target = np.asarray(inputs.goal.current, dtype=float)
         if self._holds_climb:
-            speed = target[:, 0]
+            speed = np.clip(target[:, 0], self._speeds[0], self._speeds[-1])
             quats = self._between(self._quats, speed)
             quats /= np.linalg.norm(quats, axis=-1, keepdims=True)
             return Aim(quat_of_rows(quats), speed, 0.0 * speed)
