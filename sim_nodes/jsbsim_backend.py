@@ -18,6 +18,7 @@ from fulmar_core.episode import Episode
 from fulmar_core.errors import ConfigError, SafetyError
 from fulmar_core.flight.dynamics import FlightDynamics, flipped
 from fulmar_core.flight.turbulence import Gust
+from fulmar_core.motion import surface_positions_of
 from fulmar_core.robot import Robot
 from fulmar_core.sensors.kind import Truth
 from fulmar_core.sensors.reading import Reading
@@ -183,5 +184,6 @@ class JsbsimBackend:
             force = [0.0, 0.0, 0.0]
         world: Any = self._world.world  # of an aircraft
         air = self._dynamics.air_data(SpatialState.from_rigid(truth)[None], self._gust, world)
-        felt = Truth(truth, np.array([force[0], -force[1], -force[2]]), air=air)
+        surfaces = surface_positions_of(self.robot, self._world.actuation)
+        felt = Truth(truth, np.array([force[0], -force[1], -force[2]]), air=air, surfaces=surfaces)
         return Sample({"odometry": Reading(odometry), **self._sensors.measure(felt, self._time_s)}, truth)

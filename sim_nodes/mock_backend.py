@@ -9,7 +9,7 @@ import numpy as np
 from fulmar_core.backend import Sample
 from fulmar_core.episode import Episode
 from fulmar_core.flight.dynamics import FlightDynamics
-from fulmar_core.motion import wheel_speeds_of
+from fulmar_core.motion import surface_positions_of, wheel_speeds_of
 from fulmar_core.robot import Robot
 from fulmar_core.sensors.air_data import AirData
 from fulmar_core.sensors.kind import Truth
@@ -85,8 +85,8 @@ class MockBackend:
         self._ticks += ticks
         truth = self._state[0].to_rigid()
         wheels = wheel_speeds_of(self.robot, self._world.actuation)
-        others = self._sensors.measure(
-            Truth(truth, wheels=wheels, air=self._air()), self._ticks * self.robot.timing.physics_dt
-        )
+        surfaces = surface_positions_of(self.robot, self._world.actuation)
+        true = Truth(truth, wheels=wheels, air=self._air(), surfaces=surfaces)
+        others = self._sensors.measure(true, self._ticks * self.robot.timing.physics_dt)
         things = {name: pose[0] for name, pose in self._poses.items()}
         return Sample({"odometry": Reading(truth), **others}, truth, things)

@@ -300,15 +300,15 @@ class RunMessages:
         )
         self._write(name, message, log_ns)
 
-    def joints(self, name: str, effort: np.ndarray, time_s: float, log_ns: int) -> None:
-        none = np.zeros(0)
+    def joints(
+        self, name: str, values: np.ndarray, time_s: float, log_ns: int, field: str = "effort"
+    ) -> None:
+        arrays = dict.fromkeys(("position", "velocity", "effort"), np.zeros(0))
         message = self._new(
             "sensor_msgs/msg/JointState",
             header=self._header(time_s),
             name=list(self._names),
-            position=none,
-            velocity=none,
-            effort=np.asarray(effort, dtype=float),
+            **(arrays | {field: np.asarray(values, dtype=float)}),
         )
         self._write(name, message, log_ns)
 

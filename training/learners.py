@@ -83,8 +83,10 @@ def first_action(robot: Robot, task: Task) -> np.ndarray | None:
     """
     if not robot.flies or robot.airframe is None:
         return None
-    _, goal = task.draw(Draws.of_episode(0, 0), robot, training=True)
-    height = max(float(goal.targets[0, 0, 2]), 0.1 * robot.airframe.span)
+    start, goal = task.draw(Draws.of_episode(0, 0), robot, training=True)
+    # Where targets are no places, the height is that of the start.
+    above = start.z[0] if task.goal_topic == "goal_velocity" else goal.targets[0, 0, 2]
+    height = max(float(above), 0.1 * robot.airframe.span)
     return np.asarray(find_trim(robot, robot.airframe.speed, height).command / robot.actuators.scale)
 
 

@@ -12,6 +12,7 @@ from fulmar_core.dynamics.hydrodynamics import GRAVITY
 from fulmar_core.dynamics.rigid_body import inertia_of
 from fulmar_core.flight.dynamics import FlightDynamics
 from fulmar_core.flight.turbulence import Gust
+from fulmar_core.motion import surface_positions_of
 from fulmar_core.robot import Robot
 from fulmar_core.spatial import SpatialState
 from sim_nodes.mujoco_model.floater import OFF_CENTRE
@@ -76,8 +77,10 @@ class Aircraft:
         data.qvel[:6] = *start.velocity, *start.rate
 
     def own_truth(self, data: mujoco.MjData) -> dict[str, Any]:
-        """What the air probes would measure without errors."""
-        return {"air": self._dynamics.air_data(self._state(data), self._gust, self._world)}
+        """What air probes and servos would measure without errors."""
+        assert self._actuation is not None  # as of `fly_in`
+        air = self._dynamics.air_data(self._state(data), self._gust, self._world)
+        return {"air": air, "surfaces": surface_positions_of(self._robot, self._actuation)}
 
     def drive(
         self, model: mujoco.MjModel, data: mujoco.MjData, applied: np.ndarray, gain: np.ndarray, outside: Any

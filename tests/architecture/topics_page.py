@@ -21,6 +21,7 @@ Every topic is recorded in the bag of a run, except {UNRECORDED}.
 | 0 (closed) to 1 (open) | valves |
 | -1 to 1, share of full command | propellers |
 | N·m | reaction wheels: torque of the motor on its wheel; unloading: torque on the body |
+| rad, then 0 to 1 | aircraft: deflections of surfaces, throttles |
 | m/s, then rad/s | differential drive: speed, turn rate |
 | m/s, then rad | Ackermann steering: speed, steering angle |
 

@@ -17,6 +17,7 @@ from fulmar_core.sensors.kind import Truth
 from fulmar_core.sensors.odometer import Channel
 from fulmar_core.sensors.simulated import SimulatedSensors
 from fulmar_core.sensors.star_tracker import StarTrackerSpec
+from fulmar_core.sensors.surfaces import SurfacePositions
 from fulmar_core.sensors.table import RANGES, SENSORS
 from fulmar_core.sensors.wheels import WheelSpeeds
 from fulmar_core.state import RigidBodyState
@@ -28,6 +29,7 @@ TRUTH = Truth(
     np.array([1.0, 2.0, 9.0]),
     WheelSpeeds(("wheel_x", "wheel_y"), np.array([10.0, -20.0])),
     AirData(AirDataSpec.NAMES, np.array([28.0, 0.03, -0.01, 1.0])),
+    SurfacePositions(("elevator", "throttle"), np.array([0.1, 0.4])),
 )
 
 

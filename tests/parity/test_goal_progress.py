@@ -48,7 +48,7 @@ def drawn(task):
 
 def short(task):
     """The task in an episode in which several targets have their turn."""
-    hold = {"hold_s": 3.0} if task.goal_topic == "goal_velocity" else {}
+    hold = {"hold_s": 3.0} if hasattr(task, "hold_s") else {}
     return replace(task, episode_s=STEPS * robot_of(task).timing.control_s, **hold)
 
 

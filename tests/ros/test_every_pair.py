@@ -52,6 +52,8 @@ ALIKE = {
     "fly_d",
     "fly_e",
     "fly_f",
+    "fly_path",
+    "fly_recover",
 }
 ROBOTS, TASKS = (
     [pytest.param(name, marks=pytest.mark.slow if name in ALIKE else ()) for name in config_names(kind)]

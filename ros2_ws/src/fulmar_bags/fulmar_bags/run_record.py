@@ -24,6 +24,7 @@ from fulmar_core.topics import (
     DIAGNOSTICS,
     METADATA,
     ODOMETRY,
+    SENSOR_WIRES,
     STATUS,
     TRUTH,
     VELOCITY_COMMAND,
@@ -75,6 +76,22 @@ class Actuation:
 
 
 @dataclass(frozen=True)
+class Surfaces:
+    """Measured deflections and throttles of an aircraft over time."""
+
+    stamp_s: np.ndarray  # (n,) [s]
+    names: tuple[str, ...]  # of the columns
+    positions: np.ndarray  # (n, m): deflections [rad], throttles from 0 to 1
+
+    def __len__(self) -> int:
+        """Number of samples."""
+        return len(self.stamp_s)
+
+
+NO_SURFACES = Surfaces(np.zeros(0), (), np.zeros((0, 0)))
+
+
+@dataclass(frozen=True)
 class Places:
     """Where one thing of the task was over time."""
 
@@ -122,6 +139,7 @@ class RunRecord:
     controller: dict[str, Any]  # its metadata
     health: tuple[HealthSample, ...]
     warnings: tuple[str, ...]  # what could not be read
+    surfaces: Surfaces = NO_SURFACES  # `surfaces/state` of an aircraft
 
     @property
     def actuation(self) -> Actuation:
@@ -197,6 +215,7 @@ def _record(bag: Bag, info: dict[str, Any]) -> RunRecord:
     obstacles = reader.obstacles()
     command = VELOCITY_COMMAND if len(bag.of(VELOCITY_COMMAND)) else COMMAND
     things = reader.things(task)
+    surfaces = reader.vectors(SENSOR_WIRES["surfaces"], "position")
     return RunRecord(
         path=bag.path,
         info=info,
@@ -210,6 +229,7 @@ def _record(bag: Bag, info: dict[str, Any]) -> RunRecord:
         controller=next((text for text in reversed(texts) if text), {}),
         health=_health(reader, bag.name),
         warnings=tuple(reader.warnings),
+        surfaces=Surfaces(surfaces.stamp_ns / NS, surfaces.names, surfaces.values),
     )
 
 

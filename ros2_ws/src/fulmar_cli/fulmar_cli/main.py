@@ -32,6 +32,7 @@ from fulmar_cli.commands.install_stars import install_stars
 from fulmar_cli.commands.install_tf import install_tf
 from fulmar_cli.commands.layout import layout
 from fulmar_cli.commands.list import list_names
+from fulmar_cli.commands.new import new
 from fulmar_cli.commands.policies import policies
 from fulmar_cli.commands.rates import rates
 from fulmar_cli.commands.report import report
@@ -101,6 +102,7 @@ app.add_typer(benchmark, name="benchmark")
 app.add_typer(bundle, name="bundle")
 app.add_typer(bag, name="bag")
 app.add_typer(check, name="check")
+app.add_typer(new, name="new")
 app.add_typer(service, name="service")
 app.command()(report)
 app.command()(identify)

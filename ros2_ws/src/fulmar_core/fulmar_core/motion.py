@@ -22,6 +22,7 @@ from fulmar_core.dynamics.rolling import rolling_step
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
+from fulmar_core.sensors.surfaces import SurfacePositions
 from fulmar_core.sensors.wheels import WheelSpeeds
 
 
@@ -55,6 +56,13 @@ def wheel_speeds_of(robot: Robot, actuation: ActuationState) -> WheelSpeeds | No
         return None
     assert isinstance(robot.actuators, ReactionWheels)  # as of `actuation_of`
     return WheelSpeeds(robot.actuators.wheel_names, np.asarray(actuation.speeds[:, 0], dtype=float))
+
+
+def surface_positions_of(robot: Robot, actuation: ActuationState) -> SurfacePositions | None:
+    """True deflections and thrust levels of an aircraft in a batch of one; None of other robots."""
+    if not isinstance(actuation, FlightActuation):
+        return None
+    return SurfacePositions(robot.actuators.names, np.asarray(actuation.applied[:, 0], dtype=float))
 
 
 def may_open_late(robot: Robot, scenario: Scenario) -> bool:

@@ -5,8 +5,8 @@ The explicit table. Another law is one file here and one entry below.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +28,7 @@ from fulmar_core.controllers.default_gains import (
     pure_pursuit_gains,
     rounded,
 )
+from fulmar_core.controllers.flight_hold import FlightHold, FlightHoldLqr
 from fulmar_core.controllers.flight_lqi import (
     FlightLqi,
     FlightLqr,
@@ -60,6 +61,8 @@ VELOCITIES = ("track_velocities",)
 IN_SPACE = (
     "go_to_position_3d", "go_to_pose_3d", "go_through_positions_3d", "go_through_poses_3d", "track_velocities_3d",
 )  # fmt: skip
+HOLDS = ("hold_attitude", "hold_airspeed")
+FLIGHTS = ("follow_reference", *HOLDS)
 
 
 @dataclass(frozen=True)
@@ -70,6 +73,11 @@ class Entry:
     gains: type[Any]  # what its YAML is read into
     tasks: tuple[str, ...]  # kinds that it does
     defaults: Callable[[Robot], Any] | None = None  # gains of a robot without a YAML; None: it needs one
+    others: Mapping[str, type[Law]] = field(default_factory=dict)  # by kinds of tasks, in the place of `law`
+
+    def law_of(self, task: Task) -> type[Law]:
+        """The class that does a task."""
+        return self.others.get(task.kind, self.law)
 
 
 LAWS = {
@@ -101,8 +109,8 @@ ATTITUDE_LAWS = {
 }
 # Laws of aircraft; the first one is that of the family.
 FLIGHT_LAWS = {
-    "lqi": Entry(FlightLqi, FlightWeights, ("follow_reference",), flight_lqi_weights),
-    "lqr": Entry(FlightLqr, FlightWeights, ("follow_reference",), flight_lqr_weights),
+    "lqi": Entry(FlightLqi, FlightWeights, FLIGHTS, flight_lqi_weights, dict.fromkeys(HOLDS, FlightHold)),
+    "lqr": Entry(FlightLqr, FlightWeights, FLIGHTS, flight_lqr_weights, dict.fromkeys(HOLDS, FlightHoldLqr)),
     "mppi": Entry(FlightMppi, MppiSettings, ("follow_reference",), mppi_settings),
     "pid": Entry(FlightPid, FlightPidGains, ("follow_reference",), flight_pid_gains),
 }
@@ -247,7 +255,7 @@ def load_classical(
     if seed and isinstance(gains, MppiSettings):
         gains = replace(gains, seed=gains.seed + seed)
     try:
-        return entry.law(robot, task, gains, control_hz=control_hz, name=law or "classical")
+        return entry.law_of(task)(robot, task, gains, control_hz=control_hz, name=law or "classical")
     except ValueError as error:
         hz = control_hz or robot.timing.control_hz
         raise ConfigError(f"{entry.law.law} for '{robot.name}' at {hz:g} Hz: {error}") from error

@@ -23,6 +23,28 @@ from fulmar_core.spatial import SpatialState
 
 
 @dataclass(frozen=True)
+class HoldWeights:
+    """Weights per second of what tasks hold that are about attitude or airspeed."""
+
+    angle: float = 20.0  # of bank and pitch, per rad²
+    angle_integral: float = 20.0  # per (rad·s)²
+    speed: float = 0.5  # per (m/s)²
+    speed_integral: float = 0.1  # per m²
+    climb: float = 1.0  # per (m/s)²
+    climb_integral: float = 0.5  # per m²
+    angle_limit_deg: float = 10.0  # errors of the attitude beyond count as this [deg]
+    speed_limit: float = 2.0  # same of speed and climb [m/s]
+    attack_margin_deg: float = 8.0  # of the angle of attack from that of level flight [deg]
+    lead_s: float = 0.2  # ahead of which it counts [s]
+
+    def __post_init__(self) -> None:
+        if min(self.angle, self.speed, self.climb, self.angle_limit_deg, self.speed_limit) <= 0.0:
+            raise ValueError("angle, speed, climb and both limits must be greater than 0.")
+        if min(self.angle_integral, self.speed_integral, self.climb_integral) < 0.0:
+            raise ValueError("weights must not be negative.")
+
+
+@dataclass(frozen=True)
 class FlightWeights:
     """Weights per second, as read from `configs/controllers/<robot>_lqi.yaml` or `_lqr.yaml`."""
 
@@ -40,6 +62,7 @@ class FlightWeights:
     observer: ObserverNoise | None = (
         None  # of a Kalman filter on the craft's own model; None: state as measured
     )
+    hold: HoldWeights = HoldWeights()  # of tasks without a reference
 
     def __post_init__(self) -> None:
         if min(self.height, self.side, self.surface, self.throttle, self.error_limit, self.smooth_s) <= 0.0:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_core.attitude import exponential, minus, normalised, plus, product, rotation_error
+from fulmar_core.attitude import euler_of, exponential, minus, normalised, plus, product, rotation_error
 from fulmar_core.controllers.controller import Inputs
 from fulmar_core.controllers.lqr import regulator
 from fulmar_core.flight.dynamics import FlightDynamics
@@ -41,14 +41,20 @@ class ObserverNoise:
 class FlightObserver:
     """The believed state of n craft."""
 
-    def __init__(self, robot: Robot, noise: ObserverNoise, dt: float) -> None:
-        """Solve for the gain; `dt` of a control step [s].
+    def __init__(self, robot: Robot, noise: ObserverNoise, dt: float, *, any_heading: bool = False) -> None:
+        """Solve for the gain.
+
+        Args:
+            robot: The craft.
+            noise: What its model does not know.
+            dt: Of a control step [s].
+            any_heading: Whether it turns; False: it flies along the world's x.
 
         Raises:
             ConfigError: The craft has no trim at its speed.
         """
         assert robot.airframe is not None
-        self._robot, self._dt = robot, dt
+        self._robot, self._dt, self._any_heading = robot, dt, any_heading
         self._dynamics = FlightDynamics(robot, turbulent=False)
         self._substeps = robot.timing.substeps(1.0 / dt)
         model = flight_model(robot, find_trim(robot, robot.airframe.speed, 0.5 * robot.airframe.span), dt)
@@ -90,24 +96,26 @@ class FlightObserver:
         return self._state
 
     def _corrected(self, ahead: SpatialState, measured: SpatialState) -> SpatialState:
-        off = np.stack(
-            (
-                measured.y - ahead.y,
-                measured.z - ahead.z,
-                *rotation_error(ahead.quat, measured.quat),
-                *minus(measured.velocity, ahead.velocity),
-                *minus(measured.rate, ahead.rate),
+        heading = euler_of(ahead.quat)[2] if self._any_heading else 0.0 * ahead.x
+        c, s = np.cos(heading), np.sin(heading)
+        away, velocity = (
+            (c * v[0] + s * v[1], c * v[1] - s * v[0], v[2])
+            for v in (
+                minus(measured.position, ahead.position),
+                minus(measured.velocity, ahead.velocity),
             )
         )
+        turned = rotation_error(ahead.quat, measured.quat)
+        off = np.stack((*away[1:], *turned, *velocity, *minus(measured.rate, ahead.rate)))
         step = self._gain @ off
-        turn = (step[2], step[3], step[4])
         # Along x the filter of the other places holds.
-        x = ahead.x + float(self._gain[0, 0]) * (measured.x - ahead.x)
+        place = float(self._gain[0, 0]) * away[0], step[0], step[1]
+        moved, faster = (
+            (c * v[0] - s * v[1], s * v[0] + c * v[1], v[2]) for v in (place, (step[5], step[6], step[7]))
+        )
         return SpatialState(
-            x,
-            ahead.y + step[0],
-            ahead.z + step[1],
-            *normalised(product(ahead.quat, exponential(turn))),
-            *plus(ahead.velocity, (step[5], step[6], step[7])),
+            *plus(ahead.position, moved),
+            *normalised(product(ahead.quat, exponential((step[2], step[3], step[4])))),
+            *plus(ahead.velocity, faster),
             *plus(ahead.rate, (step[8], step[9], step[10])),
         )

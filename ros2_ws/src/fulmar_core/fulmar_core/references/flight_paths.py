@@ -5,7 +5,7 @@ The formulas are those of `elharirymatteo/falcon-s`, `controllers/lqr/reference.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -27,3 +27,23 @@ PATHS: dict[str, tuple[Profile, Profile]] = {  # to the left, and above the wate
     "e": (lambda t: 3.0 * np.sin(0.03 * t), lambda t: 3.0 - 2.0 * np.cos(0.18 * t)),
     "f": (lambda t: 3.0 * np.sin(0.2 * t), lambda t: 3.0 - 2.0 * np.cos(0.2 * t)),
 }
+
+
+def through(waypoints: Sequence[tuple[float, float, float]], speed: float) -> tuple[Profile, Profile]:
+    """Side and height of a path through waypoints (ahead, to the left, up) [m], which is flown at a speed [m/s].
+
+    It is a monotone cubic between waypoints (Fritsch and Carlson, SIAM Journal on Numerical Analysis 17, 1980), which
+    overshoots none of them. Before the first one and beyond the last one it is level and straight ahead.
+    """
+    ahead, side, above = np.array(waypoints, dtype=float).T
+    times = ahead / speed
+
+    def profile(values: np.ndarray) -> Profile:
+        if len(values) == 1:
+            return lambda t: values[0] + 0.0 * t
+        from scipy.interpolate import PchipInterpolator  # slow to import, and only such paths need it
+
+        curve = PchipInterpolator(times, values)
+        return lambda t: np.asarray(curve(np.clip(t, times[0], times[-1])))
+
+    return profile(side), profile(above)

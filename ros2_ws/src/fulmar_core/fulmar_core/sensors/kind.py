@@ -24,6 +24,7 @@ class Truth:
     )
     wheels: Any = None  # `sensors.wheels.WheelSpeeds` of a robot with reaction wheels
     air: Any = None  # `sensors.air_data.AirData` of an aircraft
+    surfaces: Any = None  # `sensors.surfaces.SurfacePositions` of an aircraft
 
 
 class SimulatedSensor(Protocol):

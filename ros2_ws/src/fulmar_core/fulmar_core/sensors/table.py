@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from fulmar_core.plausible_ranges import Plausible
-from fulmar_core.sensors import air_data, imu, odometer, star_tracker, wheels
+from fulmar_core.sensors import air_data, imu, odometer, star_tracker, surfaces, wheels
 from fulmar_core.sensors.kind import SensorKind
 
 # By the name in a robot's YAML, in the order in which a plant publishes: controllers wait for the odometry.
@@ -15,6 +15,7 @@ SENSORS: dict[str, SensorKind] = {
     "star_tracker": star_tracker.KIND,
     "wheels": wheels.KIND,
     "air_data": air_data.KIND,
+    "surfaces": surfaces.KIND,
 }
 
 RANGES: tuple[Plausible, ...] = tuple(

@@ -20,6 +20,7 @@ from fulmar_core.tasks.go_to_pose_3d import GoToPose3d
 from fulmar_core.tasks.go_to_position import GoToPosition
 from fulmar_core.tasks.go_to_position_3d import GoToPosition3d
 from fulmar_core.tasks.go_to_position_with_obstacles import GoToPositionWithObstacles
+from fulmar_core.tasks.hold_flight import HoldAirspeed, HoldAttitude
 from fulmar_core.tasks.own_task import load_own_task
 from fulmar_core.tasks.point import Point
 from fulmar_core.tasks.push_block import PushBlock
@@ -50,6 +51,8 @@ ShippedTask = (  # what a file of `configs/tasks` can be
     | GoThroughPoses3d
     | Point
     | FollowReference
+    | HoldAttitude
+    | HoldAirspeed
 )
 _asked_for: set[str] = set()  # dotted paths that this process was given, in the place of what a bag names
 

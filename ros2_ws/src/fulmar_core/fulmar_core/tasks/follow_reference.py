@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -14,10 +15,11 @@ from fulmar_core.counter_rng import Draws
 from fulmar_core.errors import ConfigError
 from fulmar_core.flight.trim import find_trim
 from fulmar_core.goal import Goal, no_obstacles
-from fulmar_core.references.flight_paths import PATHS
+from fulmar_core.references.flight_paths import PATHS, through
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
 from fulmar_core.spatial import SpatialState
+from fulmar_core.tasks.flight_terms import is_lost
 from fulmar_core.tasks.task import Task
 from fulmar_core.tasks.terms import Errors, Tolerance, weighted_sum
 
@@ -77,9 +79,11 @@ class FollowReference(Task[SpatialState]):
     start: FlightStart
     tolerance: Tolerance
     reward_weights: FlightReward
-    reference: Literal["hold", "a", "b", "c", "d", "e", "f"] = "hold"  # of `references.flight_paths.PATHS`
+    # "hold", one of `references.flight_paths.PATHS`, or through the waypoints of the file
+    reference: Literal["hold", "a", "b", "c", "d", "e", "f", "waypoints"] = "hold"
     height: Range = (1.0, 1.0)  # that `hold` draws from [m]
     spacing_s: float = 0.1  # between two places of the path [s]
+    waypoints: tuple[tuple[float, float, float], ...] = ()  # ahead of the start, to the left and up [m]
 
     goal_topic: ClassVar[str] = "goal_path"
     state_type = SpatialState
@@ -91,6 +95,11 @@ class FollowReference(Task[SpatialState]):
             raise ValueError(f"'height' must be [low, high] with 0 < low <= high, found {list(self.height)}.")
         if self.spacing_s <= 0.0 or self.episode_s <= 0.0:
             raise ValueError("spacing_s and episode_s must be greater than 0.")
+        if (self.reference == "waypoints") is not bool(self.waypoints):
+            raise ValueError("'waypoints' go with 'reference: waypoints', and that with them.")
+        ahead = [place[0] for place in self.waypoints]
+        if any(b <= a for a, b in pairwise(ahead)):
+            raise ValueError("each of 'waypoints' must lie further ahead than the one before.")
 
     def farthest_start(self, *, training: bool) -> tuple[str, float]:
         """See `Task.farthest_start`."""
@@ -104,10 +113,12 @@ class FollowReference(Task[SpatialState]):
             ConfigError: As of `Task.check`, or the lowest start lies in the water.
         """
         super().check(robot)
-        lowest = self.height[0] + self.start.height[0]
-        if self.reference == "hold" and lowest + robot.hull_span[0] <= 0.0:
+        lowest, leads = self.height[0] + self.start.height[0], "starts at"
+        if self.waypoints:
+            lowest, leads = min(place[2] for place in self.waypoints), "leads down to"
+        if self.reference in ("hold", "waypoints") and lowest + robot.hull_span[0] <= 0.0:
             raise ConfigError(
-                f"task '{self.name}' starts at {lowest:g} m, where the hull of '{robot.name}' touches the ground. Its "
+                f"task '{self.name}' {leads} {lowest:g} m, where the hull of '{robot.name}' touches the ground. Its "
                 f"origin is {-robot.hull_span[0]:g} m above its lowest point."
             )
 
@@ -141,7 +152,7 @@ class FollowReference(Task[SpatialState]):
         if self.reference == "hold":
             targets[:, :, 2] = np.asarray(held)[:, None]
         else:
-            side, above = PATHS[self.reference]
+            side, above = through(self.waypoints, speed) if self.waypoints else PATHS[self.reference]
             targets[..., 1], targets[..., 2] = side(times), above(times)
         goal = Goal(xp.asarray(targets), xp.zeros_like(held), no_obstacles(worlds))
         return self.begun(goal, None)
@@ -235,11 +246,7 @@ class FollowReference(Task[SpatialState]):
 
     def collides(self, state: SpatialState, goal: Goal, robot: Robot) -> Array | None:
         """Whether the hull touches the water, or the craft is stalled beyond recovery; see `Task.collides`."""
-        assert robot.airframe is not None  # as of `check`
-        ahead, _, up = state.velocity_in_body
-        xp = array_namespace(ahead)
-        lost = xp.abs(xp.atan2(-up, ahead)) > math.radians(robot.airframe.lost_deg)
-        return (state.z + robot.hull_span[0] <= 0.0) | lost | ~xp.isfinite(state.z)
+        return is_lost(state, robot)
 
     def penalty(self, state: SpatialState, goal: Goal, robot: Robot) -> Array | None:
         """What the loss of the craft costs a learner; see `Task.penalty`."""

@@ -18,6 +18,7 @@ from matplotlib.figure import Figure
 from fulmar_bags.contents import Bag
 from fulmar_bags.decode import TWIST, Odometries, Vectors, joint_vectors, odometries, twist_vectors
 from fulmar_bags.figures import describe
+from fulmar_core.topics import SENSOR_WIRES
 from fulmar_evaluation.report.page import Part, Plot, cells, html_page, table
 from fulmar_evaluation.report.space_plot import SIDES
 from fulmar_evaluation.report.style import CONTROLLER_COLOURS, legend, quiet_grid
@@ -125,7 +126,8 @@ def _drawings(bag: Bag, seen: Odometries) -> list[Drawing]:
     ]
     for topic in bag.topics.values():
         if topic.type in COMMANDS and len(topic):
-            vectors = COMMANDS[topic.type](topic)
+            measured = topic.name.endswith(f"/{SENSOR_WIRES['surfaces'].name}")
+            vectors = joint_vectors(topic, "position") if measured else COMMANDS[topic.type](topic)
             if len(vectors) and 0 < len(vectors.names) <= MOST_ACTUATORS:
                 found.append(_actuators(topic.name, vectors, _seconds(vectors, seen, topic.type == TWIST)))
     found.append(

@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from datetime import datetime
 from html import escape
 from pathlib import Path
 
 import numpy as np
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, SubFigure
 
 from fulmar_bags.run_record import RunRecord
 from fulmar_core.errors import ConfigError
 from fulmar_core.spatial import SpatialState
 from fulmar_evaluation.report.control_plot import actuators_height, draw_actuators, draw_latency, draw_use
 from fulmar_evaluation.report.error_plot import counting, draw_progress, strips
+from fulmar_evaluation.report.flight_plot import (
+    FLIGHT_ROWS,
+    PATH_ROWS,
+    draw_flight,
+    draw_flight_path,
+    draw_surfaces,
+    flies,
+)
 from fulmar_evaluation.report.motion_plot import MOTION_ROWS, draw_motion
 from fulmar_evaluation.report.page import Part, Plot, cells, faint, html_page, table
 from fulmar_evaluation.report.run_view import View, evaluated, in_space, result_of, rule, table_rows, views
@@ -69,10 +77,14 @@ def _check_alike(records: Sequence[RunRecord]) -> None:
 
 
 def _parts(runs: Sequence[View]) -> list[Part]:
+    path: tuple[Callable[[Sequence[View]], Plot], ...]
     path = (_space_path, _progress, _motion) if in_space(runs) else (_trajectory, _progress)
     if all(result.robot.actuators.turns_only for _, result in evaluated(runs)):
         path = (_progress, _motion)  # a satellite stays where it is
-    plots = (*path, _actuators, _use, _latency) if evaluated(runs) else ()
+    if flies(runs):
+        path = (_flight_path, _progress, _flight, _motion)
+    use = (_surfaces,) if flies(runs) else (_actuators, _use)
+    plots = (*path, *use, _latency) if evaluated(runs) else ()
     return [
         *faint(_subtitle(runs)),
         f'<div class="results">{"".join(map(_result, runs))}</div>',
@@ -152,12 +164,15 @@ def _overview(runs: Sequence[View], title: str) -> Figure:
     """All of it on one sheet."""
     rows, space = len(runs), in_space(runs)
     count, motion = _rows(runs), MOTION_ROWS if space else 0
-    high, low = 1.28 * (count + motion + 1) if space else 4.9, rows * actuators_height(runs, 1.5) + 0.2
+    high = 1.28 * max(count + motion + 1, PATH_ROWS + FLIGHT_ROWS if flies(runs) else 0) if space else 4.9
+    low = 3.6 if flies(runs) else rows * actuators_height(runs, 1.5) + 0.2
     figure = Figure(figsize=(11.0, high + low + 0.5), layout="constrained")
     top, bottom = figure.subfigures(2, 1, height_ratios=(high, low))
     near = space and any(has_place(result) for _, result in evaluated(runs))
     left, right = top.subfigures(1, 2, width_ratios=(1.2 if near else 1.0, 1.0))
-    if space:
+    if flies(runs):
+        _flight_overview(left, runs)
+    elif space:
         draw_space(left, runs, stacked=True)
     else:
         path = left.subplots()
@@ -171,12 +186,25 @@ def _overview(runs: Sequence[View], title: str) -> Figure:
         axes[count - 1].set_xlabel("")
         draw_motion(axes[count:-1], runs)
     draw_latency(axes[-1], runs)
-    for one, run in zip(bottom.subplots(rows, 1, sharex=True, squeeze=False)[:, 0], runs, strict=True):
-        draw_actuators(one, run)
-        one.set_xlabel("time [s]")
-        one.label_outer()
+    if flies(runs):
+        for pair, run in zip(bottom.subplots(2, rows, squeeze=False).T, runs, strict=True):
+            draw_surfaces(pair, run)
+    else:
+        for one, run in zip(bottom.subplots(rows, 1, sharex=True, squeeze=False)[:, 0], runs, strict=True):
+            draw_actuators(one, run)
+            one.set_xlabel("time [s]")
+            one.label_outer()
     figure.suptitle(title, fontsize=13, fontweight="bold")
     return figure
+
+
+def _flight_overview(figure: SubFigure, runs: Sequence[View]) -> None:
+    """Path, height and energy of flights, below one another."""
+    path, flight = figure.subfigures(2, 1, height_ratios=(PATH_ROWS, FLIGHT_ROWS))
+    rows = path.subplots(PATH_ROWS, 1)
+    draw_flight_path(rows, runs)
+    legend(rows[0], loc="best", ncols=1 + len(runs))
+    draw_flight(flight.subplots(FLIGHT_ROWS, 1), runs)
 
 
 def _rows(runs: Sequence[View]) -> int:
@@ -233,6 +261,36 @@ def _space_path(runs: Sequence[View]) -> Plot:
         strokes are the wanted axes. Below, the last stretch: bold is the closing window, the dot is the end, the dashed
         circle is the tolerance."""
     return Plot("The path, seen from above and from the side", caption, figure)
+
+
+def _flight_path(runs: Sequence[View]) -> Plot:
+    figure = Figure(figsize=(WIDTH, 1.0 + 1.6 * PATH_ROWS), layout="constrained")
+    rows = figure.subplots(PATH_ROWS, 1)
+    draw_flight_path(rows, runs)
+    legend(rows[0], loc="best", ncols=1 + len(runs))
+    caption = """
+    Each view has a scale of its own: a flight is much longer than it is wide or high."""
+    return Plot("The path, seen from above and from the side", caption, figure)
+
+
+def _flight(runs: Sequence[View]) -> Plot:
+    figure = Figure(figsize=(WIDTH, 0.5 + 1.5 * FLIGHT_ROWS), layout="constrained")
+    rows = figure.subplots(FLIGHT_ROWS, 1, sharex=True)
+    draw_flight(rows, runs)
+    legend(rows[0], loc="upper right", ncols=len(runs))
+    caption = """
+    The dashed line is the reference. Energy is the mean square of the throttles, added up: seconds at full throttle."""
+    return Plot("Height and energy", caption, figure)
+
+
+def _surfaces(runs: Sequence[View]) -> Plot:
+    figure = Figure(figsize=(WIDTH, 3.8 * len(runs)), layout="constrained")
+    rows = figure.subplots(2 * len(runs), 1, squeeze=False)[:, 0]
+    for number, run in enumerate(runs):
+        draw_surfaces(rows[2 * number : 2 * number + 2], run)
+    caption = """
+    A positive elevator lowers the nose, a positive aileron the right wing, and a positive rudder turns to the left."""
+    return Plot("What surfaces and throttles did", caption, figure)
 
 
 def _motion(runs: Sequence[View]) -> Plot:

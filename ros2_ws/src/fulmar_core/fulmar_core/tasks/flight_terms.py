@@ -1,0 +1,45 @@
+"""What tasks of aircraft share: when a craft is lost, its attitude without its heading, and how flights begin."""
+
+from __future__ import annotations
+
+import math
+
+from fulmar_core.arrays import array_namespace, clip
+from fulmar_core.attitude import Quaternion, Vector, cross, dot, length, scaled, turn_back
+from fulmar_core.robot import Robot
+from fulmar_core.rotation import Array
+from fulmar_core.spatial import SpatialState
+
+
+def is_lost(state: SpatialState, robot: Robot) -> Array:
+    """Whether the hull touches the water, or the craft is stalled beyond recovery, shape (...,)."""
+    assert robot.airframe is not None  # as of `Robot.flies`
+    xp = array_namespace(state.x)
+    stalled = xp.abs(angle_of_attack(state)) > math.radians(robot.airframe.lost_deg)
+    return (state.z + robot.hull_span[0] <= 0.0) | stalled | ~xp.isfinite(state.z)
+
+
+def angle_of_attack(state: SpatialState) -> Array:
+    """Against still air, shape (...,) [rad]."""
+    ahead, _, up = state.velocity_in_body
+    return array_namespace(ahead).atan2(-up, ahead)
+
+
+def up_in_body(quat: Quaternion) -> Vector:
+    """The world's z axis along the body's axes, which says all of an attitude but the heading."""
+    zero = 0.0 * quat[0]
+    return turn_back(quat, (zero, zero, 1.0 + zero))
+
+
+def tilt_error(quat: Quaternion, target: Quaternion) -> Vector:
+    """Shortest rotation vector in the body's frame by which an attitude differs from a target, whatever its heading.
+
+    Returns:
+        Axis times angle [rad]; a positive x part is a right wing that is too low, a positive y part a nose.
+    """
+    now, wanted = up_in_body(quat), up_in_body(target)
+    axis = cross(now, wanted)
+    sine = length(axis)
+    xp = array_namespace(sine)
+    angle = xp.atan2(sine, dot(now, wanted))
+    return scaled(angle / clip(sine, 1e-9, None), axis)

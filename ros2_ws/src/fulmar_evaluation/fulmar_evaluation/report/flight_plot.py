@@ -1,0 +1,120 @@
+"""The flight of an aircraft: path with its reference, height and side over time, surfaces and energy."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from fulmar_core.actuators.control_surfaces import ControlSurfaces
+from fulmar_core.tasks.follow_reference import FollowReference
+from fulmar_evaluation.report.run_view import View, evaluated
+from fulmar_evaluation.report.style import BODY_AXES, CONTROLLER_COLOURS, DASHED, INK, legend, quiet_grid
+from fulmar_evaluation.run_evaluation import RunResult
+
+PATH_ROWS, FLIGHT_ROWS = 2, 3
+LEAST_SPAN = 0.5  # of an axis of height or side: less is noise [m]
+REFERENCE: dict[str, Any] = {"color": INK, "linestyle": DASHED, "linewidth": 0.9, "label": "reference"}
+PARTS = (*BODY_AXES, CONTROLLER_COLOURS["policy"], CONTROLLER_COLOURS["lqr"])  # of surfaces and throttles
+
+
+def flies(runs: Sequence[View]) -> bool:
+    """Whether the runs are flights of aircraft."""
+    return any(result.robot.flies for _, result in evaluated(runs))
+
+
+def draw_flight_path(rows: Sequence[Axes] | np.ndarray, runs: Sequence[View]) -> None:
+    """Side and height over the way ahead, each at a scale of its own, beside the reference."""
+    for axes, up in zip(rows, (1, 2), strict=True):
+        for order, (run, result) in enumerate(evaluated(runs)):
+            way, aims = run.record.motion.position[result.samples], reference_places(result)
+            axes.plot(way[:, 0], way[:, up], color=run.colour, label=run.label)
+            if order == 0 and aims is not None:
+                axes.plot(way[:, 0], aims[:, up], **REFERENCE)
+        _at_least(axes)
+        quiet_grid(axes)
+        axes.set_ylabel("y [m]" if up == 1 else "z [m]")
+    rows[0].set_title("to the left")
+    rows[1].set_title("height")
+    rows[0].tick_params(labelbottom=False)
+    rows[-1].set_xlabel("x [m]")
+
+
+def draw_flight(rows: Sequence[Axes] | np.ndarray, runs: Sequence[View]) -> None:
+    """Height, its error, and energy over time."""
+    height, off, energy = rows
+    for order, (run, result) in enumerate(evaluated(runs)):
+        place, aims = run.record.motion.position[result.samples], reference_places(result)
+        look = {"color": run.colour, "linewidth": 1.2}
+        height.plot(result.time_s, place[:, 2], label=run.label, **look)
+        energy.plot(result.time_s, _energy(result), **look)
+        if aims is not None:
+            off.plot(result.time_s, place[:, 2] - aims[:, 2], **look)
+            if order == 0:
+                height.plot(result.time_s, aims[:, 2], **REFERENCE)
+    _at_least(height)
+    for axes, label in zip(rows, ("height [m]", "height error [m]", "energy [s]"), strict=True):
+        quiet_grid(axes)
+        axes.set_xlim(0.0, max((result.duration_s for _, result in evaluated(runs)), default=1.0))
+        axes.set_ylabel(label)
+    energy.set_ylim(bottom=0.0)
+    for axes in rows[:-1]:
+        axes.tick_params(labelbottom=False)
+    energy.set_xlabel("time [s]")
+
+
+def reference_places(result: RunResult) -> np.ndarray | None:
+    """Places of the reference over time, between its known places in a straight line, shape (n, 3) [m]; None: none."""
+    if not isinstance(result.task, FollowReference):
+        return None
+    steps = np.arange(len(result.aims))
+    new = np.flatnonzero(np.any(np.diff(result.aims[:, 1:3], axis=0) != 0.0, axis=1)) + 1
+    known = np.unique(np.concatenate(([0], new)))
+    return np.stack([np.interp(steps, known, result.aims[known, axis]) for axis in range(3)], axis=-1)
+
+
+def _energy(result: RunResult) -> np.ndarray:
+    """Mean square of the throttles, added up: seconds at full throttle that would cost as much, shape (n,) [s]."""
+    craft = result.robot.actuators
+    assert isinstance(craft, ControlSurfaces)  # as of `Robot.flies`
+    throttles = result.run.shares[0, :, craft.positions :]
+    return np.asarray(np.cumsum(np.mean(throttles**2, axis=-1)) * result.run.control_dt)
+
+
+def draw_surfaces(rows: Sequence[Axes] | np.ndarray, run: View) -> None:
+    """Deflections in the first row and throttles in the second: as measured, else as applied."""
+    for _, result in evaluated([run]):
+        craft, begin_s = result.robot.actuators, float(run.record.motion.stamp_s[0])
+        measured = len(run.record.surfaces) > 0
+        if measured:
+            names, values = run.record.surfaces.names, run.record.surfaces.positions
+            time_s = run.record.surfaces.stamp_s - begin_s
+        else:
+            names, values = craft.names, result.run.shares[0] * craft.scale
+            time_s = result.time_s
+        for number, name in enumerate(names):
+            turned = not name.startswith("throttle")
+            shown = np.rad2deg(values[:, number]) if turned else values[:, number]
+            rows[0 if turned else 1].plot(
+                time_s, shown, color=PARTS[number % len(PARTS)], linewidth=0.9, label=name.replace("_", " ")
+            )
+        for axes in rows:
+            axes.set_xlim(0.0, result.duration_s)
+        rows[0].set_title(f"{run.label}, {'measured' if measured else 'applied'}", loc="left", color=INK)
+    for axes, label in zip(rows, ("deflection [°]", "throttle"), strict=True):
+        quiet_grid(axes)
+        axes.set_ylabel(label)
+        legend(axes, loc="upper right", ncols=3)
+    rows[0].tick_params(labelbottom=False)
+    rows[1].set_ylim(0.0, 1.05)
+    rows[1].set_xlabel("time [s]")
+
+
+def _at_least(axes: Axes) -> None:
+    """Let the vertical axis span so much that noise looks like noise."""
+    low, high = axes.get_ylim()
+    if high - low < LEAST_SPAN:
+        middle = 0.5 * (low + high)
+        axes.set_ylim(middle - 0.5 * LEAST_SPAN, middle + 0.5 * LEAST_SPAN)

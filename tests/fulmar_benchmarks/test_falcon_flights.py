@@ -1,0 +1,88 @@
+"""`fulmar benchmark falcon`: one short flight, its keys and report, and what it refuses."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fulmar_benchmarks.falcon import cells
+from fulmar_core.tasks import load_task
+from tests.fulmar_cli.command_line import complaint
+
+FIGURES = {
+    "rmse_per_axis_m", "rmse_m", "altitude_rmse_m", "settling_s", "peak_error_m", "energy", "survival", "episodes",
+    "thesis",
+}  # fmt: skip
+
+
+@pytest.fixture
+def brief(monkeypatch):
+    """Flights of a second in the place of a minute, in this process."""
+    monkeypatch.setattr(cells, "load_task", lambda name: replace(load_task(name), episode_s=1.0))
+    monkeypatch.setattr(
+        "fulmar_benchmarks.falcon.campaign.mapped",
+        lambda work, given, **_: [work(*each) for each in given],
+    )
+
+
+def test_a_flight_has_the_stated_keys(fulmar, brief, tmp_path):
+    words = ("--tasks", "a", "--controllers", "lqi", "--scenarios", "exact", "--episodes", 1)
+    code, out, _ = fulmar(
+        "benchmark", "falcon", *words, "--out", tmp_path / "falcon", "--no-report", "--json"
+    )
+    assert code == 0
+    document = json.loads(out)
+    assert set(document["tasks"]) == {"a"}
+    assert set(document["tasks"]["a"]) == {"lqi"}
+    assert set(document["tasks"]["a"]["lqi"]) == {"exact"}
+    found = document["tasks"]["a"]["lqi"]["exact"]
+    assert set(found) >= FIGURES
+    assert found["episodes"] == 1
+    assert found["survival"] == 1.0
+    assert found["thesis"]["rmse_per_axis_m"] == 0.025
+    assert found["rmse_per_axis_m"] == pytest.approx(found["rmse_m"] / np.sqrt(3.0))
+    assert found["altitude_rmse_m"] <= found["rmse_m"] < 0.05
+    assert 0.05 < found["energy"] < 0.5, "throttles are about 0.38 at one metre"
+    saved = json.loads((tmp_path / "falcon" / "falcon.json").read_text(encoding="utf-8"))
+    assert saved["tasks"] == document["tasks"]
+    assert not list((tmp_path / "falcon").glob("*.html"))
+
+
+@pytest.mark.slow
+def test_a_report_is_a_page_with_both_plots(fulmar, brief, tmp_path):
+    words = ("--tasks", "a,hold", "--controllers", "lqi", "--scenarios", "exact,light", "--episodes", 2)
+    code, out, _ = fulmar("benchmark", "falcon", *words, "--out", tmp_path / "falcon")
+    assert code == 0
+    assert "hold" in out
+    (page,) = (tmp_path / "falcon").glob("*.html")
+    text = page.read_text(encoding="utf-8")
+    assert text.count("<svg") == 2
+    assert "Ground effect" in text
+
+
+def test_a_policy_that_is_not_shipped_is_left_out(fulmar, brief, tmp_path):
+    words = ("--tasks", "f", "--controllers", "policy", "--scenarios", "exact", "--no-report")
+    code, out, _ = fulmar(
+        "benchmark", "falcon", "--robot", "navion", *words, "--out", tmp_path / "o", "--json"
+    )
+    assert code == 0
+    assert json.loads(out)["tasks"] == {}
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (("--tasks", "g"), "'g'"),
+        (("--scenarios", "calmer"), "Did you mean 'calm'?"),
+        (("--controllers", "lqx"), "'lqx'"),
+        (
+            ("--robot", "navien", "--tasks", "a", "--controllers", "lqi", "--scenarios", "exact"),
+            "Did you mean 'navion'?",
+        ),
+    ],
+)
+def test_a_wrong_name_is_one_line(fulmar, brief, tmp_path, words, says):
+    assert says in complaint(fulmar("benchmark", "falcon", *words, "--out", tmp_path / "o", "--json"))
