@@ -6,6 +6,7 @@ import copy
 import json
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -64,6 +65,13 @@ QUICK = {
 } | {("policy", *pair) for pair in LEARNED}
 
 
+def rate_of(name, robot, task):
+    """Command rate that a controller runs at: of a policy that which it was trained at, else the robot's [Hz]."""
+    if name == "policy":
+        return read_passport(Path(LEARNED[robot.name, task.name])).control_hz
+    return robot.timing.control_hz
+
+
 def marked(name, robot, task):
     """A case as a parameter; slow where the quick ones do without it."""
     names = (name, robot.name, task.name)
@@ -75,7 +83,7 @@ def marked(name, robot, task):
 def case(request):
     name, robot, task = request.param
     policy = LEARNED.get((robot.name, task.name), "")
-    controller = load_controller(name, robot, task, Choice(robot.timing.control_hz, policy))
+    controller = load_controller(name, robot, task, Choice(rate_of(name, robot, task), policy))
     return name, robot, task, controller
 
 
@@ -118,9 +126,9 @@ def test_every_controller_and_every_robot_is_under_this_contract():
 
 
 def test_it_has_its_name_its_rate_and_asks_for_an_estimator_or_none(case):
-    name, robot, _, controller = case
+    name, robot, task, controller = case
     assert controller.name == name
-    assert controller.control_hz == robot.timing.control_hz
+    assert controller.control_hz == rate_of(name, robot, task)
     assert controller.estimator is None or isinstance(controller.estimator, HealthSettings)
 
 
