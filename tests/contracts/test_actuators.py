@@ -184,6 +184,7 @@ class TestRefuge:
 
         class Glide:
             longest_s = np.inf
+            doing = "glides"
 
             def command(self, since_s, last, state):
                 seen.append((since_s, state))

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from fulmar_core.actuators.refuge import DOWN
 from fulmar_core.attitude import euler_of, from_euler
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import draw_episode
-from fulmar_core.flight.refuge import refuge_of
+from fulmar_core.flight.refuge import DESCENDS, HOLD_S, HOLDS, refuge_of
 from fulmar_core.flight.trim import find_trim, flying_at
 from fulmar_core.robot import load_robot
 from fulmar_core.spatial import SpatialState
@@ -57,7 +59,62 @@ def test_a_bank_at_the_moment_of_death_is_taken_out():
     assert climb.min() >= -1.0
 
 
-def test_without_a_measured_state_throttles_are_idle():
+TRIM = find_trim(ROBOT, ROBOT.airframe.speed, 1.0)
+
+
+def at_height(height: float):
+    """Level flight, as it is measured."""
+    return replace(TRIM.state, z=np.asarray(height)).to_rigid()
+
+
+@pytest.fixture(scope="module")
+def solved():
+    """With its gains."""
+    return refuge_of(ROBOT)
+
+
+@pytest.fixture
+def refuge(solved):
+    return copy.deepcopy(solved)
+
+
+def test_it_holds_its_height_then_descends_and_says_so(refuge):
+    last = TRIM.command
+    refuge.command(0.0, last, at_height(1.0))
+    refuge.command(HOLD_S, last, at_height(1.0))
+    assert refuge.doing == HOLDS
+    refuge.command(HOLD_S + 0.01, last, at_height(1.0))
+    assert refuge.doing == DESCENDS
+
+
+def test_on_the_ground_its_throttles_go_idle_and_stay_so_through_a_wrong_height(refuge):
+    last = TRIM.command
+    refuge.command(0.0, last, at_height(0.5))
+    for step in range(200):
+        refuge.command(HOLD_S + 0.01 * step, last, at_height(0.4))
+    assert refuge.doing == DOWN
     np.testing.assert_array_equal(
-        refuge_of(ROBOT).command(0.0, np.ones(5), None), ROBOT.actuators.safe_command
+        refuge.command(HOLD_S + 3.0, last, at_height(0.6)), ROBOT.actuators.safe_command
     )
+
+
+def test_one_low_measurement_over_the_water_does_not_stop_its_motors(refuge):
+    last = TRIM.command
+    for step in range(100):
+        refuge.command(HOLD_S + 0.01 * step, last, at_height(0.6))
+    command = refuge.command(HOLD_S + 1.0, last, at_height(0.35))
+    assert refuge.doing == DESCENDS
+    assert command[-1] > 0.0
+
+
+def test_a_second_failure_begins_anew_from_where_the_craft_is_then(refuge, solved):
+    fresh = copy.deepcopy(solved)
+    for since_s in (0.0, 0.01):
+        refuge.command(since_s, TRIM.command, at_height(1.0))
+    for since_s in (0.0, 0.01):
+        again = refuge.command(since_s, TRIM.command, at_height(3.0))
+        np.testing.assert_array_equal(again, fresh.command(since_s, TRIM.command, at_height(3.0)))
+
+
+def test_without_a_measured_state_throttles_are_idle(refuge):
+    np.testing.assert_array_equal(refuge.command(0.0, np.ones(5), None), ROBOT.actuators.safe_command)

@@ -19,6 +19,7 @@ from fulmar_ros.plant_wires import PlantWires
 LOOK_S = 0.1  # between two looks for a change
 AT_LEAST_S = 1.0  # between two reports without a change
 NAMES_LOOKS = 10  # in which discovery reports the name of a node whose publisher is known
+SAFE_CONTROLLER = "safe controller"  # commands what cannot stop when its controller fails
 HANGS_S = 0.5  # a step that takes longer than this, and than ten ticks, will not come back
 
 
@@ -78,7 +79,9 @@ class PlantHealth:
         if warning and level == "ok":
             level, message = "warn", warning
         guard, listeners = self._guard, self._health.listeners()
-        changed = (self.mode, self.reason, key, warning, guard.watchdog.trips, guard.rejected, listeners)
+        changed = (
+            self.mode, self.reason, key, warning, guard.watchdog.trips, guard.rejected, listeners, guard.doing
+        )  # fmt: skip
         now = time.monotonic()
         if changed == self._said and now - self._said_at < AT_LEAST_S:
             return
@@ -93,7 +96,8 @@ class PlantHealth:
         if contested:
             self._unnamed_looks = self._unnamed_looks + 1 if UNNAMED in contested else 0
             level = "warn" if 0 < self._unnamed_looks <= NAMES_LOOKS else "error"
-            return level, f"{contested}. Actuators in their safe state until the others stop.", contested
+            words = self._refuge()
+            return level, f"{contested}. {words[0].upper()}{words[1:]} until the others stop.", contested
         if self.mode == "running" and self._realtime is not None:
             now = time.monotonic_ns()
             late_s = self._realtime.since_tick_s(now)
@@ -105,7 +109,7 @@ class PlantHealth:
                 tripped, silent_ns = self._guard.watchdog.tripped, self._guard.watchdog.silent_ns(now)
             if tripped:
                 limit_ms = self._guard.watchdog.timeout_ns / 1e6
-                limit = f"(limit {limit_ms:.0f} ms): actuators in their safe state"
+                limit = f"(limit {limit_ms:.0f} ms): {self._refuge()}"
                 return "error", f"{NO_COMMAND} {silent_ns / 1e6:.0f} ms {limit}", "tripped"
         stopped = self._estop()
         if stopped:
@@ -130,7 +134,17 @@ class PlantHealth:
         with self._wires.lock:
             reason = self._guard.estop.reason(time.monotonic_ns())
             level = "error" if self._guard.estop.was_released and self.mode == "running" else "warn"
-        return (level, f"{reason}: actuators in their safe state", reason[:16]) if reason else None
+        return (level, f"{reason}: {self._refuge()}", reason[:16]) if reason else None
+
+    def _refuge(self) -> str:
+        """What happens in the place of the controller's commands."""
+        doing = self._guard.doing
+        return f"the safe controller {doing}" if doing else "actuators in their safe state"
+
+    def _commander(self) -> str:
+        if self._guard.doing:
+            return SAFE_CONTROLLER
+        return "person" if self._guard.person else "controller"
 
     def _values(self) -> dict[str, str]:
         values = {
@@ -141,7 +155,8 @@ class PlantHealth:
             "sim_time_s": f"{self._clock.now_ns / 1e9:.3f}",
             "watchdog_trips": str(self._guard.watchdog.trips),
             "rejected_commands": str(self._guard.rejected),
-            "commanded_by": "person" if self._guard.person else "controller",
+            "commanded_by": self._commander(),
+            "safe_controller": self._guard.doing,
             "answers": str(self._wires.answers),
             **self._wires.latency_ms.percentiles("latency_ms"),
         }

@@ -95,7 +95,7 @@ class LockstepLoop:
                 # The first messages can get lost while endpoints still find each other.
                 self._wires.publish_sample(sample, stamp, resend=True)
             # The very command that answered: how long its answer or this thread took does not matter here.
-            command = self._guard.answer(time.monotonic_ns(), sample.odometry)
+            command = self._guard.answer(time.monotonic_ns(), sample.odometry, plant_ns=stamp)
         if grounded:
             command = self._backend.robot.actuators.safe_command  # what the backend does with any other
         self._wires.publish_applied(command, stamp)
@@ -150,7 +150,7 @@ class ChainLoop(LockstepLoop):
                     raise LockstepError(self._silence(stamp, waited, before))
                 wires.repeat_period()
             self._commanded = wires.answered_ns == stamp
-            command = self._guard.answer(time.monotonic_ns(), sample.odometry)
+            command = self._guard.answer(time.monotonic_ns(), sample.odometry, plant_ns=stamp)
         if grounded:
             command = self._backend.robot.actuators.safe_command
         wires.begin_period()
@@ -170,6 +170,38 @@ class ChainLoop(LockstepLoop):
             )
         why = self._why_unanswered(before)
         return f"no command answers the odom of t = {stamp / 1e9:.2f} s {limit}: {why} Look at its output."
+
+
+class UnansweredLoop:
+    """Steps a simulator on after the process of its controller has ended, as fast as it goes.
+
+    No command can come any more, so none is waited for. The guard is asked with the plant's own time in place of the
+    wall clock's: watchdog and safe controller act at the very ticks at which they would in real time.
+    """
+
+    def __init__(
+        self, backend: Backend, wires: PlantWires, guard: ActuatorGuard, clock: SimulatedTime | WallTime
+    ) -> None:
+        """Step a simulator, tick by tick."""
+        self._backend, self._wires, self._guard, self._clock = backend, wires, guard, clock
+
+    def run(self, sample: Sample, ticks: int, stop: threading.Event, on_step: OnStep) -> None:
+        """Tick from a sample until `ticks` are done, or `stop` is set."""
+        dt, began_ns, begun_ns = (
+            self._backend.robot.timing.physics_dt,
+            time.monotonic_ns(),
+            self._clock.now_ns,
+        )
+        for _ in range(ticks):
+            if stop.is_set():
+                return
+            now_ns = self._clock.now_ns
+            with self._wires.lock:
+                command = self._guard.output(began_ns + now_ns - begun_ns, sample.odometry, plant_ns=now_ns)
+            sample = self._backend.step(command)
+            self._wires.publish_applied(command, now_ns)
+            self._clock.advance(dt)
+            on_step(sample, command)
 
 
 class RealtimeLoop:
@@ -213,4 +245,4 @@ class RealtimeLoop:
 
     def _command(self, measured: RigidBodyState | None) -> np.ndarray:
         with self._wires.lock:
-            return self._guard.output(time.monotonic_ns(), measured)
+            return self._guard.output(time.monotonic_ns(), measured, plant_ns=self._clock.now_ns)

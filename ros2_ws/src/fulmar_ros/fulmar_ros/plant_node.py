@@ -9,7 +9,7 @@ from collections.abc import Callable
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 
-from fulmar_core.backend import AirBearing, Backend
+from fulmar_core.backend import AirBearing, Backend, Sample
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import Episode
 from fulmar_core.errors import BAD_USAGE, FAILED, ConfigError, FulmarError
@@ -27,7 +27,7 @@ from fulmar_ros.node_identity import identity_of
 from fulmar_ros.parameters import name_of, read_parameters
 from fulmar_ros.plant_clock import SimulatedTime, WallTime, other_clocks
 from fulmar_ros.plant_health import PlantHealth
-from fulmar_ros.plant_loops import ChainLoop, LockstepLoop, OnStep, RealtimeLoop
+from fulmar_ros.plant_loops import ChainLoop, LockstepLoop, OnStep, RealtimeLoop, UnansweredLoop
 from fulmar_ros.plant_settings import PlantSettings, first_episode
 from fulmar_ros.plant_wires import PlantWires
 from fulmar_ros.qos import SAFE_REPEATS, subscriber_qos
@@ -203,6 +203,11 @@ class PlantNode(LifecycleNode):
         with self.wires.lock:
             self.guard.reset()  # actuators begin at rest, not where the episode before left them
         self._lockstep.run(sample, steps, self._stop, on_step)
+
+    def fly_on(self, sample: Sample, *, ticks: int, stop: threading.Event, on_step: OnStep) -> None:
+        """Go on from the last sample of `run_episode` once its controller has ended; see `UnansweredLoop`."""
+        assert self._backend is not None
+        UnansweredLoop(self._backend, self.wires, self.guard, self.clock).run(sample, ticks, stop, on_step)
 
     def _clock_is_taken(self) -> bool:
         """Whether another node publishes the clock already; logs that ours is left out then."""

@@ -12,6 +12,7 @@ import numpy as np
 
 from fulmar_core.state import RigidBodyState
 
+DOWN = "is down"  # what a safe controller that steers has done in the end
 LONGEST_S = 60.0  # after which no slowdown goes on: a refuge that steers a vehicle has no end of its own [s]
 
 
@@ -21,9 +22,11 @@ class Refuge(Protocol):
     Attributes:
         longest_s: Time after which its command is the safe one, whatever came before; infinite where it goes on
             controlling [s].
+        doing: What it does, in words; empty where it does not steer.
     """
 
     longest_s: float
+    doing: str
 
     def command(self, since_s: float, last: np.ndarray, state: RigidBodyState | None) -> np.ndarray:
         """Command to apply.
@@ -44,6 +47,7 @@ class StopAtOnce:
     """Closed valves, propellers and fans that stop: the safe command from the first moment on."""
 
     longest_s = 0.0
+    doing = ""
 
     def __init__(self, safe: np.ndarray) -> None:
         self._safe = safe
@@ -55,6 +59,8 @@ class StopAtOnce:
 
 class RampDown:
     """Wheels that slow down as fast as they may, so that they do not lock."""
+
+    doing = ""
 
     def __init__(self, scale: np.ndarray, slew: Sequence[float]) -> None:
         """Prepare.

@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from fulmar_core.actuators.refuge import Refuge
+from fulmar_core.actuators.refuge import DOWN, Refuge
 from fulmar_core.attitude import euler_of, from_euler, product
 from fulmar_core.controllers.controller import Inputs
-from fulmar_core.controllers.flight_lqi import FlightLqr, flight_lqr_weights
+from fulmar_core.controllers.flight_lqi import FlightLqi, FlightWeights, flight_lqi_weights
 from fulmar_core.goal import goals_at
 from fulmar_core.robot import Robot
 from fulmar_core.spatial import SpatialState
@@ -20,15 +20,23 @@ from fulmar_core.tasks.follow_reference import NOW
 
 HOLD_S = 5.0  # for which the height is held: a controller that comes back within it finds the craft where it was [s]
 SINK = 0.4  # of the descent [m/s]
-NEAREST = (
-    0.2  # heights of the descent end here below the lowest part of the hull, so that it touches down [m]
+LEAD_M = (
+    0.2  # so far below the craft the height that it is to have may lie, where ground effect carries it [m]
 )
+ATTITUDE = 150.0  # weight of attitudes, per rad²
+EASE_S = 2.0  # in which the sink rate grows: a step of it makes the craft dive before it descends [s]
+DOWN_M, SURE_S = (
+    0.05,
+    0.3,
+)  # nearer to the ground than this, over so long a time, its lowest point is down [m], [s]
+HOLDS, DESCENDS = "holds its height", "descends with level wings"  # what it does before it is `DOWN`
 
 
 class LevelDescent:
     """See `Refuge`. Without a measured state surfaces are neutral and throttles idle: nothing else is safe then."""
 
     longest_s = math.inf
+    doing = HOLDS
 
     def __init__(self, robot: Robot) -> None:
         """Solve for its gains; `robot` is an aircraft.
@@ -37,27 +45,38 @@ class LevelDescent:
             ConfigError: It has no trim at its speed.
         """
         self._robot = robot
-        weights = replace(flight_lqr_weights(robot), side=1e-3, observer=None)
-        self._law = FlightLqr(robot, load_task("fly_hold").fitted(robot), weights)
+        self._law = FlightLqi(robot, load_task("fly_hold").fitted(robot), descent_weights(robot))
         self._since_s = math.inf
 
     def command(self, since_s: float, last: np.ndarray, state: RigidBodyState | None) -> np.ndarray:
-        """See `Refuge.command`; a time before that of the call before begins anew."""
+        """See `Refuge.command`; a time that is not after that of the call before begins anew."""
         if state is None:
             return self._robot.actuators.safe_command
         now = SpatialState.from_rigid(state)[None].in_float64()
-        if since_s < self._since_s:
+        if since_s <= self._since_s:
             self._height, self._heading = float(now.z[0]), float(euler_of(now.quat)[2][0])
             self._law.reset()
-            self._sent = np.asarray(last, dtype=float)
-        self._since_s = since_s
-        ahead = self._along(now)
-        sinking = max(0.0, since_s - HOLD_S)
-        lowest = -self._robot.hull_span[0] - NEAREST
-        height = max(self._height - SINK * sinking, lowest)
-        falls = SINK if sinking and height > lowest else 0.0
-        self._sent = self._answer(ahead, height, falls)
+            self._sent, self._since_s = np.asarray(last, dtype=float), since_s
+            self._falls, self._low = 0.0, math.inf
+        passed, self._since_s = since_s - self._since_s, since_s
+        if since_s <= HOLD_S:
+            self.doing = HOLDS
+        elif self._is_down(float(now.z[0]), passed):
+            self.doing = DOWN
+            return self._robot.actuators.safe_command
+        else:
+            self.doing = DESCENDS
+            self._falls = SINK * min(1.0, (since_s - HOLD_S) / EASE_S)
+            self._height = max(self._height - self._falls * passed, float(now.z[0]) - LEAD_M)
+        self._sent = self._answer(self._along(now))
         return self._sent
+
+    def _is_down(self, height: float, passed: float) -> bool:
+        """Whether the craft lies on the ground, from where it does not come back by itself."""
+        low = height + self._robot.hull_span[0]
+        share = 1.0 if math.isinf(self._low) else min(1.0, passed / SURE_S)
+        self._low = low if share == 1.0 else self._low + share * (low - self._low)
+        return self.doing == DOWN or self._low <= DOWN_M
 
     def _along(self, state: SpatialState) -> SpatialState:
         """The state in a world whose x axis is the heading at the beginning."""
@@ -77,15 +96,30 @@ class LevelDescent:
             *state.rate,
         )
 
-    def _answer(self, state: SpatialState, height: float, falls: float) -> np.ndarray:
+    def _answer(self, state: SpatialState) -> np.ndarray:
         target = np.zeros((1, 7))
-        target[0, 1], target[0, 2], target[0, 6] = state.y[0], height, 1.0
+        target[0, 1], target[0, 2], target[0, 6] = state.y[0], self._height, 1.0
         goal = goals_at(target)
-        now = np.array([[0.0, 0.0, state.y[0], height, 0.0, 0.0, -falls]])
+        now = np.array([[0.0, 0.0, state.y[0], self._height, 0.0, 0.0, -self._falls]])
         dt = 1.0 / self._law.control_hz
         empty = np.zeros((1, 0))
         inputs = Inputs(state, replace(goal, things={NOW: now}), empty, self._sent[None], None, 0, dt)
         return np.asarray(self._robot.actuators.limited(self._law.command(inputs))[0])
+
+
+def descent_weights(robot: Robot) -> FlightWeights:
+    """Weights of the descent: level wings before the way, and an integral against what ground effect carries.
+
+    It steers by the state as it is measured, without a filter that could be as lost as the controller.
+    """
+    return replace(
+        flight_lqi_weights(robot),
+        side=1e-3,
+        side_integral=1e-6,
+        attitude=ATTITUDE,
+        error_limit=1.5 * LEAD_M,
+        observer=None,
+    )
 
 
 def refuge_of(robot: Robot) -> Refuge:

@@ -15,6 +15,9 @@ from fulmar_core.safety.watchdog import Watchdog
 from fulmar_core.state import RigidBodyState
 
 LAST_WORDS_NS = 200_000_000  # so long after a person gave back, safe commands by hand may be under way
+# A wing that follows its last command for as long as a watchdog waits may be in the water by then. Its safe controller
+# bridges a shorter silence, which is no trip, and gives back with the next command.
+BRIDGED_S, BRIDGED_PERIODS = 0.05, 2.5
 LEFTOVERS_NS = 2_000_000_000  # so long after the last command, an older one may come out of a queue
 
 
@@ -30,6 +33,7 @@ class ActuatorGuard:
         last_rejection: Why not the last of them.
         person: Whether a person has the actuators.
         publishers: Which nodes publish the controller's commands; of two none is obeyed.
+        doing: What a safe controller that steers does now, in words; empty while it does not act.
     """
 
     def __init__(
@@ -57,6 +61,8 @@ class ActuatorGuard:
         self.publishers = CommandPublishers()
         self._control_dt, self._lockstep = control_dt, lockstep
         self._refuge = refuge or actuators.refuge
+        self._steers = math.isinf(self._refuge.longest_s)
+        self._bridge_ns = round(1e9 * max(BRIDGED_S, BRIDGED_PERIODS * control_dt))
         self.rejected = 0
         self.last_rejection = ""
         self._given_back_ns: int | None = None
@@ -69,7 +75,16 @@ class ActuatorGuard:
         self._stamp_ns = 0
         self._stopped_ns: int | None = None
         self._taken_ns: int | None = None
+        self._asked_ns: int | None = (
+            None  # since when the controller of what cannot stop commands what is safe
+        )
+        self._steering_ns: int | None = None  # by the plant's clock, since when the safe controller steers
         self.watchdog.reset()
+
+    @property
+    def doing(self) -> str:
+        """See the class."""
+        return self._refuge.doing if self._steering_ns is not None else ""
 
     def offer(
         self,
@@ -145,38 +160,60 @@ class ActuatorGuard:
         self._given_back_ns = now_ns
         return ""
 
-    def output(self, now_ns: int, state: RigidBodyState | None = None) -> np.ndarray:
+    def output(
+        self, now_ns: int, state: RigidBodyState | None = None, *, plant_ns: int | None = None
+    ) -> np.ndarray:
         """What to apply at this time of the steady clock.
 
         After a silence and under the e-stop that is the family's own safe controller (`actuators/refuge.py`): valves
-        close at once, wheels slow down as fast as they may.
+        close at once, wheels slow down as fast as they may. What cannot stop flies by it also where its controller
+        commands what is safe, and after a silence of `BRIDGED_S` already.
 
         Args:
             now_ns: Steady clock [ns].
             state: Newest measured state, for families whose safe controller steers; None without one.
+            plant_ns: Time of the plant, by which a safe controller steers; `now_ns` by default [ns].
         """
-        since_ns = self._ended_ns(now_ns)
-        if since_ns is None:
-            return self.command
-        return self._refuge.command(max(0, now_ns - since_ns) / 1e9, self.command, state)
+        return self._applied(self._ended_ns(now_ns), now_ns, state, plant_ns)
 
-    def answer(self, now_ns: int, state: RigidBodyState | None = None) -> np.ndarray:
+    def answer(
+        self, now_ns: int, state: RigidBodyState | None = None, *, plant_ns: int | None = None
+    ) -> np.ndarray:
         """What to apply in lock step, where time stands still between commands and only the e-stop may end one.
 
-        What cannot stop flies on by its safe controller, for which `state` is the newest one.
+        What cannot stop flies on by its safe controller, for which `state` is the newest one; as of `output`.
         """
-        since_ns = self._stopped(now_ns)
-        if since_ns is None:
-            return self.command
-        if math.isinf(self._refuge.longest_s):
-            return self._refuge.command(max(0, now_ns - since_ns) / 1e9, self.command, state)
+        since_ns = self._handed_over(now_ns)
+        if since_ns is None or self._steers:
+            return self._applied(since_ns, now_ns, state, plant_ns)
         return self._actuators.safe_command
+
+    def _applied(
+        self, since_ns: int | None, now_ns: int, state: RigidBodyState | None, plant_ns: int | None
+    ) -> np.ndarray:
+        """The command, or that of the safe controller where the command has ended [ns]."""
+        if since_ns is None:
+            self._steering_ns = None
+            return self.command
+        since_s = max(0, now_ns - since_ns) / 1e9
+        if self._steers and plant_ns is not None:
+            if self._steering_ns is None:
+                self._steering_ns = plant_ns
+            since_s = (plant_ns - self._steering_ns) / 1e9
+        return self._refuge.command(since_s, self.command, state)
+
+    def _handed_over(self, now_ns: int) -> int | None:
+        """Since when the e-stop, a second publisher or the controller itself has ended the command [ns]."""
+        ends = [self._stopped(now_ns), self._asked_ns]
+        return min((end for end in ends if end is not None), default=None)
 
     def _ended_ns(self, now_ns: int) -> int | None:
         """When the command came to its end; None if it holds."""
-        ends = [self._stopped(now_ns)]
+        ends = [self._handed_over(now_ns)]
         if self.watchdog.expired(now_ns):
             ends.append(now_ns - self.watchdog.silent_ns(now_ns) + self.watchdog.timeout_ns)
+        if self._steers and self.watchdog.silent_ns(now_ns) > self._bridge_ns:
+            ends.append(now_ns - self.watchdog.silent_ns(now_ns) + self._bridge_ns)
         return min((end for end in ends if end is not None), default=None)
 
     def _stopped(self, now_ns: int) -> int | None:
@@ -218,12 +255,16 @@ class ActuatorGuard:
         """Take a good command; `seconds` is the time it has had to change in, None for that since the last one."""
         time_ns = now_ns if plant_ns is None else plant_ns
         if self._stopped(now_ns) is not None:
-            if self._is_safe(self.output(now_ns)):
+            if not self._steers and self._is_safe(self.output(now_ns)):
                 self.command = self._actuators.safe_command  # nothing is left to slow down from
         else:
-            if not self._lockstep and self.watchdog.expired(now_ns):
+            if not (self._lockstep or self._steers) and self.watchdog.expired(now_ns):
                 self.command = self.output(now_ns)  # where wheels have slowed down to
             self.command = self._slewed(np.asarray(values, dtype=float), time_ns, seconds)
+        if not (self._steers and self._is_safe(values)):
+            self._asked_ns = None
+        elif self._asked_ns is None:
+            self._asked_ns = now_ns
         self._taken_ns = time_ns
         self.watchdog.feed(now_ns)
 
