@@ -6,9 +6,10 @@ import time
 
 import pytest
 
-from fulmar_bringup.run_executor import _wait_for_end
+from fulmar_bringup.run_executor import _let_it_land, _wait_for_end
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.supervisor import Report
+from fulmar_core.actuators.refuge import DOWN
 from fulmar_core.errors import RunFailed
 from fulmar_core.safety.watchdog import NO_COMMAND
 
@@ -72,3 +73,50 @@ def test_an_e_stop_ends_a_run_only_if_asked_to():
     watched("armed", RUNNING, PRESSED, RUNNING, FINISHED)
     with pytest.raises(RunFailed, match="e-stop: pressed"):
         watched("armed", RUNNING, PRESSED, RUNNING, FINISHED, end_on_estop=True)
+
+
+class Landing:
+    """Plays what a plant's safe controller does, one report for each look."""
+
+    def __init__(self, *does: str, silent_s: float = 0.0) -> None:
+        self.does, self._silent_s = list(does), silent_s
+
+    @property
+    def plant(self) -> Report:
+        now = self.does.pop(0) if len(self.does) > 1 else self.does[0]
+        return Report("error", "", {"safe_controller": now}, time.monotonic() - self._silent_s)
+
+
+class Plants:
+    """A plant that lives, or has ended."""
+
+    def __init__(self, code: int | None = None) -> None:
+        self._code = code
+
+    def process(self, name: str) -> Plants:
+        assert name == "plant"
+        return self
+
+    def poll(self) -> int | None:
+        return self._code
+
+
+def test_what_cannot_stop_is_flown_down_before_its_plant_is_stopped():
+    landing = Landing("holds its height", "descends", "descends", DOWN)
+    _let_it_land(landing, Plants())
+    assert landing.does == [DOWN]
+
+
+@pytest.mark.parametrize(
+    ("landing", "plants"),
+    [
+        (Landing(""), Plants()),
+        (Landing("descends"), Plants(-9)),
+        (Landing("descends", silent_s=60.0), Plants()),
+    ],
+    ids=["stands", "plant has ended", "plant hangs"],
+)
+def test_a_run_does_not_wait_for_a_landing_that_nobody_flies(landing, plants):
+    began = time.monotonic()
+    _let_it_land(landing, plants)
+    assert time.monotonic() - began < 0.5

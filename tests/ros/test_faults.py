@@ -15,6 +15,7 @@ import pytest
 import yaml
 
 from fulmar_bags.run_record import read_run
+from fulmar_core.robot import load_robot
 from tests.conftest import RosDomain
 from tests.ros.cli import (
     child_running,
@@ -183,3 +184,29 @@ def test_a_ring_writes_the_run_of_a_controller_that_died(ros_domain: RosDomain, 
         fault["reason"].startswith("plant: no command")
         for fault in json.loads(reported["custom_data"]["fulmar_faults"])
     )
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(120)
+def test_an_aircraft_whose_controller_was_killed_is_flown_down_before_its_run_ends(
+    ros_domain: RosDomain, tmp_path: Path
+) -> None:
+    """From one metre: five seconds level, then down; the run waits for it."""
+    asked = ("run", "airship_v7", "--task", "fly_hold", "--controller", "lqi", "--duration", "60")
+    run = start_fulmar(*asked, "--record", "bag", "--json", env=ros_domain.env, cwd=tmp_path)
+    controller = child_running(run, "policy_server.controller_node")
+    time.sleep(12.0)
+    controller.kill()
+    out, err = run.communicate(timeout=60.0)
+    assert run.returncode == 1, err
+    failure = json_of(out)["failure"]
+    assert "controller was killed by SIGKILL" in failure
+    assert "the safe controller holds its height" in failure
+    record = read_run(tmp_path / "bag")
+    height = record.truth.states.position_in_world[:, 2]
+    climb = record.truth.states.velocity_in_world[:, 2]
+    lowest = load_robot("airship_v7").hull_span[0]
+    touched = int(np.argmax(height + lowest <= 0.01))
+    assert height[touched] + lowest <= 0.01
+    assert climb[touched - 1] >= -1.0
+    assert not record.applied.effort[-1].any()  # on the ground throttles are idle

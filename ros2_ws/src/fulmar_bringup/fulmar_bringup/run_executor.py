@@ -29,6 +29,7 @@ from fulmar_bringup.run_plan import NodeSpec, RunPlan
 from fulmar_bringup.supervisor import Report, Supervisor, supervisor
 from fulmar_bringup.system_events import distance_of, mode_of
 from fulmar_bringup.system_rows import system_rows
+from fulmar_core.actuators.refuge import DOWN
 from fulmar_core.errors import BAD_USAGE, ConfigError, RunFailed
 from fulmar_core.goal_files import load_goals
 from fulmar_core.robot import load_robot
@@ -43,6 +44,7 @@ STOPPED = "stopped by the user"
 LAST_WORDS_S = 0.5  # after a controller died, the plant still shows that its actuators are safe
 SILENT_S = 2.0  # a controller without a status for so long hangs, in real time
 PLANT_SILENT_S = 3.0  # the same for a plant, which publishes its status once a second
+LANDS_S = 300.0  # for a safe controller to bring a craft down, which at 0.4 m/s is from 100 m
 LOCKSTEP_SILENT_S = 10.0  # in lock step both are busy, and a plant itself waits 5 s for an answer
 
 
@@ -164,8 +166,20 @@ def _watch(request: RunRequest, plan: RunPlan, overseer: Supervisor, group: Proc
             _wait_for_end(plan, overseer, group, moved, end_on_estop=request.end_on_estop)
     except RunFailed as error:
         time.sleep(LAST_WORDS_S)
-        return with_plant_reaction(str(error), overseer)
+        reason = with_plant_reaction(str(error), overseer)
+        _let_it_land(overseer, group)
+        return reason
     return ""
+
+
+def _let_it_land(overseer: Supervisor, group: ProcessGroup) -> None:
+    """Let the plant of what cannot stop bring it down before the plant, too, is stopped."""
+    until_s = time.monotonic() + LANDS_S
+    while overseer.plant.values.get("safe_controller", "") not in ("", DOWN):
+        ended, silent_s = group.process("plant").poll(), time.monotonic() - overseer.plant.received_s
+        if ended is not None or silent_s > PLANT_SILENT_S or time.monotonic() > until_s:
+            return
+        time.sleep(0.1)
 
 
 def _wait_for_end(
