@@ -16,7 +16,7 @@ from fulmar_core.controllers.excite import Excite, excite_of, excite_tasks
 from fulmar_core.errors import BundleError, ConfigError, UnknownNameError
 from fulmar_core.goal_files import load_torques
 from fulmar_core.own_class import is_own, load_class
-from fulmar_core.policy_bundle import PASSPORT
+from fulmar_core.policy_bundle import PASSPORT, read_passport
 from fulmar_core.robot import Robot
 from fulmar_core.tasks import Task
 from policy_server.own_controller import MEMBERS, OwnController
@@ -180,3 +180,21 @@ def shipped_policy(robot: str, task: str) -> Path | None:
     """The shipped bundle for a robot and a task, or None."""
     folder = policies_directory() / f"{robot}_{task}"
     return folder if (folder / PASSPORT).is_file() else None
+
+
+def usual_hz(controller: str, robot: Robot, task: Task, policy: Path | None = None) -> float:
+    """Rate that a controller runs at: that of a policy's bundle, else the robot's own [Hz].
+
+    Args:
+        controller: Its name.
+        robot: The robot.
+        task: The task.
+        policy: Bundle; the shipped one by default.
+
+    Raises:
+        BundleError: The bundle is damaged.
+    """
+    folder = policy or shipped_policy(robot.name, task.name)
+    if controller_entry(controller).runs_bundle and folder is not None:
+        return read_passport(folder).control_hz
+    return robot.timing.control_hz

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from fulmar_core.flight.trim import find_trim
 from fulmar_core.goal_files import load_goals
 from fulmar_core.paths import config_names
 from fulmar_core.planar import PlanarState
@@ -25,6 +26,7 @@ from fulmar_evaluation.faults.fault_environment import (
     task_of,
 )
 from fulmar_evaluation.faults.suite import EVERY, faults_of, modules_for
+from policy_server.controllers import shipped_policy
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "safety.md"
 ROBOTS = config_names("robots")
@@ -35,6 +37,7 @@ FLYING = [
     and not (load_robot(name).actuators.turns_only or load_robot(name).flies)
 ]
 SATELLITES = [name for name in ROBOTS if load_robot(name).actuators.turns_only]
+AIRCRAFT = [name for name in ROBOTS if load_robot(name).flies]
 MOST_LEFT_OUT = 4
 
 
@@ -73,6 +76,28 @@ def test_a_satellite_lacks_what_needs_a_policy_a_place_or_a_person_and_each_has_
     needs = ("swap", "bundle", "area", "geofence", "teleop", "driver", "mocap", "bearing", "gyroscope")
     assert [name for name in reasons if not any(word in name for word in needs)] == []
     assert ("gyroscope_dies" in reasons) is not bool(load_robot(robot).event_cameras)
+
+
+@pytest.mark.parametrize("robot", AIRCRAFT)
+def test_an_aircraft_has_every_fault_of_processes_commands_and_odometry_and_the_rest_has_a_reason(robot: str):
+    reasons = left_out(robot)
+    assert all(reasons.values())
+    needs = (
+        "swap", "bundle", "geofence", "goal", "teleop", "driver", "mocap", "estimator", "bearing", "gyroscope",
+    )  # fmt: skip
+    assert [name for name in reasons if not any(word in name for word in needs)] == []
+    assert "goal_outside_the_area" not in reasons
+
+
+def test_an_aircraft_starts_in_level_flight_and_never_leaves_its_area_ahead(tmp_path):
+    request = request_of("airship_v7", tmp_path / "bag", FaultEnvironment(has_area=True))
+    craft = load_robot("airship_v7")
+    assert request.plan.controller == "policy" if shipped_policy("airship_v7", "fly_hold") else "lqr"
+    assert request.plan.start[4] == pytest.approx(
+        SpatialState.written(find_trim(craft, craft.airframe.speed, 1.0).state.pose)[4], abs=1e-6
+    )
+    assert is_inside((craft.airframe.speed * 300.0, 0.0, 1.0), request.plan.guards.area)
+    assert not is_inside((0.0, 0.0, 5.0), request.plan.guards.area)
 
 
 def test_a_satellite_keeps_its_place_and_gets_another_attitude_from_a_file_of_goals(tmp_path):
@@ -121,9 +146,11 @@ def test_the_document_lists_every_fault_and_those_that_may_not_apply():
     table = section[section.index("| Does not apply |") :]
     rows = re.findall(r"^\| (`[^|]+) \|", table[: table.index("\n\n")], re.MULTILINE)
     listed = {name for row in rows for name in re.findall(r"`(\w+)`", row)}
-    satellite = load_robot("cubesat_wheels")
+    others = load_robot("cubesat_wheels"), load_robot("airship_v7")
     may_not = {
-        fault.name for fault in EVERY if fault.why_not is not possible or fault.inapplicable(satellite)
+        fault.name
+        for fault in EVERY
+        if fault.why_not is not possible or any(fault.inapplicable(robot) for robot in others)
     }
     assert listed == may_not
 

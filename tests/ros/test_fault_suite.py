@@ -46,6 +46,21 @@ ON_A_SATELLITE = (  # what differs there: estimators in a chain, a place that do
     "goals_killed",
     "goal_with_a_wrong_quaternion",
 )
+AIRCRAFT = "airship_v7"
+ON_AN_AIRCRAFT = (  # what differs there: it flies on, by the plant's own state
+    "controller_killed",
+    "controller_hangs",
+    "plant_killed",
+    "estop_killed",
+    "odometry_not_a_number",
+    "odometry_late",
+    "odometry_leaves_the_area",
+    "goal_outside_the_area",
+    "commands_not_a_number",
+    "commands_late",
+    "commands_from_another_node",
+    "time_jump_backwards",
+)
 KEYS = [
     "name",
     "detected_by",
@@ -170,5 +185,14 @@ def test_a_spacecraft_survives_what_differs_in_space(fault: str, ros_domain: Ros
 @pytest.mark.parametrize("fault", ON_A_SATELLITE)
 def test_a_satellite_survives_what_differs_there(fault: str, ros_domain: RosDomain) -> None:
     (found,) = run_faults(SATELLITE, faults_of(SATELLITE, [fault])[0], lambda _done: None)
+    assert found.passed, found
+    assert found.bag_intact
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(240)
+@pytest.mark.parametrize("fault", ON_AN_AIRCRAFT)
+def test_an_aircraft_flies_on_level_through_what_differs_there(fault: str, ros_domain: RosDomain) -> None:
+    (found,) = run_faults(AIRCRAFT, faults_of(AIRCRAFT, [fault])[0], lambda _done: None)
     assert found.passed, found
     assert found.bag_intact

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from fulmar_core.robot import Robot
 from fulmar_evaluation.faults.fault_environment import USUAL, FaultEnvironment
+from fulmar_evaluation.faults.flight_watch import FLIES_S
 from fulmar_evaluation.faults.live_system import LiveSystem, NothingShown
 from fulmar_evaluation.faults.observer import wait_for
 
@@ -50,6 +51,8 @@ class FaultResult:
 def stopped(live: LiveSystem, since_s: float, limit_s: float) -> Outcome:
     """Whether a robot that moved got safe in time, stayed so, and somebody said why.
 
+    What cannot stop is safe once its safe controller flies it, with level wings.
+
     Args:
         live: The system.
         since_s: When the fault was done, on the monotonic clock [s].
@@ -69,7 +72,12 @@ def stopped(live: LiveSystem, since_s: float, limit_s: float) -> Outcome:
     wait_for(lambda: observer.problem_since(since_s) is not None, WORDS_S)
     status = observer.problem_since(since_s)
     passed = time_s is not None and time_s <= limit_s and status is not None
-    return Outcome(status.who if status else "", status.text if status else "", passed, time_s, limit_s)
+    words = status.text if status else ""
+    if live.flight is not None:
+        wait_for(lambda: time.monotonic() > since_s + limit_s + FLIES_S, limit_s + 2.0 * FLIES_S)
+        flown, level = live.flight.since(since_s)
+        words, passed = "; ".join(text for text in (words, flown) if text), passed and level
+    return Outcome(status.who if status else "", words, passed, time_s, limit_s)
 
 
 def went_on(

@@ -17,14 +17,16 @@ from sensor_msgs.msg import Imu, JointState
 
 from fulmar_bringup.planning import RunRequest, plan_run
 from fulmar_core.estimation.kinds import default_estimator
+from fulmar_core.flight.trim import find_trim
 from fulmar_core.planar import PlanarState
+from fulmar_core.process import CONTROL_PRIORITY, take_priority_with_helpers
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.spatial import SpatialState
 from fulmar_core.state import State
 from fulmar_core.tasks import Task, load_task
 from fulmar_core.topics import COMMAND, GOAL_POINT, GOAL_POSE, IMU, MOCAP, ODOMETRY, VELOCITY_COMMAND, Wire
 from fulmar_ros.qos import publisher_qos, subscriber_qos
-from policy_server.controllers import shipped_policy
+from policy_server.controllers import shipped_policy, usual_hz
 
 KINDS = {
     ODOMETRY: Odometry,
@@ -67,6 +69,7 @@ class FaultInjector:
     def __init__(self, node: Node, wire: Wire) -> None:
         """Begin as if it were not there."""
         self.change: Injection = unchanged
+        self._prior = False  # whether this process has the priority of those that it stands between
         kind, reliable = KINDS[wire], wire.delivery != "best_effort"
         self._publisher = node.create_publisher(kind, wire.name, publisher_qos(wire))
         node.create_subscription(
@@ -74,6 +77,9 @@ class FaultInjector:
         )
 
     def _pass(self, message: Any) -> None:
+        if not self._prior:
+            take_priority_with_helpers(CONTROL_PRIORITY)
+            self._prior = True
         changed = self.change(message)
         if changed is not None:
             self._publisher.publish(changed)
@@ -87,6 +93,9 @@ GOALS: Mapping[type[State], tuple[float, ...]] = {
 }
 STAYS = "it stays where it is"  # why what only turns has no limits of place
 TURNED = (0.0, 0.0, 0.0, 20.0, -30.0, 90.0)  # the same of what only turns
+HOLD = "fly_hold"  # what an aircraft does
+HELD = (0.0, 0.0, 1.0, 0.0, 0.0, 0.0)  # where it begins: it goes on along x for ever
+AISLE_M = 100.0  # of its area, to either side
 CORNER_M = 1.0  # from there to the second place that a node of goals sends it to, along y
 ROOM_M = 2.0  # of an area beyond start and goal
 TASKS = (
@@ -126,13 +135,16 @@ class FaultEnvironment:
 
     def why_not(self, robot: Robot) -> str:
         """Why a robot cannot be in such a system; empty if it can."""
-        if not robot.actuators.turns_only:
+        turns, flies = robot.actuators.turns_only, robot.flies
+        if not (turns or flies):
             return ""
         reasons = {
-            "no policy is shipped for it": self.bundle is not None or self.fallback is not None,
-            STAYS: self.has_area,
-            "it is not seen by motion capture": self.intercepted == MOCAP,
+            "no policy is shipped for it": not _has_policy(robot)
+            and (self.bundle is not None or self.fallback is not None),
+            STAYS: turns and self.has_area,
+            "it is not seen by motion capture": self.intercepted == MOCAP or (flies and self.estimated),
             "only its own controllers drive it": self.by_hand,
+            "no goal file holds what it flies along": flies and self.by_goal_node,
         }
         return next((reason for reason, counts in reasons.items() if counts), "")
 
@@ -144,18 +156,28 @@ def task_of(robot: Robot) -> Task:
     """What a robot does when a fault comes: the first of `TASKS` in its world that a policy is shipped for."""
     if robot.actuators.turns_only:
         return load_task("slew")
+    if robot.flies:
+        return load_task(HOLD)
     fitting = [task for task in map(load_task, TASKS) if task.state_type is robot.state_type]
     return next((task for task in fitting if shipped_policy(robot.name, task.name)), fitting[0])
 
 
+def _has_policy(robot: Robot) -> bool:
+    return shipped_policy(robot.name, task_of(robot).name) is not None
+
+
 def goal_of(robot: Robot) -> tuple[float, ...]:
     """Where it goes, as people write it [m, deg]."""
+    if robot.flies:
+        return HELD
     return TURNED if robot.actuators.turns_only else GOALS[robot.state_type]
 
 
 def area_of(robot: Robot) -> tuple[float, ...]:
     """The surroundings of start and goal: two sides for each axis [m]."""
     goal = goal_of(robot)[: robot.state_type.AXES]
+    if robot.flies:
+        return (-ROOM_M, robot.limits.geofence, -AISLE_M, AISLE_M, -ROOM_M, goal[2] + ROOM_M)
     return tuple(side for far in goal for side in (-ROOM_M, far + ROOM_M))
 
 
@@ -172,18 +194,19 @@ def request_of(name: str, record: Path, about: FaultEnvironment = USUAL) -> RunR
     """
     robot = load_robot(name)
     task = load_task("point") if about.nadir else task_of(robot)
+    controller = _controller_of(robot)
     request = plan_run(
         robot=name,
         task=task.name,
-        controller="classical" if robot.actuators.turns_only else "policy",
+        controller=controller,
         backend="hardware" if about.emulated else "mujoco",
         policy=None,
-        goal=None if about.by_goal_node or about.nadir else goal_of(robot),
-        start=None if about.nadir else (0.0,) * robot.state_type.AXES,
+        goal=None if about.by_goal_node or about.nadir or robot.flies else goal_of(robot),
+        start=_start_of(robot, about),
         duration_s=None,
         lockstep=False,
         rate=1.0,
-        control_hz=None,
+        control_hz=usual_hz(controller, robot, task) if robot.flies else None,
         scenario=about.scenario,
         seed=0,
         record=record,
@@ -196,6 +219,21 @@ def request_of(name: str, record: Path, about: FaultEnvironment = USUAL) -> RunR
         _harmed_bundle(name, task.name, record.parent, about.bundle) if about.bundle else request.plan.policy
     )
     return replace(request, plan=replace(request.plan, duration_s=0.0, policy=policy))
+
+
+def _start_of(robot: Robot, about: FaultEnvironment) -> tuple[float, ...] | None:
+    """Where it starts, as people write it: an aircraft in level flight [m, deg]; None: as the task draws it."""
+    if robot.airframe is not None:
+        level = find_trim(robot, robot.airframe.speed, HELD[2]).state
+        return *HELD[:3], *SpatialState.written(level.pose)[3:]
+    return None if about.nadir else (0.0,) * robot.state_type.AXES
+
+
+def _controller_of(robot: Robot) -> str:
+    """The policy; of what turns only, and of an aircraft without one, its classical controller."""
+    if robot.actuators.turns_only or (robot.flies and not _has_policy(robot)):
+        return "classical"
+    return "policy"
 
 
 def _goals_file(folder: Path, robot: Robot, task: Task) -> str:

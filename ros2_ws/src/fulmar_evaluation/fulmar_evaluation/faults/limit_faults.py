@@ -144,7 +144,11 @@ def _refusal(live: LiveSystem, since_s: float) -> str:
 
 
 def _without_place(robot: Robot) -> str:
-    return STAYS if robot.actuators.turns_only else ""
+    if robot.actuators.turns_only:
+        return STAYS
+    drift_m = CARRIED_S * STEP_M / robot.timing.physics_dt
+    far = robot.limits.geofence > drift_m
+    return f"its geofence of {robot.limits.geofence:g} m is farther than a drift takes it" if far else ""
 
 
 def _without_attitude(robot: Robot) -> str:

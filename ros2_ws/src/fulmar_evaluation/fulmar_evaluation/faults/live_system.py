@@ -35,6 +35,7 @@ from fulmar_core.topics import (
     command_wire,
 )
 from fulmar_evaluation.faults.fault_environment import USUAL, FaultEnvironment, FaultInjector, source_of
+from fulmar_evaluation.faults.flight_watch import FlightWatch
 from fulmar_evaluation.faults.observer import RunObserver, wait_for
 from fulmar_evaluation.faults.two_hosts import TwoHosts
 from fulmar_ros.runtime import spinning
@@ -65,6 +66,7 @@ class LiveSystem:
         robot = load_robot(self.plan.robot)
         self.robot = robot
         self.observer = RunObserver(bystander, robot, DEVICE_STATE if about.emulated else ACTUATORS_STATE)
+        self.flight = FlightWatch(bystander, self.plan.frames) if robot.flies else None
         self.injector = FaultInjector(bystander, about.intercepted or command_wire(robot))
         self._answers = FaultInjector(bystander, command_wire(robot)) if about.answers_pass else None
         self.tick_s, self.beat_s = robot.timing.physics_dt, 1.0 / self.plan.control_hz
@@ -118,7 +120,7 @@ class LiveSystem:
         self._overseer.start_plant(lambda: None, lambda: self.group.last_words("plant"))
 
     def until_it_moves(self) -> float:
-        """Wait until actuators are on.
+        """Wait until actuators are on; of an aircraft, until it flies level.
 
         Returns:
             Now, on the monotonic clock [s].
@@ -126,6 +128,10 @@ class LiveSystem:
         Raises:
             NothingShown: They stay off.
         """
+        if self.flight is not None and not wait_for(self.flight.is_level, MOVING_S):
+            raise NothingShown(
+                f"the craft did not fly level within {MOVING_S:g} s; the fault would show nothing"
+            )
         if not wait_for(self.observer.moves, MOVING_S):
             raise NothingShown(f"the robot did not move within {MOVING_S:g} s; the fault would show nothing")
         return time.monotonic()

@@ -20,7 +20,7 @@ from fulmar_bags.decode import stamps_ns
 from fulmar_bags.message_reader import stamp_ns
 from fulmar_core.errors import BagError
 from fulmar_core.robot import Robot
-from fulmar_core.topics import ACTUATORS_STATE, DIAGNOSTICS, STATUS, Wire
+from fulmar_core.topics import ACTUATORS_STATE, DIAGNOSTICS, STATUS, Wire, command_wire
 from fulmar_ros.qos import subscriber_qos
 
 DEPTH = 100  # messages that may wait while this process does something else
@@ -51,18 +51,35 @@ class RunObserver:
         self.wire = wire
         self._safe = robot.actuators.safe_command
         self._lock = threading.Lock()
-        self._applied: list[tuple[float, int, bool]] = []  # received [s], stamp [ns], whether it moves
+        self._applied: list[tuple[float, int, tuple[float, ...]]] = []  # received [s], stamp [ns], command
+        # Of what cannot stop: every command of its controller; anything else is the safe controller's.
+        self._commanded: set[tuple[float, ...]] | None = set() if robot.flies else None
         self._statuses: list[HealthStatus] = []
         listen = node.create_subscription
         listen(JointState, wire.name, self._on_applied, subscriber_qos(wire, reliable=True, depth=DEPTH))
+        if robot.flies:
+            command = command_wire(robot)
+            qos = subscriber_qos(command, reliable=True, depth=DEPTH)
+            listen(JointState, command.name, self._on_command, qos)
         for health in (DIAGNOSTICS, STATUS):
             qos = subscriber_qos(health, reliable=True, depth=DEPTH)
             listen(DiagnosticArray, health.name, self._on_health, qos)
 
     def _on_applied(self, message: JointState) -> None:
-        moves = bool(np.any(np.asarray(message.effort) != self._safe))
         with self._lock:
-            self._applied.append((time.monotonic(), stamp_ns(message.header.stamp), moves))
+            applied = tuple(float(value) for value in message.effort)
+            self._applied.append((time.monotonic(), stamp_ns(message.header.stamp), applied))
+
+    def _on_command(self, message: JointState) -> None:
+        with self._lock:
+            if self._commanded is not None:
+                self._commanded.add(tuple(float(value) for value in message.effort))
+
+    def _moves(self, applied: tuple[float, ...]) -> bool:
+        """Whether a command moves the robot in a way that is not that of its safe controller."""
+        if self._commanded is not None:
+            return applied in self._commanded
+        return bool(np.any(np.asarray(applied) != self._safe))
 
     def _on_health(self, message: DiagnosticArray) -> None:
         levels = {DiagnosticStatus.OK: "ok", DiagnosticStatus.WARN: "warn"}
@@ -76,14 +93,18 @@ class RunObserver:
                 )
 
     def moves(self) -> bool:
-        """Whether the newest applied command is another than the safe one."""
+        """Whether the newest applied command is another than the safe one; of what cannot stop, its controller's."""
         with self._lock:
-            return bool(self._applied) and self._applied[-1][2]
+            return bool(self._applied) and self._moves(self._applied[-1][2])
 
     def applied_since(self, since_s: float) -> list[tuple[float, bool]]:
         """When something was applied, and whether it moved the robot."""
         with self._lock:
-            return [(received_s, moves) for received_s, _, moves in self._applied if received_s >= since_s]
+            return [
+                (received_s, self._moves(applied))
+                for received_s, _, applied in self._applied
+                if received_s >= since_s
+            ]
 
     def received(self) -> tuple[np.ndarray, np.ndarray]:
         """When something was applied, and its stamps, shapes (n,) [s] and int64 [ns]."""
