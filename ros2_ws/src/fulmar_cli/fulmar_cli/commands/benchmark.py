@@ -8,9 +8,11 @@ from pathlib import Path
 
 import typer
 
+from fulmar_cli.commands.benchmark_descent import descent
 from fulmar_cli.commands.benchmark_drift import drift
 from fulmar_cli.commands.benchmark_events import events
 from fulmar_cli.commands.benchmark_falcon import falcon
+from fulmar_cli.commands.benchmark_flights import flights
 from fulmar_cli.commands.benchmark_inertia import inertia
 from fulmar_cli.commands.benchmark_latency import endurance, latency
 from fulmar_cli.commands.benchmark_rans3d import rans3d
@@ -37,7 +39,20 @@ benchmark = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode=None,
 )
-for command in (drift, endurance, events, falcon, inertia, latency, rans3d, roboran, throughput, training):
+for command in (
+    descent,
+    drift,
+    endurance,
+    events,
+    falcon,
+    flights,
+    inertia,
+    latency,
+    rans3d,
+    roboran,
+    throughput,
+    training,
+):
     benchmark.command()(command)
 
 
