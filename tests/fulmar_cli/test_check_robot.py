@@ -319,6 +319,7 @@ def test_an_aircraft_without_a_trim_there_is_one_line(fulmar):
     assert "are for aircraft" in complaint(fulmar("check", "robot", "jetbot", "--speed", "1"))
 
 
+@pytest.mark.slow
 def test_the_envelope_of_an_aircraft_is_drawn(fulmar, tmp_path):
     code, _, _ = fulmar("check", "robot", "airship_v7", "--plot", str(tmp_path / "envelope.png"))
     assert code == 0

@@ -77,7 +77,7 @@ class Wires:
 
 def run(wires: Wires, *, steps: int = 2, timeout_s: float = 10.0) -> tuple[ChainLoop, Backend]:
     backend = Backend()
-    guard = SimpleNamespace(last_rejection="", answer=lambda _now_ns, _state: np.zeros(2))
+    guard = SimpleNamespace(last_rejection="", answer=lambda _now_ns, _state, plant_ns: np.zeros(2))
     loop = ChainLoop(
         backend, wires, guard, SimulatedTime(0), control_hz=10.0, answer_timeout_s=timeout_s
     )  # fmt: skip

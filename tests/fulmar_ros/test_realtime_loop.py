@@ -22,7 +22,7 @@ def test_the_guard_receives_the_newest_measured_state_for_safe_controllers_that_
     samples = [Sample({"odometry": Reading(planar_state(x, 0.0, 0.0))}, None) for x in (1.0, 2.0, 3.0)]
     received = []
 
-    def output(_now_ns, state):
+    def output(_now_ns, state, plant_ns):
         received.append(float(state.position_in_world[0]))
         return ROBOT.actuators.safe_command
 

@@ -39,6 +39,7 @@ from tests.spaces import robot_for, task_for
 SEED = 5
 LASTS_S = {"track_velocities": 14.0, "track_velocities_3d": 14.0}  # long enough for a second velocity
 BRIEFLY_S = 6.0  # short enough to leave no geofence and to touch no obstacle
+FLIES_S = 2.0  # of aircraft, which are commanded more often
 # A second task of a kind with other figures brings nothing new onto the wires; robots alike are in tests/conftest.py.
 ALIKE = {
     "drift_go_to_pose",
@@ -52,6 +53,7 @@ ALIKE = {
     "fly_d",
     "fly_e",
     "fly_f",
+    "fly_airspeed",
     "fly_path",
     "fly_recover",
 }
@@ -129,7 +131,7 @@ def check_pair(robot: Robot, task: Task, make: Callable[[Robot, Task], Controlle
     """Run the same two episodes with and without ROS; the second shows that nothing of the first is left."""
     scenario = load_scenario("nominal")
     dt = 1.0 / robot.timing.control_hz
-    steps = round(LASTS_S.get(task.name, BRIEFLY_S) / dt)
+    steps = round(LASTS_S.get(task.name, FLIES_S if robot.flies else BRIEFLY_S) / dt)
     ways: list[list[tuple[float, ...]]] = [[], []]
     with nodes(robot, task, make) as (plant, _, overseer):
         for number in range(2):
