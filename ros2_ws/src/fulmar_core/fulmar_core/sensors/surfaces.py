@@ -9,25 +9,17 @@ from typing import Any
 import numpy as np
 
 from fulmar_core.plausible_ranges import Plausible
+from fulmar_core.sensors.joints import JointSensors, JointSpec
 from fulmar_core.sensors.kind import MessageFields, SensorKind, Truth
 from fulmar_core.sensors.reading import Reading
-from fulmar_core.sensors.sampling import Sampling, sensor_rng
 from fulmar_core.wire import Wire
 
 NAME = "surfaces"
 
 
 @dataclass(frozen=True)
-class SurfacesSpec:
-    """What the servos report, and when; levels of motors are reported without errors."""
-
-    std: float = 0.0  # white noise of each deflection [rad]
-    quantum: float = 0.0  # deflections are whole multiples of this; 0: any [rad]
-    rate_hz: float = 0.0  # of measurements; 0: one with each sample of the plant [Hz]
-
-    def __post_init__(self) -> None:
-        if min(self.std, self.quantum, self.rate_hz) < 0.0:
-            raise ValueError("std, quantum and rate_hz must not be negative.")
+class SurfacesSpec(JointSpec):
+    """What the servos report, and when; deflections in rad. Levels of motors are reported without errors."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,32 +30,19 @@ class SurfacePositions:
     positions: np.ndarray  # shape (n,): deflections [rad], then thrust levels from 0 to 1
 
 
-class ServoSensors:
+class ServoSensors(JointSensors):
     """The sensors of one simulated aircraft."""
 
-    def __init__(self, spec: SurfacesSpec, noisy: bool) -> None:
-        """Prepare; without noise every reading is the truth."""
-        self._spec, self._noisy = spec, noisy
-        self._sampling = Sampling(spec.rate_hz, 0.0)
-
-    def reset(self, seed: int, number: int) -> None:
-        """Begin an episode; see `SimulatedSensor`."""
-        self._rng = sensor_rng(seed, number, NAME)
-        self._sampling.reset()
+    name = NAME
 
     def measure(self, truth: Truth, time_s: float) -> Reading | None:
         """`SurfacePositions`, with their covariance (n, n); None between two measurements or of other robots."""
         if truth.surfaces is None or not self._sampling.is_due(time_s):
             return None
-        spec, true = self._spec, truth.surfaces
+        true = truth.surfaces
         turned = np.array([not name.startswith("throttle") for name in true.names])
-        positions = np.array(true.positions, dtype=float)
-        if self._noisy:
-            positions += np.where(turned, spec.std, 0.0) * self._rng.standard_normal(len(positions))
-            if spec.quantum:
-                positions = np.where(turned, np.round(positions / spec.quantum) * spec.quantum, positions)
-        spread = np.where(turned, spec.std**2 + spec.quantum**2 / 12.0, 0.0)
-        return Reading(SurfacePositions(true.names, positions), covariance=np.diag(spread))
+        positions, covariance = self.with_errors(true.positions, turned)
+        return Reading(SurfacePositions(true.names, positions), covariance=covariance)
 
 
 def _write(reading: Reading, _spec: SurfacesSpec) -> list[Any]:

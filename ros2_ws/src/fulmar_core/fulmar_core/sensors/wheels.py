@@ -9,25 +9,17 @@ from typing import Any
 import numpy as np
 
 from fulmar_core.plausible_ranges import Plausible
+from fulmar_core.sensors.joints import JointSensors, JointSpec
 from fulmar_core.sensors.kind import MessageFields, SensorKind, Truth
 from fulmar_core.sensors.reading import Reading
-from fulmar_core.sensors.sampling import Sampling, sensor_rng
 from fulmar_core.wire import Wire
 
 NAME = "wheels"
 
 
 @dataclass(frozen=True)
-class WheelsSpec:
-    """What the tachometers report, and when."""
-
-    std: float = 0.0  # white noise of each speed [rad/s]
-    quantum: float = 0.0  # speeds are whole multiples of this; 0: any [rad/s]
-    rate_hz: float = 0.0  # of measurements; 0: one with each sample of the plant [Hz]
-
-    def __post_init__(self) -> None:
-        if min(self.std, self.quantum, self.rate_hz) < 0.0:
-            raise ValueError("std, quantum and rate_hz must not be negative.")
+class WheelsSpec(JointSpec):
+    """What the tachometers report, and when; speeds in rad/s."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,31 +30,18 @@ class WheelSpeeds:
     speeds: np.ndarray  # shape (n,) [rad/s]
 
 
-class Tachometers:
+class Tachometers(JointSensors):
     """The tachometers of one simulated robot."""
 
-    def __init__(self, spec: WheelsSpec, noisy: bool) -> None:
-        """Prepare; without noise every reading is the truth."""
-        self._spec, self._noisy = spec, noisy
-        self._sampling = Sampling(spec.rate_hz, 0.0)
-
-    def reset(self, seed: int, number: int) -> None:
-        """Begin an episode; see `SimulatedSensor`."""
-        self._rng = sensor_rng(seed, number, NAME)
-        self._sampling.reset()
+    name = NAME
 
     def measure(self, truth: Truth, time_s: float) -> Reading | None:
         """`WheelSpeeds`, with their covariance of shape (n, n); None between two measurements or without wheels."""
         if truth.wheels is None or not self._sampling.is_due(time_s):
             return None
-        spec, true = self._spec, truth.wheels
-        speeds = np.array(true.speeds, dtype=float)
-        if self._noisy:
-            speeds = speeds + spec.std * self._rng.standard_normal(len(speeds))
-            if spec.quantum:
-                speeds = np.round(speeds / spec.quantum) * spec.quantum
-        spread = spec.std**2 + spec.quantum**2 / 12.0
-        return Reading(WheelSpeeds(true.names, speeds), covariance=spread * np.eye(len(speeds)))
+        true = truth.wheels
+        speeds, covariance = self.with_errors(true.speeds, np.ones(len(true.names), dtype=bool))
+        return Reading(WheelSpeeds(true.names, speeds), covariance=covariance)
 
 
 def _write(reading: Reading, _spec: WheelsSpec) -> list[Any]:
