@@ -5,6 +5,7 @@ Another controller is one file in `fulmar_core/controllers`, one YAML with its g
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -185,16 +186,16 @@ def shipped_policy(robot: str, task: str) -> Path | None:
 def usual_hz(controller: str, robot: Robot, task: Task, policy: Path | None = None) -> float:
     """Rate that a controller runs at: that of a policy's bundle, else the robot's own [Hz].
 
+    Of a bundle that cannot be read it is the robot's; loading the bundle raises the error.
+
     Args:
         controller: Its name.
         robot: The robot.
         task: The task.
         policy: Bundle; the shipped one by default.
-
-    Raises:
-        BundleError: The bundle is damaged.
     """
     folder = policy or shipped_policy(robot.name, task.name)
     if controller_entry(controller).runs_bundle and folder is not None:
-        return read_passport(folder).control_hz
+        with contextlib.suppress(BundleError):
+            return read_passport(folder).control_hz
     return robot.timing.control_hz

@@ -8,17 +8,16 @@ from typing import Any
 
 from fulmar_core.config import load_config
 from fulmar_core.controllers.classical import default_gains_note
-from fulmar_core.errors import BundleError, ConfigError, UnknownNameError, did_you_mean
+from fulmar_core.errors import ConfigError, UnknownNameError, did_you_mean
 from fulmar_core.estimation.kinds import default_estimator, estimator_kind
 from fulmar_core.paths import config_names, config_path
-from fulmar_core.policy_bundle import read_passport
 from fulmar_core.recording import Recording
 from fulmar_core.robot import load_robot
 from fulmar_core.robot_name import check_robot_name, checked_name
 from fulmar_core.safety.geofence import NO_AREA, check_area
 from fulmar_core.tasks import load_task
-from hardware_drivers.settings import hardware_of, hardware_path, load_hardware
-from policy_server.controllers import FALLBACKS, controller_entry, shipped_policy
+from hardware_drivers.hardware import hardware_of, hardware_path, load_hardware
+from policy_server.controllers import FALLBACKS, controller_entry, usual_hz
 
 SIMULATED = ("mujoco", "mock", "jsbsim")
 BACKENDS = (*SIMULATED, "hardware")
@@ -213,21 +212,6 @@ def default_hardware(robot: str, asked: str | None = None) -> str:
     return str(hardware_path(mine[0]).absolute())
 
 
-def usual_rate(robot: str, task: str, controller: str, policy: Path | None = None) -> float:
-    """Command rate that the bundle was trained at, of a controller that runs one, else the robot's own [Hz].
-
-    Of a bundle that cannot be read it is the robot's; whoever loads it says what is wrong.
-    """
-    if controller_entry(controller).runs_bundle:
-        folder = policy or shipped_policy(robot, task)
-        try:
-            if folder is not None:
-                return read_passport(folder).control_hz
-        except BundleError:
-            pass
-    return load_robot(robot).timing.control_hz
-
-
 def default_control_hz(
     robot: str, task: str, controller: str, backend: str, policy: Path | None = None
 ) -> float:
@@ -235,7 +219,7 @@ def default_control_hz(
     system = system_of(controller, backend)
     if system is not None and (system.robot, system.task) == (robot, task):
         return system.control_hz
-    return usual_rate(robot, task, controller, policy)
+    return usual_hz(controller, load_robot(robot), load_task(task), policy)
 
 
 def default_guards(controller: str, backend: str, hardware: str = "") -> Guards:

@@ -13,7 +13,7 @@ from fulmar_bringup.console import new_table
 from fulmar_bringup.plan_checks import checked_rate, chosen_policy
 from fulmar_bringup.progress import step_bar
 from fulmar_bringup.run_plan import RunPlan
-from fulmar_bringup.system import check_names, usual_rate
+from fulmar_bringup.system import check_names
 from fulmar_core.counts import check_episodes
 from fulmar_core.disturbances.scenario import check_delays, load_scenario
 from fulmar_core.episode import episode_steps
@@ -30,7 +30,7 @@ from fulmar_evaluation.evaluation import (
     Trial,
     evaluate_trial,
 )
-from policy_server.controllers import controller_entry
+from policy_server.controllers import controller_entry, usual_hz
 
 
 def plan_trial(
@@ -82,7 +82,7 @@ def plan_trial(
         )
     the_robot, the_task = load_robot(robot), load_task(task)
     check_delays(the_robot, load_scenario(scenario))
-    hz = checked_rate(the_robot, control_hz or usual_rate(robot, task, controller, policy))
+    hz = checked_rate(the_robot, control_hz or usual_hz(controller, the_robot, the_task, policy))
     if episode_s is not None and steps is not None:
         raise ConfigError("--episode-s and --steps say the same thing. Give one of them.")
     if worlds is not None and through != "batch":

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from fulmar_benchmarks.falcon.published import BESIDE
-from fulmar_bringup.system import usual_rate
 from fulmar_core.controllers.classical import FLIGHT_LAWS, gains_of
 from fulmar_core.controllers.controller import Controller
 from fulmar_core.controllers.flight_mppi import FlightMppi
@@ -22,7 +21,7 @@ from fulmar_core.robot import Robot, load_robot
 from fulmar_core.rollout import roll_out_in_batch
 from fulmar_core.tasks import load_task
 from fulmar_core.trajectories import Trajectories
-from policy_server.controllers import Choice, load_controller
+from policy_server.controllers import Choice, load_controller, usual_hz
 
 TASKS = ("hold", *PATHS)
 CONTROLLERS = ("lqi", "lqr", "mppi", "pid", "policy")
@@ -73,7 +72,7 @@ def controller_of(robot: Robot, cell: Cell) -> Controller:
     """
     task = load_task(f"fly_{cell.task}")
     if cell.controller == "policy":
-        rate = usual_rate(robot.name, task.name, "policy", Path(cell.policy) if cell.policy else None)
+        rate = usual_hz("policy", robot, task, Path(cell.policy) if cell.policy else None)
         return load_controller("policy", robot, task, Choice(rate, policy=cell.policy))
     gains = gains_of(robot, cell.controller)
     if cell.scenario == "exact":
