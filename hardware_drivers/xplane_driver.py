@@ -46,7 +46,7 @@ HINT = "Does X-Plane run there, not paused, with the plugin XPlaneConnect?"
 class XPlaneDriver(DeviceDriver):
     """Flies by CTRL and DREF, measures by GETP and GETD.
 
-    X-Plane is paused from the connection until `begin`, and again after the end: a wing that nobody flies falls.
+    The driver pauses X-Plane until `begin` and again at its end, since an aircraft without commands falls.
     """
 
     def __init__(self, robot: Robot, settings: XPlane, *, patience_s: float) -> None:

@@ -59,7 +59,7 @@ def encode(message: Message) -> bytes:
         raise ValueError(f"{head.decode()} cannot hold {message}: {error}.") from error
     if len(datagram) > LONGEST:
         raise ValueError(f"{head.decode()} of {len(datagram)} bytes: the plugin reads at most {LONGEST}.")
-    decode(datagram)  # what nobody may receive, nobody may send
+    decode(datagram)  # rejects values that a receiver rejects
     return datagram
 
 

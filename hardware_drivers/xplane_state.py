@@ -1,8 +1,8 @@
 """What X-Plane says of an aircraft, as odometry, inertial reading and air data in the frames of ROS.
 
 X-Plane's local axes point east, up and south; its angles are those of sailors, in degrees; its beta is the heading
-relative to the flown path, which is sideslip with the other sign. From the descriptions of its data references; nobody
-has tried them on X-Plane itself.
+relative to the flown path, which is sideslip with the other sign. The signs follow the descriptions of the data
+references; they are not tested on X-Plane itself.
 """
 
 from __future__ import annotations

@@ -100,7 +100,7 @@ def test_what_cannot_be_flown_is_refused_in_words():
 
 
 class Wires:
-    """Nobody listens."""
+    """There is no subscriber."""
 
     lock = threading.Condition()
 

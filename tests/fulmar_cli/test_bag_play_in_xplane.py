@@ -178,7 +178,9 @@ def test_an_x_plane_that_vanishes_ends_the_show_with_one_line(
     assert 3 < len(screen.poses) < POSES
 
 
-def test_nobody_there_is_one_line_and_nothing_is_shown(flight: Path, screen: Screen, monkeypatch) -> None:
+def test_a_port_without_x_plane_is_one_line_and_nothing_is_shown(
+    flight: Path, screen: Screen, monkeypatch
+) -> None:
     monkeypatch.setattr(xplane_player, "CONNECT_S", 0.1)
     screen.peer.lie = lambda _answer: b""
     done = ask("play", flight, "--to", "xplane", "--port", screen.peer.port)

@@ -74,7 +74,7 @@ def flown(watch_node: Node, *, climb: float, qx: float = 0.0) -> None:
 )
 def test_a_flight_is_safe_with_little_bank_and_sink(node, climb, qx, safe):
     watch = FlightWatch(node, frames_of("airship_v7", "airship_v7"))
-    assert watch.since(0.0) == ("nobody saw it fly", False)
+    assert watch.since(0.0) == ("no true state was received after the fault", False)
     flown(node, climb=climb, qx=qx)
     words, found = watch.since(0.0)
     assert found is safe, words

@@ -15,8 +15,9 @@ import pytest
 from fulmar_core.errors import ConfigError, DeviceError
 from fulmar_core.rotation import rotate
 from hardware_drivers.driver_backend import DriverBackend, backend_of
+from hardware_drivers.hardware import load_hardware
 from hardware_drivers.presence import check_presence
-from hardware_drivers.settings import Geodetic, XPlane, load_hardware
+from hardware_drivers.settings import Geodetic, XPlane
 from hardware_drivers.xplane_driver import XPlaneDriver
 from tests.hardware_drivers.xplane_bench import ROBOT, START, Peer, XPlaneBench, episode_at, trim, until
 
@@ -319,7 +320,7 @@ def free_port() -> int:
         return int(probe.getsockname()[1])
 
 
-def test_nobody_at_the_other_end_is_refused_with_a_hint(monkeypatch):
+def test_a_port_without_x_plane_is_refused_with_a_hint(monkeypatch):
     address = f"udp://127.0.0.1:{free_port()}"
     with pytest.raises(
         DeviceError, match=r"said nothing that can be read for 0\.1 s\. Does X-Plane run there"

@@ -229,7 +229,7 @@ def test_a_latitude_that_is_not_a_number_or_not_on_earth_is_refused():
     ],
     ids=lambda message: type(message).__name__,
 )
-def test_what_nobody_could_read_is_not_sent(message):
+def test_values_that_a_receiver_rejects_are_not_sent(message):
     with pytest.raises(ValueError):
         encode(message)
 

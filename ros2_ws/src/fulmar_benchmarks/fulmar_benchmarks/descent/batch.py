@@ -61,8 +61,7 @@ class _Batch:
         most = int(self._killed.max()) + round(self._flights.longest_s / dt)
         for tick in range(most):
             applied = self._applied(tick)
-            with np.errstate(all="ignore"):  # a craft that is down flies on into the ground, and nobody looks
-                self._simulation.move(applied)
+            self._simulation.move(applied)
             for log, killed, number in zip(self._logs, self._killed, range(len(self._logs)), strict=True):
                 if tick + 1 >= killed and not log.down:
                     log.add(self._simulation.truth[number], dt * (tick + 1 - killed))

@@ -52,7 +52,7 @@ class FlightWatch:
         with self._lock:
             flown = [(bank, sink) for received_s, bank, sink in self._flown if received_s >= since_s]
         if not flown:
-            return "nobody saw it fly", False
+            return "no true state was received after the fault", False
         bank, sink = (max(each) for each in zip(*flown, strict=True))
         safe = bank <= MOST_BANK_DEG and sink <= MOST_SINK
         return f"bank at most {bank:.1f} deg, sink at most {sink:.2f} m/s", safe

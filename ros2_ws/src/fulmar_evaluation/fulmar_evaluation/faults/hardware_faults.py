@@ -19,7 +19,8 @@ from fulmar_evaluation.faults.live_system import LiveSystem
 from fulmar_evaluation.faults.observer import wait_for
 from fulmar_evaluation.faults.process_faults import signalled
 from fulmar_ros.qos import subscriber_qos
-from hardware_drivers.settings import KingfisherNmea, Kobuki, hardware_of, load_hardware
+from hardware_drivers.hardware import hardware_of, load_hardware
+from hardware_drivers.settings import KingfisherNmea, Kobuki
 from sim_nodes.emulators import kingfisher, kobuki
 
 SCENARIO = "bearing_late"
