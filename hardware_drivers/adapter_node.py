@@ -25,7 +25,8 @@ from fulmar_ros.foreign_topics import VALVE_MESSAGES, valve_values
 from fulmar_ros.parameters import own_frames, read_parameters
 from fulmar_ros.qos import publisher_qos
 from fulmar_ros.runtime import RequestExit, run_node
-from hardware_drivers.settings import ThrustTopic, ValveTopic, VelocityTopic, load_hardware
+from hardware_drivers.hardware import load_hardware
+from hardware_drivers.settings import ThrustTopic, ValveTopic, VelocityTopic
 from hardware_drivers.valves import from_message
 
 NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)  # matches every publisher

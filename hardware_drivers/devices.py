@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 from fulmar_core.errors import ConfigError
 from fulmar_core.robot import Robot
 from hardware_drivers.driver_backend import DriverBackend, backend_of
+from hardware_drivers.hardware import Hardware
 from hardware_drivers.settings import (
     Driver,
     GpioValves,
-    Hardware,
     KingfisherNmea,
     Kobuki,
     MavlinkBoat,

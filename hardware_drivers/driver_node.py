@@ -18,16 +18,8 @@ from fulmar_ros.plant_settings import PlantSettings
 from fulmar_ros.runtime import RequestExit, run_node
 from hardware_drivers.devices import make_device
 from hardware_drivers.driver_backend import DriverBackend, backend_of
-from hardware_drivers.settings import (
-    UNARMED,
-    Hardware,
-    MavlinkBoat,
-    OwnDriver,
-    ThrustTopic,
-    ValveTopic,
-    VelocityTopic,
-    load_hardware,
-)
+from hardware_drivers.hardware import Hardware, load_hardware
+from hardware_drivers.settings import UNARMED, MavlinkBoat, OwnDriver, ThrustTopic, ValveTopic, VelocityTopic
 from hardware_drivers.topic_driver import TopicDriver, ValveTopicDriver
 from hardware_drivers.valves import to_message
 from hardware_drivers.wiring import channel_velocity, channels

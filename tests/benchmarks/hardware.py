@@ -28,13 +28,14 @@ class HardwareCase:
     @property
     def robot(self) -> str:
         """Whose device it is."""
-        from hardware_drivers.settings import load_hardware
+        from hardware_drivers.hardware import load_hardware
 
         return load_hardware(self.name).robot
 
     def prepared(self, _seed: int) -> contextlib.AbstractContextManager[Command]:
         """An emulator stands in for the device."""
-        from hardware_drivers.settings import MavlinkBoat, load_hardware
+        from hardware_drivers.hardware import load_hardware
+        from hardware_drivers.settings import MavlinkBoat
 
         arm = ("--arm",) if isinstance(load_hardware(self.name).driver, MavlinkBoat) else ()
         device = ("--backend", "hardware", "--hardware", self.name, "--emulate", *arm)
@@ -42,7 +43,7 @@ class HardwareCase:
 
     def about(self) -> dict[str, Any]:
         """The device and what drives it."""
-        from hardware_drivers.settings import load_hardware
+        from hardware_drivers.hardware import load_hardware
 
         return {"hardware": self.name, "driver": load_hardware(self.name).driver.kind}
 

@@ -18,7 +18,7 @@ from fulmar_bringup.run_plan import NODES
 from fulmar_bringup.service.device_rules import device_groups, device_rules
 from fulmar_bringup.system import varied_system
 from fulmar_cli.main import app
-from hardware_drivers.settings import load_hardware
+from hardware_drivers.hardware import load_hardware
 
 # https://github.com/compose-spec/compose-spec/blob/main/05-services.md: those that a service on one host can have.
 SERVICE_KEYS = (

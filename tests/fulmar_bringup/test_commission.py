@@ -26,7 +26,7 @@ from fulmar_core.topics import ACTUATORS_STATE, AIR_BEARING, COMMAND, DIAGNOSTIC
 from fulmar_ros.convert import VectorWriter, stamp_of
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.runtime import spinning
-from hardware_drivers.settings import hardware_path, load_hardware
+from hardware_drivers.hardware import hardware_path, load_hardware
 from hardware_drivers.valves import to_message
 from hardware_drivers.wiring import channels
 from tests.new_robots import write_new_robots

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from fulmar_bringup.goal_plan import check_heading, default_task
 from fulmar_bringup.plan_checks import usual_controller
+from fulmar_bringup.task_choice import check_heading, default_task
 from fulmar_cli.commands.values import read_goal
 from fulmar_core.errors import ConfigError
 from fulmar_core.robot import load_robot

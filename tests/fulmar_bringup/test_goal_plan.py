@@ -7,11 +7,12 @@ import math
 import numpy as np
 import pytest
 
-from fulmar_bringup.goal_plan import is_endless, shown_path, start_of, task_of_goals, task_of_run
+from fulmar_bringup.goal_plan import is_endless, shown_path, start_of
 from fulmar_bringup.launched_system import list_nodes
 from fulmar_bringup.node_table import controller_spec
 from fulmar_bringup.operator_rows import run_goals_spec
 from fulmar_bringup.planning import plan_run
+from fulmar_bringup.task_choice import task_of_goals, task_of_run
 from fulmar_core.errors import ConfigError
 from fulmar_core.goal_files import load_goals
 

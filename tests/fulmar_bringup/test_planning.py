@@ -14,7 +14,7 @@ from fulmar_core.bundle_signature import make_keys, sign_bundle
 from fulmar_core.errors import BundleError, ConfigError, DeviceError, UnknownNameError
 from fulmar_core.paths import config_directory
 from fulmar_core.recording import Recording
-from hardware_drivers.settings import hardware_path
+from hardware_drivers.hardware import hardware_path
 from policy_server.controllers import shipped_policy
 
 NAN = float("nan")

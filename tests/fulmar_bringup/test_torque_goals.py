@@ -10,8 +10,8 @@ import pytest
 
 from fulmar_bringup.bag_origin import attachments
 from fulmar_bringup.excitation_plan import torques_note
-from fulmar_bringup.goal_plan import task_of_run
 from fulmar_bringup.node_table import controller_spec
+from fulmar_bringup.task_choice import task_of_run
 from fulmar_core.controllers.controller import Inputs
 from fulmar_core.controllers.excite import excite_of
 from fulmar_core.disturbances.scenario import load_scenario

@@ -8,7 +8,7 @@ from fulmar_cli.diagnosis.devices import diagnose_hardware
 from fulmar_core.errors import ConfigError
 from fulmar_core.paths import config_names
 from hardware_drivers.devices import UNPROTECTED, own_watchdog
-from hardware_drivers.settings import load_hardware
+from hardware_drivers.hardware import load_hardware
 
 
 def test_every_file_without_a_watchdog_below_its_driver_is_a_warning_in_capitals():

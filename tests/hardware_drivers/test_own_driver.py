@@ -13,12 +13,12 @@ from fulmar_core.robot import load_robot
 from hardware_drivers.devices import make_device, when_the_driver_dies
 from hardware_drivers.driver import MEMBERS, DeviceDriver
 from hardware_drivers.driver_backend import STOPS
+from hardware_drivers.hardware import hardware_of, load_hardware
 from hardware_drivers.kingfisher_driver import KingfisherDriver
 from hardware_drivers.kobuki_driver import KobukiDriver
 from hardware_drivers.mavlink_driver import MavlinkDriver
 from hardware_drivers.own_driver import check_own_driver
 from hardware_drivers.presence import check_presence
-from hardware_drivers.settings import hardware_of, load_hardware
 from hardware_drivers.thruster_driver import ThrusterDriver
 from hardware_drivers.topic_driver import TopicDriver, ValveTopicDriver
 from tests.hardware_drivers.bench import episode_at, until

@@ -10,8 +10,9 @@ import gpiod
 import pytest
 
 from fulmar_core.errors import DeviceError
+from hardware_drivers.hardware import load_hardware
 from hardware_drivers.presence import check_presence
-from hardware_drivers.settings import Kobuki, load_hardware
+from hardware_drivers.settings import Kobuki
 
 VALVES = load_hardware("zero_g_lab").driver
 BOAT = load_hardware("kingfisher").driver

@@ -11,7 +11,7 @@ from fulmar_core.errors import ConfigError
 from fulmar_core.paths import config_names
 from fulmar_core.robot import load_robot
 from hardware_drivers.devices import UNPROTECTED, own_watchdog, when_the_driver_dies
-from hardware_drivers.settings import hardware_of, hardware_path, load_hardware
+from hardware_drivers.hardware import hardware_of, hardware_path, load_hardware
 
 TURTLEBOT = "title: t\nrobot: turtlebot2\ndriver:\n  kind: kobuki\n  port: /dev/ttyUSB0\n"
 

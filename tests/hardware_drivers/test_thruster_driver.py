@@ -17,7 +17,8 @@ from fulmar_core.tasks import load_task
 from hardware_drivers.devices import make_device
 from hardware_drivers.driver_backend import DriverBackend, backend_of
 from hardware_drivers.gpio import output_lines
-from hardware_drivers.settings import Bearing, GpioValves, Hardware, load_hardware
+from hardware_drivers.hardware import Hardware, load_hardware
+from hardware_drivers.settings import Bearing, GpioValves
 from hardware_drivers.thruster_driver import ThrusterDriver
 from sim_nodes.emulators.outputs import ValveBank
 from tests.hardware_drivers.bench import episode_at

@@ -14,7 +14,8 @@ from std_srvs.srv import Trigger
 
 from fulmar_core.topics import DEVICE_STATE, ESTOP_TRIGGER
 from fulmar_ros.qos import subscriber_qos
-from hardware_drivers.settings import MavlinkBoat, load_hardware
+from hardware_drivers.hardware import load_hardware
+from hardware_drivers.settings import MavlinkBoat
 from tests.conftest import RosDomain
 from tests.ros.cli import fulmar, json_of, nothing_left, start_fulmar
 from tests.ros.neighbour import Neighbour, until

@@ -35,7 +35,8 @@ from fulmar_core.topics import AIR_BEARING, DEVICE_STATE
 from fulmar_ros.qos import subscriber_qos
 from hardware_drivers.devices import own_watchdog, when_the_driver_dies
 from hardware_drivers.driver_node import DriverNode
-from hardware_drivers.settings import MavlinkBoat, load_hardware
+from hardware_drivers.hardware import load_hardware
+from hardware_drivers.settings import MavlinkBoat
 from sim_nodes.emulators.outputs import ValveBank
 from tests.conftest import RosDomain
 from tests.ros.cli import fulmar, json_of

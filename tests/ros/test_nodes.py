@@ -36,7 +36,7 @@ from fulmar_ros.parameters import read_parameters
 from fulmar_ros.plant_settings import PlantSettings
 from fulmar_ros.recorder_settings import RecorderSettings
 from hardware_drivers.driver_node import DriverSettings
-from hardware_drivers.settings import load_hardware
+from hardware_drivers.hardware import load_hardware
 from sim_nodes.emulator_node import EmulatorSettings
 from tests.conftest import RosDomain
 from tests.ros.neighbour import NAMESPACE, Neighbour, until

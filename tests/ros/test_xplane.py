@@ -22,7 +22,7 @@ from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.system import default_hardware
 from fulmar_core.topics import DEVICE_STATE, TRUTH
 from fulmar_ros.qos import subscriber_qos
-from hardware_drivers.settings import load_hardware
+from hardware_drivers.hardware import load_hardware
 from tests.conftest import RosDomain
 from tests.hardware_drivers.xplane_bench import Peer
 from tests.ros.cli import fulmar, json_of

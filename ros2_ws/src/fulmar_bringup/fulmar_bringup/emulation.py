@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from fulmar_core.errors import ConfigError
+from hardware_drivers.hardware import Hardware
 from hardware_drivers.settings import (
     Driver,
     GpioValves,
-    Hardware,
     KingfisherNmea,
     Kobuki,
     MavlinkBoat,

@@ -17,8 +17,8 @@ from fulmar_bringup.system_rows import own_nodes, system_rows
 from fulmar_core.errors import ConfigError
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
+from hardware_drivers.hardware import load_hardware
 from hardware_drivers.own_driver import check_own_driver
-from hardware_drivers.settings import load_hardware
 
 
 def list_nodes(

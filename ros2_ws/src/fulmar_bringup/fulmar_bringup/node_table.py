@@ -38,7 +38,7 @@ from fulmar_core.topics import (
     command_wire,
     goal_wires,
 )
-from hardware_drivers.settings import load_hardware
+from hardware_drivers.hardware import load_hardware
 from policy_server.controllers import controller_entry
 
 MODEL = (

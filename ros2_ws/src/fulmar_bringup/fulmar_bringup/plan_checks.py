@@ -32,8 +32,9 @@ from fulmar_core.safety.geofence import NO_AREA, check_area_of
 from fulmar_core.safety.watchdog import default_timeout
 from fulmar_core.tasks import Task
 from fulmar_core.topics import COMMAND, MOCAP, ODOMETRY, SENSOR_WIRES, TRUTH, VELOCITY_COMMAND
+from hardware_drivers.hardware import TOPIC_DRIVERS, load_hardware
 from hardware_drivers.own_driver import check_own_driver
-from hardware_drivers.settings import TOPIC_DRIVERS, UNARMED, MavlinkBoat, load_hardware
+from hardware_drivers.settings import UNARMED, MavlinkBoat
 from policy_server.controllers import EXTERNAL, FALLBACKS, controller_entry, shipped_policies, shipped_policy
 
 # Topics between plant, controller and estimator. Goals, e-stop and status keep their names: the run itself and every

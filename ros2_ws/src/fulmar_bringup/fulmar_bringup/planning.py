@@ -18,7 +18,6 @@ from fulmar_bringup.goal_plan import (
     goal_path,
     goal_rate,
     start_of,
-    whole_pose,
 )
 from fulmar_bringup.plan_checks import (
     adapter_path,
@@ -46,6 +45,7 @@ from fulmar_bringup.system import (
     system_of,
 )
 from fulmar_bringup.system_rows import own_nodes
+from fulmar_bringup.task_choice import whole_pose
 from fulmar_core.disturbances.scenario import Scenario, load_scenario
 from fulmar_core.episode import draw_episode
 from fulmar_core.errors import ConfigError, UnknownNameError

@@ -17,7 +17,7 @@ from fulmar_core.topics import ODOMETRY, Wire, command_wire
 from fulmar_core.wire_check import Offer, wire_problems
 from fulmar_ros.recorder_health import COMMANDERS
 from hardware_drivers.adapter_node import message_class
-from hardware_drivers.settings import TOPIC_DRIVERS, load_hardware
+from hardware_drivers.hardware import TOPIC_DRIVERS, load_hardware
 
 EXTERNAL_TIMEOUT_S = 20.0  # for an external controller to publish, and to read
 CONTROLLER_AND_RECORDER = 2  # nodes that receive the goal before anything moves

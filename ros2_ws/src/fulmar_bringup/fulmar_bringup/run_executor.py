@@ -36,8 +36,8 @@ from fulmar_core.robot import load_robot
 from fulmar_core.safety.estop import HOLDS
 from fulmar_core.safety.watchdog import NO_COMMAND
 from fulmar_core.topics import SIMULATION_START_NS
+from hardware_drivers.hardware import load_hardware
 from hardware_drivers.presence import check_presence
-from hardware_drivers.settings import load_hardware
 from policy_server.controllers import controller_entry
 
 STOPPED = "stopped by the user"

@@ -28,7 +28,7 @@ from fulmar_core.robot import load_robot
 from fulmar_core.robot_name import namespace_of
 from fulmar_core.tasks import load_task
 from fulmar_core.topics import ANSWER, CLOCK, EVENTS, EVENTS_2, ODOMETRY, PERIOD, RATE, WIRES, command_wire
-from hardware_drivers.settings import load_hardware
+from hardware_drivers.hardware import load_hardware
 from policy_server.controllers import controller_entry
 
 

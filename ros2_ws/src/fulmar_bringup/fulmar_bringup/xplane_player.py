@@ -14,7 +14,8 @@ from fulmar_bags.decode import odometries
 from fulmar_core.errors import BagError, ConfigError, UnknownNameError
 from fulmar_core.state import RigidBodyState
 from hardware_drivers.earth_frame import LocalFrame
-from hardware_drivers.settings import Geodetic, XPlane, load_hardware
+from hardware_drivers.hardware import load_hardware
+from hardware_drivers.settings import Geodetic, XPlane
 from hardware_drivers.xplane_link import XPlaneLink
 from hardware_drivers.xplane_messages import PAUSE, Position, Simulation
 from hardware_drivers.xplane_state import shown_at

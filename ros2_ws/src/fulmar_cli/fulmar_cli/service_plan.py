@@ -25,8 +25,8 @@ from fulmar_bringup.standing_system import plan_system
 from fulmar_bringup.system import varied_system
 from fulmar_cli.extras import check_plan
 from fulmar_core.errors import ConfigError, FulmarError
+from hardware_drivers.hardware import load_hardware
 from hardware_drivers.presence import check_presence
-from hardware_drivers.settings import load_hardware
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,8 @@ from fulmar_core.commissioning.match import indistinct, left_over
 from fulmar_core.errors import ConfigError
 from fulmar_core.robot import Robot, load_robot
 from fulmar_ros.runtime import ros_node
-from hardware_drivers.settings import GpioValves, Hardware, hardware_path, load_hardware
+from hardware_drivers.hardware import Hardware, hardware_path, load_hardware
+from hardware_drivers.settings import GpioValves
 from hardware_drivers.wiring import SIDES
 from policy_server.controllers import EXTERNAL
 

@@ -14,7 +14,8 @@ from fulmar_core.actuators.thrusters import Thrusters
 from fulmar_core.atomic_write import write_whole
 from fulmar_core.errors import ConfigError
 from fulmar_core.robot import Robot
-from hardware_drivers.settings import GpioValves, Hardware, OwnDriver, ValveTopic, XPlane
+from hardware_drivers.hardware import Hardware
+from hardware_drivers.settings import GpioValves, OwnDriver, ValveTopic, XPlane
 from hardware_drivers.wiring import SIDES
 
 WHEEL_SPEED = 0.1  # of the rim of one wheel, our value: a step of some centimetres [m/s]

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from hardware_drivers.settings import GpioValves, Hardware, Kobuki
+from hardware_drivers.hardware import Hardware
+from hardware_drivers.settings import GpioValves, Kobuki
 
 SERIAL_GROUP, GPIO_GROUP = "dialout", "gpio"
 # Identification of the base's FTDI chip: kobuki_core, 60-kobuki.rules.

@@ -52,7 +52,7 @@ def commission(
     from fulmar_bringup.commissioning.commission import commission as conduct
     from fulmar_bringup.commissioning.hardware_file import line_of
     from fulmar_bringup.commissioning.hardware_file import write_line as write_into_file
-    from hardware_drivers.settings import hardware_path
+    from hardware_drivers.hardware import hardware_path
 
     if (write or out) and not yes:
         raise ConfigError("clicks find no order to write: --write and --out need --yes.")
@@ -86,9 +86,9 @@ def _check(request: Request) -> None:
     from fulmar_bringup.emulation import check_emulated
     from fulmar_bringup.plan_checks import check_arming
     from fulmar_cli.extras import require
+    from hardware_drivers.hardware import load_hardware
     from hardware_drivers.own_driver import check_own_driver
     from hardware_drivers.presence import check_presence
-    from hardware_drivers.settings import load_hardware
 
     file = load_hardware(request.hardware)
     if request.wiring not in WIRINGS:

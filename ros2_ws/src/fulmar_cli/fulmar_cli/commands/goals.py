@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -11,6 +11,10 @@ from fulmar_cli.commands.list import list_names
 from fulmar_cli.commands.values import read_area, read_goal
 from fulmar_core.errors import ConfigError
 from fulmar_core.robot_name import checked_name
+
+if TYPE_CHECKING:
+    from fulmar_core.goal_files import GoalFile
+    from fulmar_core.robot import Robot
 
 GIVE_UP_S = 5.0  # without odometry or without a subscriber of the goals
 
@@ -79,10 +83,10 @@ def goals(
     if robot is None:
         example = name if place is None else f"--pose {pose}"
         raise ConfigError(f"whose goals? Example: fulmar goals {example} --robot floating_platform")
-    from fulmar_bringup.goal_plan import check_file_places, check_pace, whole_pose
+    from fulmar_bringup.goal_plan import check_file_places, check_pace
     from fulmar_bringup.operator_rows import goals_spec
     from fulmar_bringup.processes import command_line
-    from fulmar_core.goal_files import load_goals, single_goal
+    from fulmar_core.goal_files import load_goals
     from fulmar_core.goal_sequence import goal_sequence
     from fulmar_core.robot import load_robot
     from fulmar_core.safety.geofence import NO_AREA, check_area_of
@@ -90,9 +94,7 @@ def goals(
     the_robot = load_robot(robot)
     inside = read_area(area) or NO_AREA
     check_area_of(the_robot, inside)
-    if place is not None:
-        whole_pose(place, the_robot, "--pose")  # refuses numbers of another robot
-    given = None if place is None else single_goal(place, the_robot.state_type)
+    given = None if place is None else _single(place, the_robot)
     file = given or load_goals(name or "")
     goal_sequence(file, the_robot, as_path=as_path)  # rejects goals that the robot cannot have
     check_pace(file, name or "", the_robot, min(control_hz, the_robot.timing.control_hz))
@@ -110,3 +112,12 @@ def goals(
 
     _, _, _, *arguments = command_line(spec)  # python -m module
     raise typer.Exit(run_node(lambda request_exit: GoalNode(request_exit, goals=given), arguments))
+
+
+def _single(place: tuple[float, ...], robot: Robot) -> GoalFile:
+    """The one goal of --pose, which numbers of another kind of robot are not."""
+    from fulmar_bringup.task_choice import whole_pose
+    from fulmar_core.goal_files import single_goal
+
+    whole_pose(place, robot, "--pose")
+    return single_goal(place, robot.state_type)

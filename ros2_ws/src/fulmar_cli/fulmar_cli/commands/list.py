@@ -73,7 +73,7 @@ def _family(family: str) -> tuple[list[str], Callable[[str], str]]:
     from fulmar_core.policy_bundle import read_passport
     from fulmar_core.robot import load_robot
     from fulmar_core.tasks import load_task
-    from hardware_drivers.settings import load_hardware
+    from hardware_drivers.hardware import load_hardware
     from policy_server.controllers import CONTROLLERS, policies_directory, shipped_policies
 
     if family == "policies":

@@ -114,8 +114,8 @@ def run(
 
     fulmar run cubesat_wheels --scenario gyro_dies --lockstep
     """
-    from fulmar_bringup.goal_plan import task_of_run
     from fulmar_bringup.planning import plan_run
+    from fulmar_bringup.task_choice import task_of_run
     from fulmar_cli.extras import check_plan
     from fulmar_core.robot import use_calibration
 

@@ -59,9 +59,10 @@ def diagnose_hardware(name: str | None) -> list[Finding]:
         ConfigError: There is no such file, or it has a mistake.
     """
     from hardware_drivers.devices import own_watchdog, when_the_driver_dies
+    from hardware_drivers.hardware import load_hardware
     from hardware_drivers.own_driver import check_own_driver
     from hardware_drivers.presence import check_presence
-    from hardware_drivers.settings import OwnDriver, load_hardware
+    from hardware_drivers.settings import OwnDriver
 
     findings = []
     for each in [name] if name else config_names("hardware"):
