@@ -44,8 +44,8 @@ def descent(
     ground the plant's guard flies it, by the state that the plant measures. `lockstep`: plant and controller are the
     nodes of `fulmar run`, in lock step up to the kill; after it no command answers, and the plant steps through
     simulated time on its own. `realtime`: each node is a process, by the clock. `batch`: the same guard in the core's
-    own dynamics, without ROS. A flight is good if its bank stays within 10 degrees until touch-down and it sinks by at most
-    1 m/s then. The exit code is 1 unless 60 of 64 are.
+    own dynamics, without ROS. A flight is good if its bank stays within 10 degrees until touch-down and it sinks by at
+    most 1 m/s then. The exit code is 1 unless 60 of 64 are.
 
     Try:
 
