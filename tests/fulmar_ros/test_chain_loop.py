@@ -77,7 +77,12 @@ class Wires:
 
 def run(wires: Wires, *, steps: int = 2, timeout_s: float = 10.0) -> tuple[ChainLoop, Backend]:
     backend = Backend()
-    guard = SimpleNamespace(last_rejection="", answer=lambda _now_ns, _state, plant_ns: np.zeros(2))
+
+    def answer(_now_ns, _state, *, plant_ns):
+        assert plant_ns == loop._clock.now_ns
+        return np.zeros(2)
+
+    guard = SimpleNamespace(last_rejection="", answer=answer)
     loop = ChainLoop(
         backend, wires, guard, SimulatedTime(0), control_hz=10.0, answer_timeout_s=timeout_s
     )  # fmt: skip

@@ -7,23 +7,28 @@ from contextlib import nullcontext
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
 from fulmar_core.backend import Sample
 from fulmar_core.robot import load_robot
 from fulmar_core.sensors.reading import Reading
-from fulmar_ros.plant_clock import SimulatedTime
+from fulmar_ros.plant_clock import SimulatedTime, WallTime
 from fulmar_ros.plant_loops import RealtimeLoop
 from tests.states import planar_state
 
 ROBOT = load_robot("floating_platform")
 
 
-def test_the_guard_receives_the_newest_measured_state_for_safe_controllers_that_steer():
+@pytest.mark.parametrize("clock", [SimulatedTime(), WallTime()], ids=["simulated", "wall"])
+def test_the_guard_receives_the_newest_measured_state_and_a_steady_time_for_safe_controllers_that_steer(
+    clock,
+):
     samples = [Sample({"odometry": Reading(planar_state(x, 0.0, 0.0))}, None) for x in (1.0, 2.0, 3.0)]
-    received = []
+    received, asked_ns = [], []
 
-    def output(_now_ns, state, plant_ns):
+    def output(now_ns, state, plant_ns):
         received.append(float(state.position_in_world[0]))
+        asked_ns.append((now_ns, plant_ns))
         return ROBOT.actuators.safe_command
 
     def ignore(*_arguments):
@@ -31,6 +36,11 @@ def test_the_guard_receives_the_newest_measured_state_for_safe_controllers_that_
 
     backend = SimpleNamespace(robot=ROBOT, step=lambda _command: samples[len(received)])
     wires = SimpleNamespace(lock=nullcontext(), publish_sample=ignore, publish_applied=ignore)
-    loop = RealtimeLoop(backend, wires, SimpleNamespace(output=output), SimulatedTime(), rate=50.0)
+    loop = RealtimeLoop(backend, wires, SimpleNamespace(output=output), clock, rate=50.0)
     loop.run(samples[0], 2, threading.Event())
     assert np.allclose(received, [1.0, 2.0])
+    first, second = (plant_ns for _, plant_ns in asked_ns)
+    if isinstance(clock, WallTime):  # nothing that sets the clock of the machine reaches the safe controller
+        assert all(0 <= plant_ns - now_ns < 1_000_000_000 for now_ns, plant_ns in asked_ns)
+    else:
+        assert second - first == round(1e9 * ROBOT.timing.physics_dt)

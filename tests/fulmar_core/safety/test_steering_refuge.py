@@ -12,6 +12,7 @@ from fulmar_core.safety.watchdog import Watchdog
 from tests.fulmar_core.safety.guards import GOOD, MS, NAMES, THRUSTERS
 
 SAFE = [0.0] * 8
+OTHER = [0.0, 1.0, *[0.0] * 6]
 STEERED = [1.0, *[0.0] * 7]
 
 
@@ -90,6 +91,32 @@ def test_a_slow_controller_is_not_bridged_between_its_own_commands(glide):
     guard.offer(NAMES, GOOD, 0)
     assert guard.output(100 * MS, object(), plant_ns=100 * MS).tolist() == GOOD
     assert guard.output(110 * MS, object(), plant_ns=110 * MS).tolist() == STEERED
+
+
+def test_a_controller_whose_simulation_runs_slowly_is_not_bridged_between_its_own_commands(glide):
+    guard = ActuatorGuard(THRUSTERS, Watchdog(2000 * MS), refuge=glide, control_dt=0.01, period_s=0.1)
+    guard.offer(NAMES, GOOD, 0)
+    assert guard.output(250 * MS, object(), plant_ns=25 * MS).tolist() == GOOD
+    assert guard.output(260 * MS, object(), plant_ns=26 * MS).tolist() == STEERED
+
+
+def test_the_e_stop_hands_over_and_the_newest_command_goes_on_after_it(guard):
+    guard.offer(NAMES, GOOD, 0)
+    guard.estop.receive(True, 5 * MS)
+    assert applied(guard, 10 * MS) == STEERED
+    guard.offer(NAMES, OTHER, 20 * MS)
+    assert applied(guard, 20 * MS) == STEERED
+    guard.estop.release(30 * MS)
+    assert applied(guard, 30 * MS) == OTHER
+
+
+def test_two_publishers_of_commands_hand_over_until_one_is_gone(guard):
+    guard.offer(NAMES, GOOD, 0)
+    guard.publishers.see(["controller", "intruder"], 5 * MS)
+    assert applied(guard, 10 * MS) == STEERED
+    guard.offer(NAMES, OTHER, 1000 * MS)
+    assert applied(guard, 1000 * MS) == STEERED
+    assert applied(guard, 1010 * MS) == OTHER
 
 
 def test_what_can_stop_does_as_its_controller_says():

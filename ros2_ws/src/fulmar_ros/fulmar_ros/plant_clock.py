@@ -18,6 +18,11 @@ class SimulatedTime:
 
     now_ns: int = SIMULATION_START_NS
 
+    @property
+    def steady_ns(self) -> int:
+        """The same: nothing sets it back [ns]."""
+        return self.now_ns
+
     def advance(self, seconds: float) -> None:
         """Move on [s]."""
         self.now_ns += round(seconds * 1e9)
@@ -30,6 +35,11 @@ class WallTime:
     def now_ns(self) -> int:
         """Since the epoch [ns]."""
         return time.time_ns()
+
+    @property
+    def steady_ns(self) -> int:
+        """Since some moment, whatever NTP or PTP do to the clock [ns]."""
+        return time.monotonic_ns()
 
     def advance(self, seconds: float) -> None:
         """Nothing to do: real time passes anyway [s]."""

@@ -33,6 +33,7 @@ class ActuatorGuard:
         last_rejection: Why not the last of them.
         person: Whether a person has the actuators.
         publishers: Which nodes publish the controller's commands; of two none is obeyed.
+        refuge: Safe controller.
         doing: What a safe controller that steers does now, in words; empty while it does not act.
     """
 
@@ -43,6 +44,7 @@ class ActuatorGuard:
         *,
         estop: EstopMonitor | None = None,
         control_dt: float = 0.0,
+        period_s: float | None = None,
         lockstep: bool = False,
         refuge: Refuge | None = None,
     ) -> None:
@@ -53,6 +55,7 @@ class ActuatorGuard:
             watchdog: Ends a command that nobody repeats.
             estop: Ends any command; none by default.
             control_dt: Time between commands: what they may differ by follows from it; 0 for no such limit [s].
+            period_s: The same by the steady clock, which silences are measured by; `control_dt` by default [s].
             lockstep: Time stands still between commands, so nothing slows down while one is waited for.
             refuge: Safe controller; that of the actuators by default.
         """
@@ -60,9 +63,10 @@ class ActuatorGuard:
         self.estop = estop or EstopMonitor(required=False)
         self.publishers = CommandPublishers()
         self._control_dt, self._lockstep = control_dt, lockstep
-        self._refuge = refuge or actuators.refuge
-        self._steers = math.isinf(self._refuge.longest_s)
-        self._bridge_ns = round(1e9 * max(BRIDGED_S, BRIDGED_PERIODS * control_dt))
+        self.refuge = refuge or actuators.refuge
+        self._steers = math.isinf(self.refuge.longest_s)
+        period_s = control_dt if period_s is None else period_s
+        self._bridge_ns = round(1e9 * max(BRIDGED_S, BRIDGED_PERIODS * period_s))
         self.rejected = 0
         self.last_rejection = ""
         self._given_back_ns: int | None = None
@@ -84,7 +88,7 @@ class ActuatorGuard:
     @property
     def doing(self) -> str:
         """See the class."""
-        return self._refuge.doing if self._steering_ns is not None else ""
+        return self.refuge.doing if self._steering_ns is not None else ""
 
     def offer(
         self,
@@ -200,7 +204,7 @@ class ActuatorGuard:
             if self._steering_ns is None:
                 self._steering_ns = plant_ns
             since_s = (plant_ns - self._steering_ns) / 1e9
-        return self._refuge.command(since_s, self.command, state)
+        return self.refuge.command(since_s, self.command, state)
 
     def _handed_over(self, now_ns: int) -> int | None:
         """Since when the e-stop, a second publisher or the controller itself has ended the command [ns]."""
@@ -255,7 +259,11 @@ class ActuatorGuard:
         """Take a good command; `seconds` is the time it has had to change in, None for that since the last one."""
         time_ns = now_ns if plant_ns is None else plant_ns
         if self._stopped(now_ns) is not None:
-            if not self._steers and self._is_safe(self.output(now_ns)):
+            if self._steers:
+                self.command = self._actuators.limited(
+                    np.asarray(values, dtype=float)
+                )  # what goes on after the stop
+            elif self._is_safe(self.output(now_ns)):
                 self.command = self._actuators.safe_command  # nothing is left to slow down from
         else:
             if not (self._lockstep or self._steers) and self.watchdog.expired(now_ns):
