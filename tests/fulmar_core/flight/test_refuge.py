@@ -13,7 +13,7 @@ from fulmar_core.actuators.refuge import DOWN
 from fulmar_core.attitude import euler_of, from_euler
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import draw_episode
-from fulmar_core.flight.refuge import DESCENDS, HOLD_S, HOLDS, refuge_of
+from fulmar_core.flight.refuge import BLIND, DESCENDS, HOLD_S, HOLDS, refuge_of
 from fulmar_core.flight.trim import find_trim, flying_at
 from fulmar_core.robot import load_robot
 from fulmar_core.spatial import SpatialState
@@ -24,18 +24,18 @@ ROBOT = load_robot("airship_v7")
 TASK = load_task("fly_hold").fitted(ROBOT)
 
 
-def left_alone(height: float, roll: float):
-    """Bank [rad], vertical velocity [m/s] and height [m] at 100 Hz after the controller died."""
+def left_alone(height: float, roll: float, hz: float = 100.0):
+    """Bank [rad], vertical velocity [m/s] and height [m] at a rate after the controller died."""
     quat = [float(part) for part in from_euler(np.asarray(roll), np.asarray(0.0), np.asarray(0.4))]
     start = flying_at(ROBOT, np.array([0.0, 0.0, height, *quat]))
     drawn = draw_episode(ROBOT, TASK, load_scenario("nominal"), seed=3, number=0)
     backend = MockBackend(ROBOT, things=TASK.things)
     sample = backend.reset(replace(drawn, start=start), seed=3)
-    refuge, last = refuge_of(ROBOT), find_trim(ROBOT, ROBOT.airframe.speed, height).command
+    refuge, last = refuge_of(ROBOT, hz), find_trim(ROBOT, ROBOT.airframe.speed, height).command
     rows = []
-    for step in range(2000):
-        last = refuge.command(0.01 * step, last, sample.truth)
-        sample = backend.step(last, 1)
+    for step in range(round(20.0 * hz)):
+        last = refuge.command(step / hz, last, sample.truth)
+        sample = backend.step(last, ROBOT.timing.substeps(hz))
         now = SpatialState.from_rigid(sample.truth)[None]
         if float(now.z[0]) + ROBOT.hull_span[0] <= 0.02:
             break
@@ -70,7 +70,7 @@ def at_height(height: float):
 @pytest.fixture(scope="module")
 def solved():
     """With its gains."""
-    return refuge_of(ROBOT)
+    return refuge_of(ROBOT, 100.0)
 
 
 @pytest.fixture
@@ -107,6 +107,30 @@ def test_one_low_measurement_over_the_water_does_not_stop_its_motors(refuge):
     assert command[-1] > 0.0
 
 
+def test_neither_does_the_first_one_after_a_start_or_after_the_hold(refuge):
+    last = TRIM.command
+    assert refuge.command(0.0, last, at_height(0.3))[-1] > 0.0
+    for step in range(1, 501):
+        refuge.command(0.01 * step, last, at_height(0.6))
+    assert refuge.command(HOLD_S + 0.01, last, at_height(0.3))[-1] > 0.0
+    assert refuge.doing == DESCENDS
+
+
+def test_a_craft_that_is_on_the_ground_gets_no_thrust_for_longer_than_it_takes_to_be_sure(refuge):
+    last = np.zeros(5)
+    commands = [refuge.command(0.01 * step, last, at_height(0.4)) for step in range(31)]
+    assert refuge.doing == DOWN
+    np.testing.assert_array_equal(commands[-1], ROBOT.actuators.safe_command)
+
+
+@pytest.mark.slow
+def test_it_comes_down_softly_where_it_is_asked_at_every_command_of_a_slow_controller():
+    bank, climb, heights = left_alone(1.0, 0.0, hz=25.0).T
+    assert np.abs(bank).max() <= math.radians(10.0)
+    assert climb.min() >= -1.0
+    assert heights[-1] < 0.5
+
+
 def test_a_second_failure_begins_anew_from_where_the_craft_is_then(refuge, solved):
     fresh = copy.deepcopy(solved)
     for since_s in (0.0, 0.01):
@@ -118,3 +142,4 @@ def test_a_second_failure_begins_anew_from_where_the_craft_is_then(refuge, solve
 
 def test_without_a_measured_state_throttles_are_idle(refuge):
     np.testing.assert_array_equal(refuge.command(0.0, np.ones(5), None), ROBOT.actuators.safe_command)
+    assert refuge.doing == BLIND

@@ -10,6 +10,7 @@ import numpy as np
 
 from fulmar_core.backend import AirBearing, Backend, Sample
 from fulmar_core.errors import LockstepError
+from fulmar_core.flight.refuge import refuge_of
 from fulmar_core.process import PLANT_PRIORITY, take_priority
 from fulmar_core.robot import Robot
 from fulmar_core.safety.actuator_guard import ActuatorGuard
@@ -176,7 +177,8 @@ class UnansweredLoop:
     """Steps a simulator on after the process of its controller has ended, as fast as it goes.
 
     No command can come any more, so none is waited for. The guard is asked with the plant's own time in place of the
-    wall clock's: watchdog and safe controller act at the very ticks at which they would in real time.
+    wall clock's, from the last command on: watchdog and safe controller act at the ticks at which they would in real
+    time, however long the process took to end.
     """
 
     def __init__(
@@ -187,11 +189,10 @@ class UnansweredLoop:
 
     def run(self, sample: Sample, ticks: int, stop: threading.Event, on_step: OnStep) -> None:
         """Tick from a sample until `ticks` are done, or `stop` is set."""
-        dt, began_ns, begun_ns = (
-            self._backend.robot.timing.physics_dt,
-            time.monotonic_ns(),
-            self._clock.now_ns,
-        )
+        dt, begun_ns, now_ns = self._backend.robot.timing.physics_dt, self._clock.now_ns, time.monotonic_ns()
+        with self._wires.lock:
+            began_ns = now_ns - self._guard.watchdog.silent_ns(now_ns)
+            self._guard.refuge = refuge_of(self._backend.robot, 1.0 / dt)  # asked at ticks, not at commands
         for _ in range(ticks):
             if stop.is_set():
                 return
@@ -245,4 +246,4 @@ class RealtimeLoop:
 
     def _command(self, measured: RigidBodyState | None) -> np.ndarray:
         with self._wires.lock:
-            return self._guard.output(time.monotonic_ns(), measured, plant_ns=self._clock.now_ns)
+            return self._guard.output(time.monotonic_ns(), measured, plant_ns=self._clock.steady_ns)

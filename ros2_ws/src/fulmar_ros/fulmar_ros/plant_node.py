@@ -83,16 +83,24 @@ class PlantNode(LifecycleNode):
         self.health.awaited = self.settings.wait_for_subscribers
         timeout_s = self.settings.timeout_s(self.robot)
         if timeout_s == 0.0:
-            off = "THE COMMAND WATCHDOG IS OFF: actuators stay as they are when a controller dies."
+            until = (
+                "the safe controller flies, and no trip is reported"
+                if self.robot.flies
+                else "actuators stay as they are"
+            )
+            off = f"THE COMMAND WATCHDOG IS OFF: {until} when a controller dies."
             self.get_logger().warning(off)
             timeout_s = 1e9
+        rate = self.settings.control_rate(self.robot)
+        ticks_hz = 1.0 / self.robot.timing.physics_dt
         self.guard = ActuatorGuard(
             self.robot.actuators,
             Watchdog(round(timeout_s * 1e9)),
             estop=EstopMonitor(required=self.settings.estop),
-            control_dt=1.0 / self.settings.control_rate(self.robot),
+            control_dt=1.0 / rate,
+            period_s=1.0 / (rate * min(self.settings.rate, 1.0)),
             lockstep=self.settings.lockstep,
-            refuge=refuge_of(self.robot),
+            refuge=refuge_of(self.robot, rate if self.settings.lockstep else ticks_hz),
         )
         self.clock = SimulatedTime() if simulated else WallTime()
         if self.settings.autostart:

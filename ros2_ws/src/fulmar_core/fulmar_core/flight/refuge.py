@@ -30,6 +30,7 @@ DOWN_M, SURE_S = (
     0.3,
 )  # nearer to the ground than this, over so long a time, its lowest point is down [m], [s]
 HOLDS, DESCENDS = "holds its height", "descends with level wings"  # what it does before it is `DOWN`
+BLIND = "measures no state and idles its motors"
 
 
 class LevelDescent:
@@ -38,32 +39,40 @@ class LevelDescent:
     longest_s = math.inf
     doing = HOLDS
 
-    def __init__(self, robot: Robot) -> None:
-        """Solve for its gains; `robot` is an aircraft.
+    def __init__(self, robot: Robot, hz: float) -> None:
+        """Solve for its gains.
+
+        Args:
+            robot: An aircraft.
+            hz: How often `command` is called [Hz].
 
         Raises:
             ConfigError: It has no trim at its speed.
         """
         self._robot = robot
-        self._law = FlightLqi(robot, load_task("fly_hold").fitted(robot), descent_weights(robot))
+        task = load_task("fly_hold").fitted(robot)
+        self._law = FlightLqi(robot, task, descent_weights(robot), control_hz=hz)
         self._since_s = math.inf
 
     def command(self, since_s: float, last: np.ndarray, state: RigidBodyState | None) -> np.ndarray:
         """See `Refuge.command`; a time that is not after that of the call before begins anew."""
         if state is None:
+            self.doing = BLIND
             return self._robot.actuators.safe_command
         now = SpatialState.from_rigid(state)[None].in_float64()
         if since_s <= self._since_s:
             self._height, self._heading = float(now.z[0]), float(euler_of(now.quat)[2][0])
             self._law.reset()
             self._sent, self._since_s = np.asarray(last, dtype=float), since_s
-            self._falls, self._low = 0.0, math.inf
+            self._falls, self.doing = 0.0, HOLDS
+            # No craft is down by its first measurement alone, and one that is shows it within `SURE_S`.
+            self._low = max(self._lowest(now), 2.0 * DOWN_M)
         passed, self._since_s = since_s - self._since_s, since_s
-        if since_s <= HOLD_S:
-            self.doing = HOLDS
-        elif self._is_down(float(now.z[0]), passed):
+        if self._is_down(now, passed):
             self.doing = DOWN
             return self._robot.actuators.safe_command
+        if since_s <= HOLD_S:
+            self.doing = HOLDS
         else:
             self.doing = DESCENDS
             self._falls = SINK * min(1.0, (since_s - HOLD_S) / EASE_S)
@@ -71,11 +80,13 @@ class LevelDescent:
         self._sent = self._answer(self._along(now))
         return self._sent
 
-    def _is_down(self, height: float, passed: float) -> bool:
+    def _lowest(self, state: SpatialState) -> float:
+        """Height of the lowest point of the hull in level flight [m]."""
+        return float(state.z[0]) + self._robot.hull_span[0]
+
+    def _is_down(self, state: SpatialState, passed: float) -> bool:
         """Whether the craft lies on the ground, from where it does not come back by itself."""
-        low = height + self._robot.hull_span[0]
-        share = 1.0 if math.isinf(self._low) else min(1.0, passed / SURE_S)
-        self._low = low if share == 1.0 else self._low + share * (low - self._low)
+        self._low += min(1.0, passed / SURE_S) * (self._lowest(state) - self._low)
         return self.doing == DOWN or self._low <= DOWN_M
 
     def _along(self, state: SpatialState) -> SpatialState:
@@ -122,6 +133,6 @@ def descent_weights(robot: Robot) -> FlightWeights:
     )
 
 
-def refuge_of(robot: Robot) -> Refuge:
-    """Safe controller of a robot: that of its actuators, or, of an aircraft, one that flies."""
-    return LevelDescent(robot) if robot.flies else robot.actuators.refuge
+def refuge_of(robot: Robot, hz: float) -> Refuge:
+    """Safe controller of a robot, asked so often [Hz]: that of its actuators, or, of an aircraft, one that flies."""
+    return LevelDescent(robot, hz) if robot.flies else robot.actuators.refuge
