@@ -33,7 +33,7 @@ from hardware_drivers.xplane_messages import (
     Values,
 )
 from hardware_drivers.xplane_protocol import MalformedError, decode, encode
-from hardware_drivers.xplane_state import ASKED, Flight, Placed, flight_of, unbelievable
+from hardware_drivers.xplane_state import ASKED, Flight, Placed, check_place, flight_of, unbelievable
 
 THROTTLES = "sim/flightmodel/engine/ENGN_thro"  # of each engine, from the left, 0 to 1
 # A positive elevator lowers the nose and a positive rudder turns it left; stick and pedals do the opposite.
@@ -149,11 +149,12 @@ class XPlaneDriver(DeviceDriver):
         position, self._position = self._position, None
         if position is None:
             return  # that datagram is lost
-        if self._frame is None:
-            self._frame = LocalFrame(position.latitude, position.longitude)
-        flight = flight_of(position, values, self._frame)
+        check_place(position)
         with self._placing:
-            self._believe(flight, now_ns)
+            if self._settings.origin is None and not self._running:  # a person may still move the aircraft
+                self._frame = LocalFrame(position.latitude, position.longitude)
+            assert self._frame is not None  # of the origin, or of the first answer
+            self._believe(flight_of(position, values, self._frame), now_ns)
 
     def _believe(self, flight: Flight, now_ns: int) -> None:
         """Report a frame if it is new, and no lie."""

@@ -34,16 +34,28 @@ class XPlaneLink:
         self._port = open_port(port, 0, 0.0)
         self._reader = Reader(self._port, self._take, self._end)
         until = time.monotonic() + within_s
-        while not self._answered.is_set():
-            if time.monotonic() > until:
-                self.close()
-                raise DeviceError(f"{port}: no answer within {within_s:.1f} s{self._refusal}. {HINT}")
-            self.ask()
-            self._answered.wait(ASK_S)
+        try:
+            while not self._answered.is_set():
+                if time.monotonic() > until:
+                    raise DeviceError(f"{port}: no answer within {within_s:.1f} s{self._refusal}. {HINT}")
+                self.ask()
+                self._answered.wait(ASK_S)
+        except BaseException:
+            self.close()
+            raise
 
     def send(self, message: Message) -> None:
-        """Send a message; a host that is not there loses it."""
-        self._port.write(encode(message))
+        """Send a message; a host that is not there loses it.
+
+        Raises:
+            DeviceError: The network of this computer does not take it.
+        """
+        try:
+            self._port.write(encode(message))
+        except OSError as error:
+            raise DeviceError(
+                f"{self._address}: not sent ({error}). Look at this computer's network."
+            ) from error
 
     def ask(self) -> None:
         """Ask for an answer."""

@@ -46,6 +46,12 @@ class Flight:
     time_s: float  # of X-Plane
 
 
+def check_place(position: Position) -> None:
+    """Reject places that are none on Earth; raises MalformedError."""
+    if not (abs(position.latitude) <= 90.0 and abs(position.longitude) <= 180.0):
+        raise MalformedError(f"POSI has latitude {position.latitude:g}, longitude {position.longitude:g}")
+
+
 def flight_of(position: Position, answer: Values, frame: LocalFrame) -> Flight:
     """Read two answers of one frame.
 

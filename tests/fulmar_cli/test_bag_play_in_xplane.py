@@ -19,6 +19,8 @@ from fulmar_bringup import xplane_player
 from fulmar_core.attitude import from_euler
 from fulmar_core.errors import BagError, DeviceError
 from fulmar_core.topics import ODOMETRY
+from hardware_drivers.ports import UdpPort
+from hardware_drivers.xplane_link import XPlaneLink
 from tests.fulmar_cli.bag_commands import answer, ask
 from tests.hardware_drivers.xplane_bench import Peer
 
@@ -205,3 +207,16 @@ def test_a_port_without_x_plane_is_one_line_and_nothing_is_shown(
 def test_options_that_do_not_go_together_are_refused(flight: Path, asked: tuple[str, ...], says: str) -> None:
     done = ask("play", flight, *asked)
     assert says in str(done.exception)
+
+
+def test_a_network_that_takes_no_datagram_is_one_line_and_leaves_no_port_open(monkeypatch) -> None:
+    closed = []
+
+    def unreachable(_port: UdpPort, _data: bytes) -> None:
+        raise OSError(101, "Network is unreachable")
+
+    monkeypatch.setattr(UdpPort, "write", unreachable)
+    monkeypatch.setattr(UdpPort, "close", lambda _port: closed.append(True))
+    with pytest.raises(DeviceError, match="Network is unreachable"):
+        XPlaneLink("udp://127.0.0.1:49009", within_s=1.0)
+    assert closed

@@ -180,6 +180,14 @@ def far(fields: list) -> None:
     fields[2] += 0.05  # of latitude: 5.6 km
 
 
+def to_the_equator(fields: list) -> None:
+    fields[2] -= 49.5
+
+
+def off_the_earth(fields: list) -> None:
+    fields[2] = -998.0
+
+
 def nowhere(fields: list) -> None:
     fields[4] = float("nan")
 
@@ -302,6 +310,32 @@ def test_one_datagram_that_is_spoilt_changes_nothing(peer):
             lambda driver=driver: driver.health() == {"refused_datagrams": "1", "warning": ""}, timeout_s=0.5
         )
         assert driver.read().odometry.position_in_world[:2] == pytest.approx((0.0, 10.0), abs=10.0)
+
+
+def test_a_frame_whose_place_was_lost_is_not_reported_with_the_place_before(peer):
+    for driver in driver_of(peer):
+        peer.lie = lambda answer: b"" if answer.startswith(b"POSI") else answer
+        time.sleep(0.03)  # what was under way
+        before = driver.read().stamp_ns
+        time.sleep(0.1)
+        assert driver.read().stamp_ns == before
+
+
+def test_an_aircraft_that_a_person_moves_before_the_start_is_measured_in_the_frame_of_where_it_then_is(peer):
+    driver = XPlaneDriver(ROBOT, settings_of(peer.address, origin=None), patience_s=5.0)
+    try:
+        peer.lie = posi(to_the_equator)
+        time.sleep(0.1)
+        driver.begin(0.0, 0.0, 0.0)
+        assert driver._frame.metres(0.0, -2.999)[0] == pytest.approx(111.3, abs=0.5)  # 72 at 49.5 degrees
+    finally:
+        driver.close()
+
+
+def test_a_place_that_is_none_on_earth_is_refused(peer):
+    for driver in driver_of(peer):
+        peer.lie = posi(off_the_earth)
+        until(lambda driver=driver: "latitude -998" in driver.health()["warning"], timeout_s=0.4)
 
 
 def test_datagrams_of_a_stranger_are_not_received(peer):
