@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from fulmar_benchmarks.falcon.campaign import Request, cells_of, requirements
+from fulmar_benchmarks.falcon.cells import figures
+from fulmar_core.robot import load_robot
 
+ROBOT = load_robot("airship_v7")
 PUBLISHED = {"rmse_per_axis_m": 0.012}
 
 
@@ -38,6 +43,7 @@ def test_flights_that_hold_a_height_begin_apart_so_exact_state_takes_as_many():
         ("light", {"altitude_rmse_m": 0.19, "late_altitude_rmse_m": 0.19, "survival": 0.97}, True),
         ("light", {"altitude_rmse_m": 0.21}, False),
         ("light", {"altitude_rmse_m": None, "survival": 0.0}, False),
+        ("calm", {"altitude_rmse_m": None, "late_altitude_rmse_m": None, "survival": None}, False),
     ],
 )
 def test_a_policy_must_hold_its_height_and_survive(scenario, change, good):
@@ -56,3 +62,41 @@ def test_mppi_must_stay_within_three_centimetres_with_every_seed(worst, survival
     flown = {"mppi": {"exact": found | {"thesis": PUBLISHED}}}
     rows = requirements({"tasks": {"a": flown, "b": flown}})
     assert [(name.split(",")[1].strip(), met) for name, *_, met in rows] == [("(a)", good)]
+
+
+def test_an_lqi_that_could_not_be_flown_is_not_met():
+    failed = {"error": "why", "survival": None, "episodes": 0}
+    rows = requirements({"tasks": {"a": {"lqi": {"light": failed}}}})
+    assert [(shown, met) for *_, shown, met in rows] == [("not flown", False)]
+
+
+def flown(heights, *, lost=(), control_dt=1.0):
+    """Flights that hold some heights in turn, shape (flights, steps), those in `lost` in the water."""
+    heights = np.asarray(heights, dtype=float)
+    touching = np.zeros(heights.shape, dtype=bool)
+    touching[list(lost), -1] = True
+    return SimpleNamespace(
+        position_error=np.abs(heights - 1.0), control_dt=control_dt, z=heights, touching=touching,
+        shares=np.zeros((*heights.shape, 5)),
+    )  # fmt: skip
+
+
+def test_figures_count_flights_that_survive_and_pool_their_altitudes():
+    off, well, lost = [1.4] * 20, [1.0] * 20, [9.0] * 20
+    found = figures(flown([off, well, lost], lost=[2]), "hold", ROBOT)
+    assert found["survival"] == pytest.approx(2.0 / 3.0)
+    assert found["altitude_rmse_m"] == pytest.approx(0.4 / np.sqrt(2.0))
+    assert found["rmse_m"] == pytest.approx(0.2)
+    assert found["rmse_per_axis_worst_m"] == pytest.approx(0.4 / np.sqrt(3.0))
+
+
+def test_the_late_altitude_leaves_the_first_ten_seconds_out():
+    found = figures(flown([[2.0] * 10 + [1.0] * 10]), "hold", ROBOT)
+    assert found["altitude_rmse_m"] > 0.5
+    assert found["late_altitude_rmse_m"] == 0.0
+
+
+def test_most_flights_must_settle_before_there_is_a_time_of_settling():
+    settles, never = [2.0, 1.0, 1.0, 1.0], [2.0] * 4
+    assert figures(flown([settles, settles, never]), "hold", ROBOT)["settling_s"] == pytest.approx(1.0)
+    assert figures(flown([settles, never, never]), "hold", ROBOT)["settling_s"] is None

@@ -49,10 +49,13 @@ def fly_in_lockstep(flights: Flights, number: int) -> Descent:
         plant = PlantNode(
             make_backend, lambda _code: None, cli_args=command_line(system_rows(plan)["plant"])[3:]
         )
-        if plant.trigger_configure() != TransitionCallbackReturn.SUCCESS:
-            raise RunFailed("the plant could not be configured")
         with spinning(plant, overseer.fail):
-            return _killed_in_lockstep(flights, number, plant, group, overseer, episode)
+            try:
+                if plant.trigger_configure() != TransitionCallbackReturn.SUCCESS:
+                    raise RunFailed(f"the plant could not be configured: {plant.health.reason}")
+                return _killed_in_lockstep(flights, number, plant, group, overseer, episode)
+            finally:
+                plant.stop()
 
 
 def _killed_in_lockstep(

@@ -132,15 +132,7 @@ def requirements(document: dict[str, Any]) -> list[tuple[str, str, str, bool]]:
                 shown = "crashed" if rmse is None else f"{rmse:.4f} m"
                 rows.append((f"LQI, ({task}), {scenario}: RMSE per axis", f"<= {limit:.4f} m", shown, good))
             if scenario in ("noise", "delay", "light") and task in STEADY:
-                good = found["survival"] is not None and found["survival"] >= SURVIVAL
-                rows.append(
-                    (
-                        f"LQI, {task}, {scenario}: survival",
-                        f">= {SURVIVAL:g}",
-                        f"{found['survival']:.2f}",
-                        good,
-                    )
-                )
+                rows.append(_survival_row(f"LQI, {task}, {scenario}", found["survival"], SURVIVAL))
         if task == HOLD:
             rows += _policy_rows(controllers.get("policy", {}))
     return rows
@@ -149,18 +141,17 @@ def requirements(document: dict[str, Any]) -> list[tuple[str, str, str, bool]]:
 def _policy_rows(scenarios: dict[str, Any]) -> list[tuple[str, str, str, bool]]:
     rows = []
     for scenario, (whole, late, survival) in POLICY_LIMITS.items():
-        found = scenarios.get(scenario, {})
-        if found.get("survival") is None:
+        if scenario not in scenarios:
             continue
+        found = scenarios[scenario]
         about = f"policy, hold, {scenario}, {found['episodes']} flights"
-        alive = found["survival"]
-        rows.append((f"{about}: survival", f">= {survival:g}", f"{alive:.3f}", alive >= survival))
+        rows.append(_survival_row(about, found["survival"], survival))
         for name, what, limit in (
             ("altitude_rmse_m", "altitude RMSE", whole),
             ("late_altitude_rmse_m", "same after 10 s", late),
         ):
             if limit is not None:
-                rmse = found[name]
+                rmse = found.get(name)
                 shown = "crashed" if rmse is None else f"{rmse:.4f} m"
                 rows.append(
                     (f"{about}: {what}", f"<= {limit:g} m", shown, rmse is not None and rmse <= limit)
@@ -168,8 +159,15 @@ def _policy_rows(scenarios: dict[str, Any]) -> list[tuple[str, str, str, bool]]:
     return rows
 
 
+def _survival_row(about: str, alive: float | None, least: float) -> tuple[str, str, str, bool]:
+    """Share of flights that must survive; None: they could not be flown."""
+    shown = "not flown" if alive is None else f"{alive:.3f}"
+    return f"{about}: survival", f">= {least:g}", shown, alive is not None and alive >= least
+
+
 def _mppi_row(task: str, found: dict[str, Any]) -> tuple[str, str, str, bool]:
     worst, limit = found.get("rmse_per_axis_worst_m"), MPPI_LIMIT[task]
-    shown = "crashed" if worst is None or found["survival"] < 1.0 else f"{worst:.4f} m"
+    alive = found["survival"] == 1.0
+    shown = f"{worst:.4f} m" if worst is not None and alive else "crashed"
     what = f"MPPI, ({task}), exact, {found['episodes']} seeds: largest RMSE per axis"
-    return what, f"<= {limit:.4f} m", shown, worst is not None and worst <= limit and found["survival"] == 1.0
+    return what, f"<= {limit:.4f} m", shown, worst is not None and worst <= limit and alive

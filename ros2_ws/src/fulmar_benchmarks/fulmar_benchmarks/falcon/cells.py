@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -110,15 +111,15 @@ def figures(run: Trajectories, task: str, robot: Robot) -> dict[str, Any]:
     rmse = np.sqrt(np.mean(error**2, axis=1))
     throttles = np.asarray(run.shares)[..., robot.actuators.positions :]
     near = np.flip(np.logical_and.accumulate(np.flip(error <= SETTLED_M, axis=1), axis=1), axis=1)
-    settled = np.where(near.any(axis=1), np.argmax(near, axis=1) * run.control_dt, np.nan)
+    settled = np.where(near.any(axis=1), np.argmax(near, axis=1) * run.control_dt, np.inf)
     late = times > WITHOUT_START_S
 
     def pooled(squares: np.ndarray) -> float | None:
         return float(np.sqrt(np.mean(squares[alive]))) if alive.any() and squares.size else None
 
     def median(values: np.ndarray) -> float | None:
-        kept = values[alive & np.isfinite(values)]
-        return float(np.median(kept)) if kept.size else None
+        middle = float(np.median(values[alive])) if alive.any() else math.inf
+        return middle if math.isfinite(middle) else None
 
     return {
         "rmse_per_axis_m": median(rmse / np.sqrt(3.0)),

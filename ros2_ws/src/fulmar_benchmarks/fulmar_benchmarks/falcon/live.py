@@ -51,7 +51,7 @@ def fly_live(request: LiveRequest, progress: Progress) -> dict[str, Any]:
     for number in range(request.real_time):
         seed = plan.seed + number
         twin = _flown(replace(trial, through="batch", episodes=1, plan=replace(plan, seed=seed)))
-        clock.append({"seed": seed, **_by_the_clock(trial, seed), "batch": twin})
+        clock.append({"seed": seed, **_by_the_clock_or_error(trial, seed), "batch": twin})
         progress(steps + clocked * (number + 1) / request.real_time, total)
     required = requirements(batch, lockstep, clock)
     return {
@@ -74,6 +74,19 @@ def fly_live(request: LiveRequest, progress: Progress) -> dict[str, Any]:
 def _flown(trial: Trial, progress: Callable[[int], None] = lambda steps: None) -> dict[str, Any]:
     found = figures(join(list(runs_of(trial, progress))), trial.plan.task.removeprefix("fly_"), trial.robot)
     return {name: found[name] for name in SHOWN}
+
+
+def _by_the_clock_or_error(trial: Trial, seed: int) -> dict[str, Any]:
+    """As `_by_the_clock`; of a run that failed `error`, which keeps what others have flown."""
+    try:
+        return _by_the_clock(trial, seed)
+    except RunFailed as error:
+        return {
+            **dict.fromkeys(SHOWN),
+            "survival": 0.0,
+            "period_error_ms": {"p99": None},
+            "error": str(error),
+        }
 
 
 def _by_the_clock(trial: Trial, seed: int) -> dict[str, Any]:
@@ -154,6 +167,8 @@ def print_live(document: dict[str, Any], write: Callable[[str], None]) -> None:
             f"{name:24} {_number(found[ALTITUDE]):>12} m {_number(found['late_altitude_rmse_m']):>9} m "
             f"{_number(found['peak_error_m']):>5} m {found['survival']:>6.2f} {_number(period):>8} ms"
         )
+        if "error" in found:
+            write(f"{'':24} {found['error']}")
     for row in document["required"]:
         write(
             f"{'met' if row['passed'] else 'NOT MET':8} {row['what']}: {_number(row['value'])} "

@@ -59,7 +59,8 @@ def descent(
     each = tuple(
         Flights(robot, controller, height, flights, seed, scenario, folder) for height in _heights(heights)
     )
-    each[0].check()
+    for one in each:
+        one.check()
     cores = jobs or len(os.sched_getaffinity(0))
     request = Request(each, tuple(read_names(through, "way", WAYS)), real_time, cores)
     with work_bar("flights") as progress:
