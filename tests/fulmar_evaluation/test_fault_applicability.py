@@ -26,7 +26,6 @@ from fulmar_evaluation.faults.fault_environment import (
     task_of,
 )
 from fulmar_evaluation.faults.suite import EVERY, faults_of, modules_for
-from policy_server.controllers import shipped_policy
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "safety.md"
 ROBOTS = config_names("robots")
@@ -92,7 +91,8 @@ def test_an_aircraft_has_every_fault_of_processes_commands_and_odometry_and_the_
 def test_an_aircraft_starts_in_level_flight_and_never_leaves_its_area_ahead(tmp_path):
     request = request_of("airship_v7", tmp_path / "bag", FaultEnvironment(has_area=True))
     craft = load_robot("airship_v7")
-    assert request.plan.controller == "policy" if shipped_policy("airship_v7", "fly_hold") else "lqr"
+    assert request.plan.controller == "policy"
+    assert request.plan.control_hz == 25.0
     assert request.plan.start[4] == pytest.approx(
         SpatialState.written(find_trim(craft, craft.airframe.speed, 1.0).state.pose)[4], abs=1e-6
     )

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from fulmar_bringup.bag_origin import attachments, run_info
+from fulmar_bringup.console import log_line
 from fulmar_bringup.domains import claimed_domain
 from fulmar_bringup.goal_plan import is_endless, shown_path
 from fulmar_bringup.planning import RunRequest
@@ -167,7 +168,8 @@ def _watch(request: RunRequest, plan: RunPlan, overseer: Supervisor, group: Proc
     except RunFailed as error:
         time.sleep(LAST_WORDS_S)
         reason = with_plant_reaction(str(error), overseer)
-        _let_it_land(overseer, group)
+        with contextlib.suppress(KeyboardInterrupt):  # which ends the descent, and leaves the reason as it is
+            _let_it_land(overseer, group)
         return reason
     return ""
 
@@ -175,6 +177,8 @@ def _watch(request: RunRequest, plan: RunPlan, overseer: Supervisor, group: Proc
 def _let_it_land(overseer: Supervisor, group: ProcessGroup) -> None:
     """Let the plant of what cannot stop bring it down before the plant, too, is stopped."""
     until_s = time.monotonic() + LANDS_S
+    if overseer.plant.values.get("safe_controller", "") not in ("", DOWN):
+        log_line(f"the safe controller flies the robot down, within {LANDS_S:g} s; Ctrl-C ends it at once")
     while overseer.plant.values.get("safe_controller", "") not in ("", DOWN):
         ended, silent_s = group.process("plant").poll(), time.monotonic() - overseer.plant.received_s
         if ended is not None or silent_s > PLANT_SILENT_S or time.monotonic() > until_s:

@@ -80,7 +80,7 @@ class PlantHealth:
             level, message = "warn", warning
         guard, listeners = self._guard, self._health.listeners()
         changed = (
-            self.mode, self.reason, key, warning, guard.watchdog.trips, guard.rejected, listeners, guard.doing
+            self.mode, self.reason, key, warning, guard.watchdog.trips, guard.rejected, listeners, self._doing
         )  # fmt: skip
         now = time.monotonic()
         if changed == self._said and now - self._said_at < AT_LEAST_S:
@@ -136,13 +136,18 @@ class PlantHealth:
             level = "error" if self._guard.estop.was_released and self.mode == "running" else "warn"
         return (level, f"{reason}: {self._refuge()}", reason[:16]) if reason else None
 
+    @property
+    def _doing(self) -> str:
+        """What the safe controller does now; nothing where the plant does not run."""
+        return self._guard.doing if self.mode == "running" else ""
+
     def _refuge(self) -> str:
         """What happens in the place of the controller's commands."""
-        doing = self._guard.doing
+        doing = self._doing
         return f"the safe controller {doing}" if doing else "actuators in their safe state"
 
     def _commander(self) -> str:
-        if self._guard.doing:
+        if self._doing:
             return SAFE_CONTROLLER
         return "person" if self._guard.person else "controller"
 
@@ -156,7 +161,7 @@ class PlantHealth:
             "watchdog_trips": str(self._guard.watchdog.trips),
             "rejected_commands": str(self._guard.rejected),
             "commanded_by": self._commander(),
-            "safe_controller": self._guard.doing,
+            "safe_controller": self._doing,
             "answers": str(self._wires.answers),
             **self._wires.latency_ms.percentiles("latency_ms"),
         }

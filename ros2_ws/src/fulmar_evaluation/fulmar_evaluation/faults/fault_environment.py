@@ -26,7 +26,7 @@ from fulmar_core.state import State
 from fulmar_core.tasks import Task, load_task
 from fulmar_core.topics import COMMAND, GOAL_POINT, GOAL_POSE, IMU, MOCAP, ODOMETRY, VELOCITY_COMMAND, Wire
 from fulmar_ros.qos import publisher_qos, subscriber_qos
-from policy_server.controllers import shipped_policy, usual_hz
+from policy_server.controllers import shipped_policy
 
 KINDS = {
     ODOMETRY: Odometry,
@@ -66,10 +66,10 @@ def delayed(periods: int) -> Injection:
 class FaultInjector:
     """Passes messages on; `change` changes each, or swallows it by returning None."""
 
-    def __init__(self, node: Node, wire: Wire) -> None:
-        """Begin as if it were not there."""
+    def __init__(self, node: Node, wire: Wire, *, prior: bool = False) -> None:
+        """Begin as if it were not there; `prior`: take the priority of the nodes that it stands between."""
         self.change: Injection = unchanged
-        self._prior = False  # whether this process has the priority of those that it stands between
+        self._waits = prior
         kind, reliable = KINDS[wire], wire.delivery != "best_effort"
         self._publisher = node.create_publisher(kind, wire.name, publisher_qos(wire))
         node.create_subscription(
@@ -77,9 +77,9 @@ class FaultInjector:
         )
 
     def _pass(self, message: Any) -> None:
-        if not self._prior:
+        if self._waits:
             take_priority_with_helpers(CONTROL_PRIORITY)
-            self._prior = True
+            self._waits = False
         changed = self.change(message)
         if changed is not None:
             self._publisher.publish(changed)
@@ -206,7 +206,7 @@ def request_of(name: str, record: Path, about: FaultEnvironment = USUAL) -> RunR
         duration_s=None,
         lockstep=False,
         rate=1.0,
-        control_hz=usual_hz(controller, robot, task) if robot.flies else None,
+        control_hz=None,
         scenario=about.scenario,
         seed=0,
         record=record,

@@ -149,7 +149,7 @@ def _without_place(robot: Robot) -> str:
     if robot.actuators.turns_only:
         return STAYS
     drift_m = CARRIED_S * STEP_M / robot.timing.physics_dt
-    far = robot.limits.geofence > drift_m
+    far = robot.flies and robot.limits.geofence > drift_m
     return f"its geofence of {robot.limits.geofence:g} m is farther than a drift takes it" if far else ""
 
 

@@ -67,8 +67,10 @@ class LiveSystem:
         self.robot = robot
         self.observer = RunObserver(bystander, robot, DEVICE_STATE if about.emulated else ACTUATORS_STATE)
         self.flight = FlightWatch(bystander, self.plan.frames) if robot.flies else None
-        self.injector = FaultInjector(bystander, about.intercepted or command_wire(robot))
-        self._answers = FaultInjector(bystander, command_wire(robot)) if about.answers_pass else None
+        # The safe controller of an aircraft bridges a pause of 50 ms, which an ordinary thread may have.
+        wire = command_wire(robot)
+        self.injector = FaultInjector(bystander, about.intercepted or wire, prior=robot.flies)
+        self._answers = FaultInjector(bystander, wire, prior=robot.flies) if about.answers_pass else None
         self.tick_s, self.beat_s = robot.timing.physics_dt, 1.0 / self.plan.control_hz
         self.watchdog_s = default_timeout(self.beat_s)
         actuators = robot.actuators
