@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-import itertools
+import struct
+from collections import Counter
 from pathlib import Path
 
 import pytest
 from mcap.reader import make_reader
 
+from fulmar_bags.contents import open_bag
 from fulmar_bags.run_record import read_run
 from tests.conftest import RosDomain
 from tests.ros.cli import fulmar, json_of, run_in_real_time
@@ -31,16 +33,29 @@ REQUIRED = {
 
 
 def command_bytes(bag: Path) -> list[bytes]:
-    """Every command in a bag, as it was on the wire, with its stamp; an answer to a plant that asked again once."""
+    """Every command in a bag, as it was on the wire, with its stamp.
+
+    A plant that has no answer for half a second asks again, and a controller then sends the same command again; such
+    repeats count once, where the bag has the odometry as often.
+    """
+    found = open_bag(bag)
+    asked = Counter(found.odometry().stamp_ns.tolist())
     (file,) = bag.glob("*.mcap")
     with file.open("rb") as stream:
-        messages = make_reader(stream).iter_messages()
-        sent = (
+        sent = [
             message.data
-            for _, channel, message in messages
+            for _, channel, message in make_reader(stream).iter_messages()
             if channel.topic.endswith(("actuators/command", "cmd_vel"))
-        )
-        return [data for data, _ in itertools.groupby(sent)]
+        ]
+    for data, count in Counter(sent).items():
+        assert count <= asked[stamp_in(data)], "a command that was not asked for again came again"
+    return list(dict.fromkeys(sent))
+
+
+def stamp_in(data: bytes) -> int:
+    """Stamp of a message in CDR that begins with its header [ns]."""
+    seconds, nanoseconds = struct.unpack_from("<iI", data, 4)
+    return int(seconds * 10**9 + nanoseconds)
 
 
 # Other quick runs have the LQR.
