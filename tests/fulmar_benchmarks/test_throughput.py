@@ -88,12 +88,15 @@ def test_aircraft_are_timed_in_jsbsim_too(command):
 
 
 def test_jsbsim_flies_above_the_ground_and_in_gusts_while_it_is_timed():
-    pace = JsbsimPace(load_robot("airship_v7"))
+    pace = JsbsimPace(load_robot("airship_v7"), 7.7)
     pace.steps_per_s(0.01)
     model = pace._model
     assert model["position/h-agl-ft"] > 10.0
     assert model["simulation/sim-time-sec"] == pytest.approx(2.0)
     assert abs(model["atmosphere/turb-down-fps"]) > 0.1
+    still = JsbsimPace(load_robot("airship_v7"), 0.0)
+    still.steps_per_s(0.01)
+    assert still._model["atmosphere/turb-down-fps"] == 0.0
 
 
 def test_a_task_of_the_other_space_is_refused_for_robots_that_were_named(command):

@@ -9,7 +9,6 @@ from pathlib import Path
 import jsbsim
 
 from fulmar_core.errors import ConfigError
-from fulmar_core.flight.turbulence import CLASSES
 from fulmar_core.robot import Robot
 from sim_nodes.jsbsim_model import FOOT, write_aircraft
 
@@ -21,8 +20,12 @@ HEIGHT_M = 20.0  # where it begins, so that it meets no ground on the way
 class JsbsimPace:
     """One aircraft in JSBSim, over level ground, by time steps as long as the core's."""
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, robot: Robot, turbulence: float) -> None:
         """Write the model and load it.
+
+        Args:
+            robot: An aircraft.
+            turbulence: Wind at 20 ft that turbulence comes from; 0: none [m/s].
 
         Raises:
             ConfigError: The robot is no aircraft, or JSBSim does not take the model.
@@ -40,21 +43,24 @@ class JsbsimPace:
         self._ticks = robot.timing.substeps(robot.timing.control_hz)
         self._steps = round(FLOWN_S * robot.timing.control_hz)
         model["ic/h-agl-ft"], model["ic/u-fps"] = HEIGHT_M / FOOT, robot.airframe.speed / FOOT
+        self._turbulence = turbulence
         self._begin()
 
     def steps_per_s(self, seconds: float) -> float:
-        """Step for a while; returns how many control steps were made a second."""
-        began, count, run = time.perf_counter(), 0, self._model.run
-        while time.perf_counter() - began < seconds or not count:
+        """Step for a while; returns how many control steps were made a second, without the time to begin anew."""
+        spent, count, run = 0.0, 0, self._model.run
+        while spent < seconds:
             self._begin()
+            began = time.perf_counter()
             for _ in range(self._steps * self._ticks):
                 run()
+            spent += time.perf_counter() - began
             count += self._steps
-        return count / (time.perf_counter() - began)
+        return count / spent
 
     def _begin(self) -> None:
         model = self._model
         model.reset_to_initial_conditions(0)
         model["atmosphere/turb-type"] = MILSPEC
-        model["atmosphere/turbulence/milspec/severity"] = LIGHT
-        model["atmosphere/turbulence/milspec/windspeed_at_20ft_AGL-fps"] = CLASSES["light"] / FOOT
+        model["atmosphere/turbulence/milspec/severity"] = LIGHT if self._turbulence else 0
+        model["atmosphere/turbulence/milspec/windspeed_at_20ft_AGL-fps"] = self._turbulence / FOOT

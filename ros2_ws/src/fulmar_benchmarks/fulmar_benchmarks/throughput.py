@@ -298,7 +298,7 @@ def _others(
 
         flown = SharedPace(cores)
         stack.callback(flown.close)
-        flown.take(cores * [partial(JsbsimPace, robot)])
+        flown.take(cores * [partial(JsbsimPace, robot, scenario.air.turbulence)])
         return {JSBSIM: flown}
     rollout = MujocoPace(robot, threads=cores)
     if robot.hydrodynamics is not None:

@@ -27,7 +27,9 @@ HIGHEST_M = 100.0
 
 def descent(
     robot: Annotated[str, option("NAME", "An aircraft.")] = "airship_v7",
-    controller: Annotated[str, option("C", "What flies until it is killed: lqi, lqr or policy.")] = "lqi",
+    controller: Annotated[
+        str, option("C", "What flies until it is killed: lqi, lqr, mppi, pid or policy.")
+    ] = "lqi",
     policy: PolicyOption = None,
     heights: Annotated[str, option("M,...", "Heights at which it is killed [m].")] = "1,5",
     flights: Annotated[int, option("N", "Flights at each height.", min=1)] = 64,

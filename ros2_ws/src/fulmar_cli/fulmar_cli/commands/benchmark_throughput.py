@@ -50,7 +50,7 @@ def throughput(
     MuJoCo's is physics alone, with its own drag for water. Both are measured in turns in this run, on the same cores;
     the medians are printed. MuJoCo also rolls out ("otherwise") robots on water in the water of the plant, and robots
     in space by Euler's method; the plant has Runge-Kutta's of fourth order. Aircraft fly in JSBSim instead, one in a
-    process for each core, in its own light turbulence.
+    process for each core, in turbulence of its own where the scenario has any.
     Before that a step of each robot is compiled, which takes 10 to 30 s.
 
     Try:
