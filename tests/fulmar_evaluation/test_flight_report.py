@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from fulmar_core.controllers.classical import load_classical
 from fulmar_core.controllers.controller import Inputs
 from fulmar_core.disturbances.scenario import Scenario
 from fulmar_core.episode import draw_episode
+from fulmar_core.references.flight_paths import PATHS
 from fulmar_core.robot import load_robot
 from fulmar_core.spatial import SpatialState
 from fulmar_core.tasks import load_task
@@ -123,3 +125,19 @@ def test_a_plot_of_any_bag_has_a_panel_of_measured_surfaces(flight):
     bag = open_bag(flight.path)
     titles = [drawing.title for drawing in _drawings(bag, odometries(bag.of(ODOMETRY)))]
     assert "What the actuators did: /airship_v7/surfaces/state" in titles
+
+
+def test_the_reference_rests_where_it_is_level_and_climbs_between_places():
+    task = load_task("fly_b").fitted(load_robot("airship_v7"))
+    dt, times = 0.01, np.arange(0.0, 45.0, 0.01)
+    side, above = PATHS["b"]
+    passed = task.spacing_s * np.floor(times / task.spacing_s + 1e-6)
+    aims = np.stack((28.0 * passed, side(passed), above(passed)), axis=-1)
+    result = SimpleNamespace(task=task, aims=aims, run=SimpleNamespace(control_dt=dt))
+    places = reference_places(result)
+    assert (
+        np.abs(places[: -round(task.spacing_s / dt), 2] - above(times)[: -round(task.spacing_s / dt)]).max()
+        < 0.11
+    )
+    level = (times > 10.2) & (times < 29.9)
+    assert np.ptp(places[level, 2]) == 0.0

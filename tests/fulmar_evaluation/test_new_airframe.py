@@ -145,3 +145,21 @@ def test_an_aircraft_like_none_is_refused(lattice, tmp_path):
 def test_a_flap_lies_within_its_surface(wrong):
     with pytest.raises(ValueError, match="'chord' must lie in"):
         Flap(**wrong)
+
+
+def test_an_aircraft_that_no_robot_can_be_leaves_no_file_behind(lattice, tmp_path):
+    out = tmp_path / "light.yaml"
+    feather = replace(CRAFT, mass=1e-6)
+    with pytest.raises(ConfigError, match=r"light\.yaml"):
+        write_robot(feather, coefficient_set(feather, Path("nowhere")), out, "made up")
+    assert not out.exists()
+    out.write_text("mine", encoding="utf-8")
+    with pytest.raises(ConfigError):
+        write_robot(feather, coefficient_set(feather, Path("nowhere")), out, "made up")
+    assert out.read_text(encoding="utf-8") == "mine"
+
+
+@pytest.mark.parametrize("count", [2, 4, 5, 7])
+def test_an_inertia_has_three_or_six_numbers(count):
+    with pytest.raises(ValueError, match="three or six numbers"):
+        replace(CRAFT, inertia=(1.0,) * count)

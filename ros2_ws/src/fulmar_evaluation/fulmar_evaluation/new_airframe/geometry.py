@@ -81,7 +81,10 @@ class Geometry:
     kind: Literal["geometry"] = "geometry"
 
     def __post_init__(self) -> None:
-        if min(self.mass, self.speed, self.profile_drag, self.stall_deg) <= 0.0 or len(self.inertia) < 3:
+        if min(self.mass, self.speed, self.profile_drag, self.stall_deg) <= 0.0 or len(self.inertia) not in (
+            3,
+            6,
+        ):
             raise ValueError(
                 "mass, speed, profile_drag and stall_deg must be greater than 0, and inertia has three or six numbers."
             )
@@ -126,6 +129,7 @@ def _flapped(surface: LiftingSurface, along: np.ndarray, chord: np.ndarray, shar
 def _wing(surface: LiftingSurface, columns: int, deflection: float, *, even: bool) -> np.ndarray:
     """Both halves; `deflection`: trailing edge down, on the right, and on the left where it is even, else up [rad]."""
     side = -np.cos(np.linspace(0.0, math.pi, columns + 1))  # -1 at the left tip, 1 at the right one
+    side[columns // 2] = 0.0  # the root belongs to neither half
     share = np.abs(side)
     along, chord = _chordwise(surface, share)
     y = 0.5 * surface.span * side

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,7 @@ DIGITS = 6  # of numbers that the lattice computes
 
 
 def write_robot(geometry: Geometry, terms: Terms, out: Path, source: str) -> Path:
-    """Write the file and load it as `fulmar check robot` does.
+    """Load the file as `fulmar check robot` does, and write it.
 
     Args:
         geometry: Of the aircraft.
@@ -58,8 +59,17 @@ def write_robot(geometry: Geometry, terms: Terms, out: Path, source: str) -> Pat
     }
     robot["performance"] |= {"speed": geometry.speed, "top_speed": round(1.4 * geometry.speed, DIGITS)}
     head = f"# {source}\n# What a geometry does not say, such as servos, motors and sensors, is of {geometry.like}.\n"
-    write_whole({out: (head + yaml.safe_dump(robot, sort_keys=False, allow_unicode=True)).encode()})
-    load_robot_file(out)
+    content = (head + yaml.safe_dump(robot, sort_keys=False, allow_unicode=True)).encode()
+    with tempfile.TemporaryDirectory(
+        prefix="fulmar-"
+    ) as folder:  # what no robot can be leaves no file behind
+        trial = Path(folder) / out.name
+        trial.write_bytes(content)
+        try:
+            load_robot_file(trial)
+        except ConfigError as error:
+            raise ConfigError(str(error).replace(str(trial), str(out))) from error
+    write_whole({out: content})
     return out
 
 

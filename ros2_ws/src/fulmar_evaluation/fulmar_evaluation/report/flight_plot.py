@@ -66,13 +66,18 @@ def draw_flight(rows: Sequence[Axes] | np.ndarray, runs: Sequence[View]) -> None
 
 
 def reference_places(result: RunResult) -> np.ndarray | None:
-    """Places of the reference over time, between its known places in a straight line, shape (n, 3) [m]; None: none."""
+    """Places of the reference over time, between its known places in a straight line, shape (n, 3) [m]; None: none.
+
+    The aim of a time is the place that the reference passed last; places lie `spacing_s` apart.
+    """
     if not isinstance(result.task, FollowReference):
         return None
-    steps = np.arange(len(result.aims))
-    new = np.flatnonzero(np.any(np.diff(result.aims[:, 1:3], axis=0) != 0.0, axis=1)) + 1
-    known = np.unique(np.concatenate(([0], new)))
-    return np.stack([np.interp(steps, known, result.aims[known, axis]) for axis in range(3)], axis=-1)
+    spacing_s = result.task.spacing_s
+    time_s = result.run.control_dt * np.arange(len(result.aims))
+    passed, first = np.unique(np.floor(time_s / spacing_s + 1e-6), return_index=True)
+    return np.stack(
+        [np.interp(time_s, spacing_s * passed, result.aims[first, axis]) for axis in range(3)], axis=-1
+    )
 
 
 def _energy(result: RunResult) -> np.ndarray:
