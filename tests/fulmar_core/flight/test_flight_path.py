@@ -72,6 +72,12 @@ def test_a_path_that_cannot_be_is_refused(change, says):
         replace(TASK, **change)
 
 
+def test_a_start_in_the_water_before_a_path_is_refused():
+    low = replace(TASK, start=replace(TASK.start, height=(0.3 - TASK.waypoints[0][2], 0.0)))
+    with pytest.raises(ConfigError, match="starts at"):
+        low.check(ROBOT)
+
+
 def test_a_path_into_the_water_is_refused():
     with pytest.raises(ConfigError, match=r"leads down to 0\.1 m, where the hull of 'airship_v7' touches"):
         replace(TASK, waypoints=((0.0, 0.0, 2.0), (100.0, 0.0, 0.1))).check(ROBOT)

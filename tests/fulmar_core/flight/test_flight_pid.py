@@ -11,6 +11,7 @@ from fulmar_benchmarks.falcon.cells import SCENARIOS, Cell, fly
 from fulmar_core.control_loop import ControlLoop
 from fulmar_core.controllers.classical import gains_of
 from fulmar_core.controllers.flight_pid import DEPARTURES, FlightPid, cascade
+from fulmar_core.flight.trim import find_trim
 from fulmar_core.goal import goal_in_float64
 from fulmar_core.paths import config_names
 from fulmar_core.robot import load_robot
@@ -20,6 +21,7 @@ from fulmar_core.tasks import load_task
 
 ROBOT = load_robot("airship_v7")
 AIRCRAFT = [name for name in config_names("robots") if load_robot(name).flies]
+TRIM = find_trim(ROBOT, ROBOT.airframe.speed, 1.0)
 GAINS = replace(gains_of(ROBOT, "pid"), observer=None)
 
 
@@ -101,3 +103,24 @@ def test_it_flies_every_reference_of_the_thesis(task):
     found = fly(Cell("airship_v7", task, "pid", "exact", 1, 3))
     assert found["survival"] == 1.0
     assert found["rmse_per_axis_m"] <= 0.15
+
+
+@pytest.mark.parametrize(("below", "cut"), [(0.01, False), (0.4, True)])
+def test_integrals_rest_while_the_pitch_that_is_asked_for_is_cut(below, cut):
+    gains = replace(GAINS, pitch_limit_deg=1.0)
+    law = FlightPid(ROBOT, load_task("fly_hold").fitted(ROBOT), gains)
+    added = cascade(gains, off(_1=-below), 28.0)
+    assert added["cut"][0].tolist() == [False, cut, False]
+    law._sums = np.zeros((1, 3))
+    law._add_up(np.array([[0.0, -below, 0.0]]), np.array(TRIM.command)[None], added["cut"])
+    assert (law._sums[0, 1] == 0.0) == cut
+
+
+@pytest.mark.parametrize(("actuator", "rests"), [(0, 1), (1, 0), (3, 2)])
+def test_integrals_rest_while_their_actuator_is_at_its_limit(actuator, rests):
+    law = FlightPid(ROBOT, load_task("fly_hold").fitted(ROBOT), GAINS)
+    law._sums = np.zeros((1, 3))
+    command = np.array(TRIM.command)[None]
+    command[0, actuator] = 9.0
+    law._add_up(np.array([[0.01, 0.01, 0.01]]), command, np.zeros((1, 3), dtype=bool))
+    assert np.flatnonzero(law._sums[0] == 0.0).tolist() == [rests]

@@ -9,12 +9,15 @@ import pytest
 
 from fulmar_benchmarks.falcon.cells import SCENARIOS, Cell, fly
 from fulmar_core.controllers.classical import load_classical
+from fulmar_core.controllers.controller import Inputs
 from fulmar_core.controllers.flight_lqi import FlightLqr
 from fulmar_core.controllers.flight_mppi import FlightMppi, mppi_settings
 from fulmar_core.controllers.flight_reference import Aim
 from fulmar_core.controllers.flight_rollouts import FlightCost, FlightRollouts
+from fulmar_core.counter_rng import Draws
 from fulmar_core.errors import ConfigError
 from fulmar_core.flight.trim import find_trim
+from fulmar_core.goal import goal_in_float64
 from fulmar_core.robot import load_robot
 from fulmar_core.rollout import roll_out_in_batch
 from fulmar_core.tasks import load_task
@@ -31,6 +34,14 @@ def flown(settings, *, seconds, seeds=(0,)):
     law.seeds = seeds
     task = replace(TASK, episode_s=seconds)
     return roll_out_in_batch(law, ROBOT, task, SCENARIOS["exact"], episodes=len(seeds), seed=1)
+
+
+def inputs_of_trim(law):
+    """What one craft sees in level flight at the beginning of (a)."""
+    start, goal = TASK.draw(Draws(1, np.arange(1), np.zeros(1)), ROBOT, training=False)
+    goal = goal_in_float64(TASK.begun(goal, start))
+    command = find_trim(ROBOT, ROBOT.airframe.speed, float(start.z[0])).command
+    return Inputs(start, goal, np.zeros((1, 0)), command[None], None, 0, 0.01)
 
 
 def test_it_stays_within_three_centimetres_over_the_water():
@@ -117,3 +128,41 @@ def test_five_seeds_stay_within_three_centimetres_rms_for_a_minute(task):
     found = fly(Cell("airship_v7", task, "mppi", "exact", 5, 3))
     assert found["survival"] == 1.0
     assert found["rmse_per_axis_worst_m"] <= 0.03
+
+
+class Cheap:
+    """Flights that cost what one command of the first knot says, and nothing else."""
+
+    def __init__(self, weight: float) -> None:
+        self._weight = weight
+
+    def fly(self, state, servos, aims, corrections):
+        return self._weight * corrections[0, :, :, 0]
+
+
+@pytest.mark.parametrize("weight", [-50.0, 50.0])
+def test_a_plan_moves_towards_the_noise_that_costs_less(weight):
+    law = FlightMppi(ROBOT, TASK, replace(SETTINGS, rollouts=512, temperature=0.5))
+    law.reset()
+    flown_before = inputs_of_trim(law)
+    law.act(flown_before)
+    law._rollouts = Cheap(weight)
+    plan = law._improved(np.zeros_like(law._plan), flown_before.state, law._law._servos, flown_before)
+    assert np.sign(plan[0, 0, 0]) == -np.sign(weight)
+    others = np.abs(plan[0, 1:, 1:])
+    assert others.max() < np.abs(plan[0, 0, 0])
+
+
+def test_noise_that_leads_away_from_the_law_costs_what_it_takes():
+    """Of flights that cost the same, those against the plan so far count more (Williams et al., eq. 38)."""
+    law = FlightMppi(ROBOT, TASK, replace(SETTINGS, rollouts=2048))
+    law.reset()
+    inputs = inputs_of_trim(law)
+    law.act(inputs)
+    law._rollouts = Cheap(0.0)
+    plan = np.zeros_like(law._plan)
+    plan[0, 0, 0] = law._sigma[0]
+    again = law._improved(plan, inputs.state, law._law._servos, inputs)
+    # The mean of a Gaussian whose density is weighted by exp(-plan noise / sigma^2) lies at -plan.
+    assert again[0, 0, 0] == pytest.approx(0.0, abs=0.15 * law._sigma[0])
+    assert np.abs(again[0, 1:]).max() < 0.15 * law._sigma.max()

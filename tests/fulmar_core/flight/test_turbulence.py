@@ -5,7 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from fulmar_core.counter_rng import Draws
+from fulmar_core.disturbances.parts import Air
+from fulmar_core.disturbances.scenario import Scenario
+from fulmar_core.flight.dynamics import FlightDynamics
 from fulmar_core.flight.turbulence import CLASSES, FILTERS, gust_step, lengths_and_intensities
+from fulmar_core.robot import load_robot
 
 SPAN, SPEED = 5.0, 28.0  # of the airship_v7 [m], [m/s]
 
@@ -85,3 +90,23 @@ def test_gusts_of_roll_pitch_and_yaw_have_the_size_that_the_span_gives():
 def test_worlds_of_one_key_have_the_same_gusts_whatever_the_batch():
     many, few = gusts(2.5, dt=0.01, seconds=0.5), gusts(2.5, dt=0.01, seconds=0.5, craft=3)
     np.testing.assert_array_equal(many[:, :, :3], few)
+
+
+@pytest.mark.parametrize(("least", "low"), [(1.0, 7.7), (0.5, 3.85), (0.0, 0.0)])
+def test_episodes_draw_turbulence_between_a_share_and_all_of_it(least, low):
+    scenario = Scenario(
+        "gusts", sensor_noise=False, body="nominal", air=Air(turbulence=7.7, least_turbulence=least)
+    )
+    drawn = FlightDynamics(load_robot("airship_v7")).draw_world(
+        scenario, Draws(3, np.arange(2000), np.zeros(2000))
+    )
+    turbulence = np.asarray(drawn.turbulence)
+    assert turbulence.min() == pytest.approx(low, abs=0.02)
+    assert turbulence.max() == pytest.approx(7.7, abs=0.02)
+    assert turbulence.mean() == pytest.approx(0.5 * (low + 7.7), abs=0.1)
+
+
+@pytest.mark.parametrize("least", [-0.1, 1.1])
+def test_a_share_of_turbulence_lies_between_nothing_and_all(least):
+    with pytest.raises(ValueError, match=r"'least_turbulence' = .* must lie in \[0, 1\]"):
+        Air(turbulence=7.7, least_turbulence=least)

@@ -63,7 +63,8 @@ class FlightHold(FlightLqi):
 
     def prepare(self) -> None:
         """Solve for the gains at every speed."""
-        self._integrates = max(self.gains.height_integral, self.gains.side_integral) > 0.0
+        of_places = max(self.gains.height_integral, self.gains.side_integral)  # 0 for the LQR
+        self._integrates = min(of_places, self.gains.hold.angle_integral) > 0.0
         trims = [find_trim(self.robot, float(speed), None) for speed in self._speeds]
         self._solved = np.stack([self._gain_at(trim) for trim in trims])
         self._trims = np.stack([trim.command for trim in trims])
@@ -147,8 +148,11 @@ class FlightHold(FlightLqi):
         x = np.concatenate((motion, off, levels), axis=-1)
         if self._integrates:
             x = np.concatenate((x, self._sums), axis=-1)
+        wanted = np.asarray(trim - np.einsum("nij,nj->ni", self._between(self._solved, aim.speed), x))
+        if self._integrates:
+            free = free & ~self.saturated(wanted)
             self._sums = self._sums + self._dt * np.where(free, held, 0.0)
-        return np.asarray(trim - np.einsum("nij,nj->ni", self._between(self._solved, aim.speed), x))
+        return wanted
 
     def _trim_at(self, aim: Aim) -> np.ndarray:
         """Commands of the trim, with the thrust that a climb takes, shape (n, m)."""

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import functools
+from dataclasses import asdict
+from typing import Any
 
 import numpy as np
 
@@ -36,6 +38,11 @@ class FlightLaw(Law):
         self._dt = self.robot.timing.substeps(self.control_hz) * self.robot.timing.physics_dt
         self._reference = SmoothReference(self.task, over_s=smooth_s, dt=self._dt)
         self._observer = None if observer is None else FlightObserver(self.robot, observer, self._dt)
+
+    def derived(self) -> dict[str, Any]:
+        """See `Law.derived`; gains and observer follow from the aerodynamics and the sensors, aims from the task."""
+        own: dict[str, Any] = {"airframe": self.robot.airframe, "odometry": self.robot.sensors.odometry}
+        return super().derived() | {name: asdict(part) for name, part in (own | {"task": self.task}).items()}
 
     def reset(self) -> None:
         """Forget the past."""
@@ -71,6 +78,15 @@ class FlightLaw(Law):
         velocity = state.vx - speed, state.vy - drift, state.vz - climb
         rates = state.wx, state.wy + bend[:, 1] / speed, state.wz - bend[:, 0] / speed
         return np.stack((*turned, *velocity, *rates), axis=-1)
+
+    def saturated(self, command: np.ndarray) -> np.ndarray:
+        """Whether limits cut commands (n, m) of ailerons, elevators and motors, shape (n, 3): integrals rest there."""
+        cut, names = np.abs(self._craft.limited(command) - command) > 0.0, self._craft.names
+        none = np.zeros(len(cut), dtype=bool)
+        roll, pitch = (
+            cut[:, names.index(name)] if name in names else none for name in ("aileron", "elevator")
+        )
+        return np.stack((roll, pitch, cut[:, self._craft.positions :].any(axis=1)), axis=-1)
 
     @functools.cached_property
     def thrust_slope(self) -> float:

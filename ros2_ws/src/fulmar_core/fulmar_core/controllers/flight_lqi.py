@@ -40,8 +40,11 @@ class HoldWeights:
     def __post_init__(self) -> None:
         if min(self.angle, self.speed, self.climb, self.angle_limit_deg, self.speed_limit) <= 0.0:
             raise ValueError("angle, speed, climb and both limits must be greater than 0.")
-        if min(self.angle_integral, self.speed_integral, self.climb_integral) < 0.0:
-            raise ValueError("weights must not be negative.")
+        integrals = self.angle_integral, self.speed_integral, self.climb_integral
+        if min(integrals) < 0.0 or (min(integrals) == 0.0 and max(integrals) > 0.0):
+            raise ValueError("weights of integrals must all be greater than 0, or all be 0.")
+        if self.attack_margin_deg <= 0.0 or self.lead_s < 0.0:
+            raise ValueError("attack_margin_deg must be greater than 0, and lead_s not negative.")
 
 
 @dataclass(frozen=True)

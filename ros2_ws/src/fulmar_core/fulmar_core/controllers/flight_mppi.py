@@ -18,7 +18,7 @@ from fulmar_core.controllers.controller import Inputs
 from fulmar_core.controllers.flight_law import FlightLaw
 from fulmar_core.controllers.flight_lqi import FlightLqr, FlightWeights, flight_lqr_weights
 from fulmar_core.controllers.flight_observer import ObserverNoise
-from fulmar_core.controllers.flight_rollouts import FlightCost, FlightRollouts, loss_angle
+from fulmar_core.controllers.flight_rollouts import FlightCost, FlightRollouts
 from fulmar_core.robot import Robot
 from fulmar_core.spatial import SpatialState
 
@@ -171,6 +171,5 @@ def mppi_settings(robot: Robot) -> MppiSettings:
     return MppiSettings(
         law=replace(law, observer=None),
         noise=noise,
-        cost=FlightCost(alpha_deg=loss_angle(robot)),
         observer=law.observer,
     )

@@ -65,7 +65,8 @@ def cascade(gains: FlightPidGains, off: np.ndarray, speed: float) -> dict[str, n
         speed: Of cruise [m/s].
 
     Returns:
-        Deflections by name [rad], and `acceleration` that the motors shall make [m/s²].
+        Deflections by name [rad], `acceleration` that the motors shall make [m/s²], and `cut`, shape (n, 3): whether
+        limits cut the bank, the pitch and the acceleration that the outer loops ask for.
     """
     g = gains
     (left, up), (roll, pitch, _), (ahead, drift, climb) = off[:, PLACE].T, off[:, TURNED].T, off[:, SPEED].T
@@ -73,16 +74,22 @@ def cascade(gains: FlightPidGains, off: np.ndarray, speed: float) -> dict[str, n
     left_sum, up_sum, ahead_sum = off[:, SUMS].T
     wanted_climb = -g.height * np.clip(up, -g.height_limit, g.height_limit) - g.height_integral * up_sum
     # A positive pitch is nose down.
-    wanted_pitch = _within(-(wanted_climb + g.climb * (wanted_climb - climb)) / speed, g.pitch_limit_deg)
+    pitch_asked = -(wanted_climb + g.climb * (wanted_climb - climb)) / speed
+    wanted_pitch = _within(pitch_asked, g.pitch_limit_deg)
     wanted_drift = -g.side * np.clip(left, -g.side_limit, g.side_limit) - g.side_integral * left_sum
     bend = g.drift * (wanted_drift - drift)
     # A positive bank is to the right.
-    wanted_bank = _within(-bend / GRAVITY, g.bank_limit_deg)
+    bank_asked = -bend / GRAVITY
+    wanted_bank = _within(bank_asked, g.bank_limit_deg)
     return {
         "elevator": g.pitch * (wanted_pitch - pitch) - g.pitch_rate * pitch_rate,
         "aileron": g.roll * (wanted_bank - roll) - g.roll_rate * roll_rate,
         "rudder": -g.yaw_rate * (yaw_rate + GRAVITY / speed * wanted_bank),
         "acceleration": -g.speed * ahead - g.speed_integral * ahead_sum,
+        "cut": np.stack(
+            (wanted_bank != bank_asked, wanted_pitch != pitch_asked, np.zeros(len(ahead), dtype=bool)),
+            axis=-1,
+        ),
     }
 
 
@@ -126,19 +133,12 @@ class FlightPid(FlightLaw):
             command[:, i] += added[surface.name]
         push = self.robot.body.mass * added["acceleration"] / self.thrust_slope
         command[:, self._craft.positions :] += push[:, None]
-        self._add_up(np.concatenate((place, motion[:, 3:4]), axis=-1), command)
+        self._add_up(np.concatenate((place, motion[:, 3:4]), axis=-1), command, added["cut"])
         return command
 
-    def _add_up(self, errors: np.ndarray, command: np.ndarray) -> None:
-        """Go on with the integrals, but not where an error is cut or an actuator is at its limit: no wind-up."""
-        g, names = self.gains, self._craft.names
-        cut = np.abs(self._craft.limited(command) - command) > 0.0
-        motors = cut[:, self._craft.positions :].any(axis=1)
-        side, up = (
-            cut[:, names.index(name)] if name in names else np.zeros(len(cut), dtype=bool)
-            for name in ("aileron", "elevator")
-        )
-        most = np.array([g.side_limit, g.height_limit, np.inf])
-        free = (np.abs(errors) < most) & ~np.stack((side, up, motors), axis=-1)
+    def _add_up(self, errors: np.ndarray, command: np.ndarray, cut: np.ndarray) -> None:
+        """Go on with the integrals, but not where an error, a demand (n, 3) or a command is cut: no wind-up."""
+        most = np.array([self.gains.side_limit, self.gains.height_limit, np.inf])
+        free = (np.abs(errors) < most) & ~(self.saturated(command) | cut)
         assert self._sums is not None  # as of `command`
         self._sums = self._sums + self._dt * np.where(free, errors, 0.0)

@@ -19,6 +19,7 @@ from fulmar_core.motion import actuation_of
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
 from fulmar_core.spatial import SpatialState
+from fulmar_core.tasks.flight_terms import angle_of_attack
 
 WORST = 1e12  # of a second of a flight that is no number [-]
 
@@ -33,12 +34,12 @@ class FlightCost:
     speed: float = 450.0  # per m/s away from the cruising speed
     sideslip: float = 5.0  # times e^(2 |sideslip in degrees|) - 1
     lost: float = 1e9  # in the water, or beyond `alpha_deg` either way
-    alpha_deg: float = 5.0  # angles of attack beyond count as lost [deg]
+    alpha_deg: float | None = None  # angles of attack beyond count as lost; None: of `loss_angle` [deg]
 
     def __post_init__(self) -> None:
         if min(self.height, self.side, self.turning, self.speed, self.sideslip, self.lost) < 0.0:
             raise ValueError("costs must not be negative.")
-        if self.alpha_deg <= 0.0:
+        if self.alpha_deg is not None and self.alpha_deg <= 0.0:
             raise ValueError(f"alpha_deg = {self.alpha_deg:g} must be greater than 0.")
 
 
@@ -63,6 +64,7 @@ class FlightRollouts:
         self._dynamics = FlightDynamics(self._robot, turbulent=False)
         self._law, self._cost, self._dt, self._share = law, cost, step_s, share
         self._speed, self._lowest = robot.airframe.speed, -robot.hull_span[0]
+        self._most_deg = loss_angle(robot) if cost.alpha_deg is None else cost.alpha_deg
         self._world: Any = still_air(self._robot, 1)
 
     def fly(
@@ -109,13 +111,13 @@ class FlightRollouts:
         c = self._cost
         ahead, left, up = state.velocity_in_body
         speed = length(state.velocity)
-        alpha = np.degrees(np.arctan2(-up, ahead))
+        alpha = np.degrees(angle_of_attack(state))
         slip = np.degrees(np.abs(np.arctan2(left, np.hypot(ahead, up))))
         cost = c.height * np.abs(state.z - place[:, 1]) + c.side * np.abs(state.y - place[:, 0])
         cost += c.turning * _sum_of_sizes(state.rate) + c.speed * np.abs(speed - self._speed)
         cost += c.sideslip * np.expm1(np.minimum(2.0 * slip, 20.0))
         # The dynamics stop a craft in the water where it was before it touched it.
-        lost = (state.z <= self._lowest) | (speed == 0.0) | (np.abs(alpha) > c.alpha_deg)
+        lost = (state.z <= self._lowest) | (speed == 0.0) | (np.abs(alpha) > self._most_deg)
         return np.where(np.isfinite(cost), cost + c.lost * lost, WORST)
 
 

@@ -6,6 +6,7 @@ import math
 
 from fulmar_core.arrays import array_namespace, clip
 from fulmar_core.attitude import Quaternion, Vector, cross, dot, length, scaled, turn_back
+from fulmar_core.errors import ConfigError
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
 from fulmar_core.spatial import SpatialState
@@ -17,6 +18,19 @@ def is_lost(state: SpatialState, robot: Robot) -> Array:
     xp = array_namespace(state.x)
     stalled = xp.abs(angle_of_attack(state)) > math.radians(robot.airframe.lost_deg)
     return (state.z + robot.hull_span[0] <= 0.0) | stalled | ~xp.isfinite(state.z)
+
+
+def check_above_ground(task: str, robot: Robot, lowest: float, leads: str = "starts at") -> None:
+    """Reject a task whose lowest height [m] puts the hull of an aircraft on the ground.
+
+    Raises:
+        ConfigError: It does.
+    """
+    if lowest + robot.hull_span[0] <= 0.0:
+        raise ConfigError(
+            f"task '{task}' {leads} {lowest:g} m, where the hull of '{robot.name}' touches the ground. Its "
+            f"origin is {-robot.hull_span[0]:g} m above its lowest point."
+        )
 
 
 def angle_of_attack(state: SpatialState) -> Array:

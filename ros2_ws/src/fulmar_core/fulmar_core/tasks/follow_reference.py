@@ -12,14 +12,13 @@ import numpy as np
 from fulmar_core.arrays import array_namespace, clip
 from fulmar_core.attitude import euler_of, exponential, length, product, scaled, uniform_direction
 from fulmar_core.counter_rng import Draws
-from fulmar_core.errors import ConfigError
 from fulmar_core.flight.trim import find_trim
 from fulmar_core.goal import Goal, no_obstacles
 from fulmar_core.references.flight_paths import PATHS, through
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
 from fulmar_core.spatial import SpatialState
-from fulmar_core.tasks.flight_terms import is_lost
+from fulmar_core.tasks.flight_terms import angle_of_attack, check_above_ground, is_lost
 from fulmar_core.tasks.task import Task
 from fulmar_core.tasks.terms import Errors, Tolerance, weighted_sum
 
@@ -113,14 +112,11 @@ class FollowReference(Task[SpatialState]):
             ConfigError: As of `Task.check`, or the lowest start lies in the water.
         """
         super().check(robot)
-        lowest, leads = self.height[0] + self.start.height[0], "starts at"
+        if self.reference == "hold":
+            check_above_ground(self.name, robot, self.height[0] + self.start.height[0])
         if self.waypoints:
-            lowest, leads = min(place[2] for place in self.waypoints), "leads down to"
-        if self.reference in ("hold", "waypoints") and lowest + robot.hull_span[0] <= 0.0:
-            raise ConfigError(
-                f"task '{self.name}' {leads} {lowest:g} m, where the hull of '{robot.name}' touches the ground. Its "
-                f"origin is {-robot.hull_span[0]:g} m above its lowest point."
-            )
+            check_above_ground(self.name, robot, self.waypoints[0][2] + self.start.height[0])
+            check_above_ground(self.name, robot, min(place[2] for place in self.waypoints), "leads down to")
 
     def draw(self, draws: Draws, robot: Robot, *, training: bool) -> tuple[SpatialState, Goal]:
         """Draw starts and goals; see `Task.draw`."""
@@ -205,15 +201,14 @@ class FollowReference(Task[SpatialState]):
         side, above = off_reference(state, goal)
         now = reference_of(goal)
         climb, drift = now[..., 6] - state.vz, now[..., 5] - state.vy
-        ahead, left, up = state.velocity_in_body
-        xp = array_namespace(ahead)
+        left = state.velocity_in_body[1]
         roll, pitch, yaw = euler_of(state.quat)
         speed = length(state.velocity)
         return (
             clip(above / COARSE, -3.0, 3.0), clip(above / FINE, -1.0, 1.0), clip(above / FINEST, -1.0, 1.0),
             clip(side / COARSE, -3.0, 3.0), clip(side / FINE, -1.0, 1.0),
             climb / FAST, drift / FAST, now[..., 6] / FAST, now[..., 5] / FAST, 0.2 * now[..., 3],
-            0.1 * (self.speed_of(goal) - speed), 10.0 * xp.atan2(-up, ahead), 10.0 * left / clip(speed, 1.0, None),
+            0.1 * (self.speed_of(goal) - speed), 10.0 * angle_of_attack(state), 10.0 * left / clip(speed, 1.0, None),
             2.0 * roll, 5.0 * pitch, 5.0 * yaw, *(rate / QUICK for rate in state.rate),
         )  # fmt: skip
 

@@ -26,7 +26,7 @@ from fulmar_core.goal import Goal, goals_at
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import Array
 from fulmar_core.spatial import SpatialState, quat_of
-from fulmar_core.tasks.flight_terms import angle_of_attack, is_lost, tilt_error
+from fulmar_core.tasks.flight_terms import angle_of_attack, check_above_ground, is_lost, tilt_error
 from fulmar_core.tasks.task import Task
 from fulmar_core.tasks.terms import Errors, Tolerance, weighted_sum
 
@@ -89,6 +89,15 @@ class _HoldFlight(Task[SpatialState]):
     def fitted(self, robot: Robot) -> Self:
         """The task with the cruising speed of a craft; see `Task.fitted`."""
         return replace(self, cruise=robot.airframe.speed) if robot.airframe is not None else self
+
+    def check(self, robot: Robot) -> None:
+        """See `Task.check`; and the hull is in the air at the lowest start.
+
+        Raises:
+            ConfigError: As of `Task.check`, or the lowest start lies on the ground.
+        """
+        super().check(robot)
+        check_above_ground(self.name, robot, self.start.height[0])
 
     def farthest_start(self, *, training: bool) -> tuple[str, float]:
         """See `Task.farthest_start`; nothing here is a way to a place."""
