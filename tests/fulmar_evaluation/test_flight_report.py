@@ -139,5 +139,6 @@ def test_the_reference_rests_where_it_is_level_and_climbs_between_places():
         np.abs(places[: -round(task.spacing_s / dt), 2] - above(times)[: -round(task.spacing_s / dt)]).max()
         < 0.11
     )
+    assert np.isnan(places[-1]).all(), "beyond the last place it is not known, rather than at rest"
     level = (times > 10.2) & (times < 29.9)
     assert np.ptp(places[level, 2]) == 0.0

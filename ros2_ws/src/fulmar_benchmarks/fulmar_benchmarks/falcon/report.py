@@ -16,8 +16,8 @@ from fulmar_evaluation.report.style import house_style, quiet_grid
 from fulmar_evaluation.report.writer import write_benchmark
 
 _ERRORS = """
-RMSE per axis of each task, median over the flights that survive, by scenario; the stroke is the thesis' LQR (Table
-5.8). What is missing has crashed."""
+RMSE per axis of each task, median over the flights that survive, by scenario. A cross at the top: none survives. The
+stroke is the thesis' controller of the kind (Tables 5.7 and 5.8)."""
 _GROUND = """
 Left: lift and induced drag near the ground over those in free air at the same angle of attack (Phillips and Hunsaker,
 2013), as in thesis Fig. 5.1. Right: mean squared throttle in level flight, and that of thesis Table 5.2, whose motors
@@ -46,13 +46,21 @@ def draw_errors(document: dict[str, Any]) -> Figure:
     for axes, (controller, tasks) in zip(panels, by.items(), strict=False):
         scenarios = list(dict.fromkeys(name for each in tasks.values() for name in each))
         for number, scenario in enumerate(scenarios):
-            shown = [
-                (place + 0.08 * (number - 0.5 * len(scenarios)), each[scenario]["rmse_per_axis_m"])
+            aside = 0.08 * (number - 0.5 * len(scenarios))
+            flown = {
+                place + aside: each[scenario].get("rmse_per_axis_m")
                 for place, each in enumerate(tasks.values())
-                if each.get(scenario, {}).get("rmse_per_axis_m") is not None
-            ]
-            if shown:
-                axes.plot(*zip(*shown, strict=True), marker="o", linestyle="", markersize=4, label=scenario)
+                if scenario in each
+            }
+            alive = {place: rmse for place, rmse in flown.items() if rmse is not None}
+            (dots,) = axes.plot(list(alive), list(alive.values()), "o", markersize=4, label=scenario)
+            axes.plot(
+                [place for place in flown if place not in alive],
+                [0.98] * (len(flown) - len(alive)),
+                "x",
+                color=dots.get_color(),
+                transform=axes.get_xaxis_transform(),
+            )
         published = [
             (place, one["thesis"]["rmse_per_axis_m"])
             for place, each in enumerate(tasks.values())
@@ -67,7 +75,9 @@ def draw_errors(document: dict[str, Any]) -> Figure:
         axes.set_title(controller)
         quiet_grid(axes)
     panels[0].set_ylabel("RMSE per axis [m]")
-    panels[0].legend(fontsize="small")
+    figure.legend(
+        *panels[0].get_legend_handles_labels(), fontsize="small", loc="outside lower center", ncols=5
+    )
     return figure
 
 

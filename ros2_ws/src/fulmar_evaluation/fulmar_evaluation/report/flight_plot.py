@@ -68,15 +68,17 @@ def draw_flight(rows: Sequence[Axes] | np.ndarray, runs: Sequence[View]) -> None
 def reference_places(result: RunResult) -> np.ndarray | None:
     """Places of the reference over time, between its known places in a straight line, shape (n, 3) [m]; None: none.
 
-    The aim of a time is the place that the reference passed last; places lie `spacing_s` apart.
+    The aim of a time is the place that the reference passed last; places lie `spacing_s` apart. After the last one
+    that the run has passed the reference is not known: NaN.
     """
     if not isinstance(result.task, FollowReference):
         return None
     spacing_s = result.task.spacing_s
     time_s = result.run.control_dt * np.arange(len(result.aims))
     passed, first = np.unique(np.floor(time_s / spacing_s + 1e-6), return_index=True)
+    known_s = spacing_s * passed
     return np.stack(
-        [np.interp(time_s, spacing_s * passed, result.aims[first, axis]) for axis in range(3)], axis=-1
+        [np.interp(time_s, known_s, result.aims[first, axis], right=np.nan) for axis in range(3)], axis=-1
     )
 
 
