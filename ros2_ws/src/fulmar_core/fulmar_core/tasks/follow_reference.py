@@ -62,6 +62,8 @@ class FlightReward:
     upright: float  # times cos(roll)
     turning: float  # times -|turn rate|
     crash: float  # once, subtracted, when the craft is lost
+    # Times (exp(-d / 0.5 m/s) + exp(-d / 3 m/s)) / 2, with d the error of the speed to the side: leads into ramps.
+    drift: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -229,6 +231,10 @@ class FollowReference(Task[SpatialState]):
         xp, w = array_namespace(after.x), self.reward_weights
         s, e = (xp.abs(part) for part in off_reference(after, ended))
         slow = xp.abs(self.speed_of(ended) - length(after.velocity))
+
+        def drift() -> Array:
+            return xp.abs(reference_of(ended)[..., 5] - after.vy)
+
         return weighted_sum(
             (w.near, lambda: xp.exp(-e / 0.5)),
             (w.nearer, lambda: xp.exp(-e / 0.08)),
@@ -236,6 +242,7 @@ class FollowReference(Task[SpatialState]):
             (w.speed, lambda: xp.exp(-slow / 2.0)),
             (w.upright, lambda: xp.cos(euler_of(after.quat)[0])),
             (-w.turning, lambda: length(after.rate)),
+            (0.5 * w.drift, lambda: xp.exp(-drift() / 0.5) + xp.exp(-drift() / 3.0)),
             zero=xp.zeros_like(e),
         )
 
