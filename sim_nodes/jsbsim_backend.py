@@ -118,7 +118,6 @@ class JsbsimBackend:
 
     def close(self) -> None:
         """Let go of the model and its files."""
-        del self._model  # which looks for its files when it ends
         self.craft.close()
 
     def _begin(self, start: SpatialState) -> None:

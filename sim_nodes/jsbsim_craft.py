@@ -39,14 +39,13 @@ class JsbsimCraft(Protocol):
         ...
 
 
-def model_in(folder: Path, name: str, robot: Robot, *, aircraft: Path | None = None) -> jsbsim.FGFDMExec:
+def model_in(folder: Path, name: str, robot: Robot) -> jsbsim.FGFDMExec:
     """Load a model over a planet that does not turn.
 
     Args:
-        folder: Where the planet's file is written, and whatever the model writes.
+        folder: Has the model as `<name>/<name>.xml`; the planet's file is written there.
         name: Of the model.
-        robot: Its time step is that of a physics tick, in `STEPS` parts.
-        aircraft: Folder of models; those that come with JSBSim by default.
+        robot: A physics tick of it is `STEPS` steps of the model.
 
     Raises:
         ConfigError: JSBSim cannot load it.
@@ -55,12 +54,9 @@ def model_in(folder: Path, name: str, robot: Robot, *, aircraft: Path | None = N
     planet.write_text(STILL_PLANET, encoding="utf-8")
     model = jsbsim.FGFDMExec(None)
     model.set_debug_level(0)
-    model.set_output_path(str(folder))
-    if aircraft is not None:
-        model.set_aircraft_path(str(aircraft))
+    model.set_aircraft_path(str(folder))
     if not (model.load_planet(str(planet), False) and model.load_model(name, True)):
         raise ConfigError(f"JSBSim cannot load the model '{name}'.")
-    model.disable_output()
     model.set_dt(robot.timing.physics_dt / STEPS)
     return model
 
@@ -82,8 +78,7 @@ class ExportedCraft:
 
     def loaded(self) -> jsbsim.FGFDMExec:
         """See `JsbsimCraft.loaded`."""
-        folder = Path(self._folder.name)
-        return model_in(folder, self._robot.name, self._robot, aircraft=folder)
+        return model_in(Path(self._folder.name), self._robot.name, self._robot)
 
     def start(self, model: jsbsim.FGFDMExec) -> None:
         """See `JsbsimCraft.start`: nothing has to."""

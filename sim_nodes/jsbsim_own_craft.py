@@ -8,15 +8,17 @@ flight is for a controller to find, and so is everything beside the trim.
 
 from __future__ import annotations
 
+import shutil
 import tempfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from xml.etree import ElementTree as Xml
 
 import jsbsim
 import numpy as np
 
 from fulmar_core.actuators.control_surfaces import ControlSurfaces
-from fulmar_core.errors import ConfigError
+from fulmar_core.errors import ConfigError, did_you_mean
 from fulmar_core.flight.trim import FREE_AIR, Trim, find_trim
 from fulmar_core.robot import Robot
 from sim_nodes.jsbsim_craft import STEPS, model_in
@@ -56,30 +58,19 @@ class OwnCraft:
         """Load the model, measure its controls, and rig it.
 
         Raises:
-            ConfigError: JSBSim has no such model, a surface does not move, or it holds no level flight.
+            ConfigError: JSBSim has no such model or cannot run it, or a surface does not move, or no level flight.
         """
         frame, craft = robot.airframe, robot.actuators
         assert frame is not None and isinstance(craft, ControlSurfaces)  # as of `jsbsim_model`
         self._robot, self._name = robot, name
         self._folder = tempfile.TemporaryDirectory(prefix="fulmar-jsbsim-")
+        _copy_model(name, Path(self._folder.name))
         self._cruise, self._motors = frame.speed, len(craft.motors)
-        surfaces = [surface.name for surface in craft.surfaces]
-        measured = [self._measured(surface) for surface in surfaces]
-        flight, trimmed = self._trimmed()
-        self.controls = tuple(
-            Control(
-                each.property,
-                each.sign,
-                each.slopes,
-                neutral=trimmed[each.property] + trimmed[f"fcs/{TRIM_OF[surface]}-trim-cmd-norm"],
-                level=float(flight.command[i]),
-            )
-            for i, (surface, each) in enumerate(zip(surfaces, measured, strict=True))
-        )
-        self.speed = flight.speed  # of the trim that it is rigged for [m/s]
-        self.throttle = trimmed["fcs/throttle-cmd-norm"]  # in that trim
-        self.pitch = trimmed["aero/alpha-rad"] - flight.alpha
-        self.mass = trimmed["inertia/mass-slugs"] * SLUG
+        try:
+            self._rig([surface.name for surface in craft.surfaces])
+        except jsbsim.BaseError as error:
+            words = " ".join(str(error).split())
+            raise ConfigError(f"JSBSim cannot fly its '{name}': {words}") from error
 
     def loaded(self) -> jsbsim.FGFDMExec:
         """See `JsbsimCraft.loaded`; gear and flaps are up, and the fuel does not run out."""
@@ -108,6 +99,23 @@ class OwnCraft:
     def close(self) -> None:
         """See `JsbsimCraft.close`."""
         self._folder.cleanup()
+
+    def _rig(self, surfaces: list[str]) -> None:
+        """Measure the controls of surfaces, and set neutral commands and axes by level flight."""
+        measured = [self._measured(surface) for surface in surfaces]
+        flight, trimmed = self._trimmed()
+        self.controls = tuple(
+            replace(
+                each,
+                neutral=trimmed[each.property] + trimmed[f"fcs/{TRIM_OF[surface]}-trim-cmd-norm"],
+                level=float(flight.command[i]),
+            )
+            for i, (surface, each) in enumerate(zip(surfaces, measured, strict=True))
+        )
+        self.speed = flight.speed  # of the trim that it is rigged for [m/s]
+        self.throttle = trimmed["fcs/throttle-cmd-norm"]  # in that trim
+        self.pitch = trimmed["aero/alpha-rad"] - flight.alpha
+        self.mass = trimmed["inertia/mass-slugs"] * SLUG
 
     def _steps(self, duration_s: float) -> int:
         return round(STEPS * duration_s / self._robot.timing.physics_dt)
@@ -168,6 +176,24 @@ class OwnCraft:
                 continue
             return find_trim(self._robot, share * self._cruise), model
         raise ConfigError(
-            f"JSBSim's '{self._name}' holds no level flight at {SHARES[-1] * self._cruise:.1f} to {self._cruise:.1f} m/s, "
-            f"the cruise of '{self._robot.name}'."
+            f"JSBSim's '{self._name}' holds no level flight between {SHARES[-1] * self._cruise:.1f} m/s and "
+            f"{self._cruise:.1f} m/s, the cruise of '{self._robot.name}'."
         )
+
+
+def _copy_model(name: str, folder: Path) -> None:
+    """Copy a model that comes with JSBSim into a folder, without the logs that it would write.
+
+    Raises:
+        ConfigError: None of this name comes with it.
+    """
+    shipped = Path(jsbsim.get_default_root_dir()) / "aircraft"
+    known = [path.parent.name for path in shipped.glob("*/*.xml") if path.stem == path.parent.name]
+    if name not in known:
+        raise ConfigError(f"JSBSim comes with no model '{name}'.{did_you_mean(name, known)}")
+    shutil.copytree(shipped / name, folder / name)
+    file = folder / name / f"{name}.xml"
+    tree = Xml.parse(file)
+    for log in tree.getroot().findall("output"):
+        tree.getroot().remove(log)
+    tree.write(file)
