@@ -58,7 +58,7 @@ class OwnCraft:
         """Load the model, measure its controls, and rig it.
 
         Raises:
-            ConfigError: JSBSim has no such model or cannot run it, or a surface does not move, or no level flight.
+            ConfigError: JSBSim has no such model or cannot run it; a surface does not move; no level flight.
         """
         frame, craft = robot.airframe, robot.actuators
         assert frame is not None and isinstance(craft, ControlSurfaces)  # as of `jsbsim_model`

@@ -18,8 +18,7 @@ RUN_TASK_HELP = (
     "and the task that takes the goals of --goals. In space go_to_position_3d or go_to_pose_3d; satellites slew, point."
 )
 BACKEND_HELP = (
-    "mujoco, mock (Fulmar's own dynamics, perfect sensors), jsbsim (aircraft; jsbsim:L17 flies JSBSim's own model) "
-    "or hardware."
+    "mujoco, mock (Fulmar's own dynamics, perfect sensors), jsbsim (aircraft; or jsbsim:MODEL) or hardware."
 )
 DURATION_HELP = "Simulated seconds; the task's episode by default."
 GOAL_HELP = "Where to go [m, deg], in space x,y,z or x,y,z,roll,pitch,yaw; by default the seed draws it."
