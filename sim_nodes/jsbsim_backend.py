@@ -1,21 +1,22 @@
-"""JSBSim as a backend: it integrates an aircraft; the core supplies servos, motors, gusts, disturbances and sensors."""
+"""JSBSim as a backend: it integrates an aircraft; the core supplies servos, motors, gusts, disturbances and sensors.
+
+The aircraft is a robot's own file, or a model that comes with JSBSim: see `jsbsim_own_craft`.
+"""
 
 from __future__ import annotations
 
 import math
-import tempfile
 from collections.abc import Mapping
-from pathlib import Path
+from dataclasses import replace
 from typing import Any
 
-import jsbsim
 import numpy as np
 
-from fulmar_core.attitude import euler_of, from_euler, minus, turn, turn_back
+from fulmar_core.attitude import Quaternion, euler_of, from_euler, minus, product, turn, turn_back
 from fulmar_core.backend import Sample
 from fulmar_core.disturbances.scenario import Scenario, sensors_in
 from fulmar_core.episode import Episode
-from fulmar_core.errors import ConfigError, SafetyError
+from fulmar_core.errors import SafetyError
 from fulmar_core.flight.dynamics import FlightDynamics, flipped
 from fulmar_core.flight.turbulence import Gust
 from fulmar_core.motion import surface_positions_of
@@ -26,10 +27,10 @@ from fulmar_core.sensors.simulated import SimulatedSensors
 from fulmar_core.spatial import SpatialState
 from fulmar_core.state import RigidBodyState
 from fulmar_core.tasks import Task
-from sim_nodes.jsbsim_model import FOOT, POUND, RADIUS_M, write_aircraft
+from sim_nodes.jsbsim_craft import STEPS, ExportedCraft, JsbsimCraft
+from sim_nodes.jsbsim_model import FOOT, POUND, RADIUS_M
+from sim_nodes.jsbsim_own_craft import OwnCraft
 from sim_nodes.one_world import OneWorld
-
-STEPS = 4  # of JSBSim in a physics tick
 
 
 class JsbsimBackend:
@@ -39,30 +40,44 @@ class JsbsimBackend:
     """
 
     def __init__(
-        self, robot: Robot, *, sensor_noise: bool = True, sensors: Mapping[str, Any] | None = None
+        self,
+        robot: Robot,
+        *,
+        model: str = "",
+        sensor_noise: bool = True,
+        sensors: Mapping[str, Any] | None = None,
     ) -> None:
-        """Write the model and load it; `sensors` by name in the place of those of the robot's file.
+        """Load a model.
+
+        Args:
+            robot: An aircraft.
+            model: One that comes with JSBSim; empty: the robot's own file.
+            sensor_noise: Whether sensors have noise.
+            sensors: By name, in the place of those of the robot's file.
 
         Raises:
-            ConfigError: The robot is no aircraft.
+            ConfigError: The robot is no aircraft, or JSBSim cannot load or fly the model.
         """
         self.robot = robot
-        self._folder = tempfile.TemporaryDirectory(prefix="fulmar-jsbsim-")
-        write_aircraft(robot, Path(self._folder.name))
+        self.craft: JsbsimCraft = OwnCraft(robot, model) if model else ExportedCraft(robot)
+        one = np.ones(1)
+        self._nose: Quaternion = from_euler(0.0 * one, -self.craft.pitch * one, 0.0 * one)
         self._dynamics = FlightDynamics(robot)
         self._sensors = SimulatedSensors(sensors or robot.sensors.specs, noisy=sensor_noise)
         self._world = OneWorld(robot, noisy=sensor_noise)
-        self._model = self._loaded()
+        self._model = self.craft.loaded()
         self._truth: RigidBodyState
 
     @classmethod
-    def of(cls, robot: Robot, task: Task, scenario: Scenario) -> JsbsimBackend:
-        """The simulator that a task and a scenario ask for."""
-        return cls(robot, sensor_noise=scenario.sensor_noise, sensors=sensors_in(robot, scenario))
+    def of(cls, robot: Robot, task: Task, scenario: Scenario, model: str = "") -> JsbsimBackend:
+        """The simulator that a task and a scenario ask for, with a model as of `__init__`."""
+        return cls(
+            robot, model=model, sensor_noise=scenario.sensor_noise, sensors=sensors_in(robot, scenario)
+        )
 
     def reset(self, episode: Episode, *, seed: int, number: int = 0) -> Sample:
-        """Begin anew; see `Backend.reset`. Mass and inertia are those of the robot's file."""
-        self._model = self._loaded()  # a model that has flown keeps the history of its integrators
+        """Begin anew; see `Backend.reset`. Mass and inertia are those of the model."""
+        self._model = self.craft.loaded()  # a model that has flown keeps the history of its integrators
         self._sensors.reset(seed, number)
         self._world.begin_episode(episode)
         self._gust: Gust | None = None
@@ -84,8 +99,7 @@ class JsbsimBackend:
             self._time_s += dt
             if self._lost:
                 continue
-            for name, value in zip(self.robot.actuators.names, applied[:, 0], strict=True):
-                self._model[f"fulmar/{name}"] = float(value)
+            self.craft.steer(self._model, applied[:, 0])
             self._blow(SpatialState.from_rigid(self._truth)[None], dt)
             for _ in range(STEPS):
                 self._model.run()
@@ -100,27 +114,17 @@ class JsbsimBackend:
 
     def make_safe(self) -> None:
         """Neutral surfaces and idle throttles."""
-        for name, value in zip(self.robot.actuators.names, self.robot.actuators.safe_command, strict=True):
-            self._model[f"fulmar/{name}"] = float(value)
+        self.craft.steer(self._model, np.asarray(self.robot.actuators.safe_command))
 
     def close(self) -> None:
         """Let go of the model and its files."""
-        self._folder.cleanup()
-
-    def _loaded(self) -> jsbsim.FGFDMExec:
-        folder, model = Path(self._folder.name), jsbsim.FGFDMExec(None)
-        model.set_debug_level(0)
-        model.set_aircraft_path(str(folder))
-        planet = model.load_planet(str(folder / "still_planet.xml"), False)
-        if not (planet and model.load_model(self.robot.name, True)):
-            raise ConfigError(f"JSBSim cannot load the model of '{self.robot.name}'.")
-        model.set_dt(self.robot.timing.physics_dt / STEPS)
-        return model
+        self.craft.close()
 
     def _begin(self, start: SpatialState) -> None:
-        state = start.mapped(lambda part: np.array([float(part)]))
+        state = self._in_its_axes(start.mapped(lambda part: np.array([float(part)])))
         roll, pitch, yaw = (float(angle[0]) for angle in euler_of(state.quat))
         model = self._model
+        self.craft.start(model)
         model["ic/terrain-elevation-ft"] = 0.0
         model["ic/lat-gc-rad"], model["ic/long-gc-rad"] = (
             float(state.y[0]) / RADIUS_M,
@@ -136,6 +140,12 @@ class JsbsimBackend:
             model[f"ic/{axis}-rad_sec"] = float(part[0])
         self.make_safe()
         model.run_ic()
+
+    def _in_its_axes(self, state: SpatialState) -> SpatialState:
+        """A state of the robot's body, with attitude and turn rate of the model's axes."""
+        columns = zip(("qx", "qy", "qz", "qw"), product(state.quat, self._nose), strict=True)
+        rates = zip(("wx", "wy", "wz"), turn_back(self._nose, state.rate), strict=True)
+        return replace(state, **dict(columns), **dict(rates))
 
     def _blow(self, state: SpatialState, dt: float) -> None:
         """Let the air move: wind, and the gusts along the craft's axes."""
@@ -159,7 +169,8 @@ class JsbsimBackend:
         model = self._model
         phi, theta, psi = (model[f"attitude/{name}-rad"] for name in ("phi", "theta", "psi"))
         one = np.array([1.0])
-        quat = from_euler(phi * one, -theta * one, (0.5 * math.pi - psi) * one)
+        x, y, z, w = self._nose
+        quat = product(from_euler(phi * one, -theta * one, (0.5 * math.pi - psi) * one), (-x, -y, -z, w))
         place = np.array(
             [
                 model["position/long-gc-rad"] * RADIUS_M,
@@ -173,17 +184,23 @@ class JsbsimBackend:
             place,
             np.array([float(part[0]) for part in quat]),
             np.array([east, north, -down]),
-            np.array([p, -q, -r]),
+            self._in_robots_axes(p, q, r),
         )
+
+    def _in_robots_axes(self, x: float, y: float, z: float) -> np.ndarray:
+        """A vector of the model's axes (x ahead, y right, z down) in the robot's body, shape (3,)."""
+        its = flipped((np.array([x]), np.array([y]), np.array([z])))
+        return np.array([float(part[0]) for part in turn(self._nose, its)])
 
     def _sample(self, odometry: RigidBodyState) -> Sample:
         """All that sensors measure now."""
         model, truth = self._model, self._truth
-        force = [model[f"forces/fb{axis}-total-lbs"] * POUND / self.robot.body.mass for axis in "xyz"]
+        force = [model[f"forces/fb{axis}-total-lbs"] * POUND / self.craft.mass for axis in "xyz"]
         if self._lost:
             force = [0.0, 0.0, 0.0]
+        felt_force = self._in_robots_axes(force[0], force[1], force[2])
         world: Any = self._world.world  # of an aircraft
         air = self._dynamics.air_data(SpatialState.from_rigid(truth)[None], self._gust, world)
         surfaces = surface_positions_of(self.robot, self._world.actuation)
-        felt = Truth(truth, np.array([force[0], -force[1], -force[2]]), air=air, surfaces=surfaces)
+        felt = Truth(truth, felt_force, air=air, surfaces=surfaces)
         return Sample({"odometry": Reading(odometry), **self._sensors.measure(felt, self._time_s)}, truth)

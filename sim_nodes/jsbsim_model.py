@@ -21,6 +21,7 @@ from fulmar_core.flight.propulsion import ElectricMotor
 from fulmar_core.robot import Robot
 
 FOOT, POUND, SLUG_FT3 = 0.3048, 4.4482216152605, 515.378818393  # [m], [N], [kg/m³]
+SLUG = POUND / FOOT  # [kg]
 RADIUS_M = 6_378_137.0
 Node = Xml.Element
 

@@ -7,6 +7,7 @@ import sys
 from fulmar_core.backend import Backend
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.errors import UnknownNameError
+from fulmar_core.flight.jsbsim_models import JSBSIM, is_jsbsim, jsbsim_model
 from fulmar_core.robot import Robot
 from fulmar_core.tasks import load_task
 from fulmar_ros.plant_node import PlantNode
@@ -14,7 +15,7 @@ from fulmar_ros.plant_settings import PlantSettings
 from fulmar_ros.runtime import run_node
 from sim_nodes.on_air import CanStand, OnAir
 
-BACKENDS = ("mujoco", "mock", "jsbsim")
+BACKENDS = ("mujoco", "mock", JSBSIM)
 
 
 def make_backend(robot: Robot, settings: PlantSettings) -> Backend:
@@ -34,10 +35,11 @@ def _simulator(robot: Robot, settings: PlantSettings) -> CanStand:
         from sim_nodes.mock_backend import MockBackend
 
         return MockBackend(robot, things=task.things)
-    if settings.backend == "jsbsim":
+    if is_jsbsim(settings.backend):
         from sim_nodes.jsbsim_backend import JsbsimBackend
 
-        return JsbsimBackend.of(robot, task, load_scenario(settings.scenario))
+        model = jsbsim_model(robot, settings.backend)
+        return JsbsimBackend.of(robot, task, load_scenario(settings.scenario), model)
     raise UnknownNameError("simulated backend", settings.backend, BACKENDS)
 
 

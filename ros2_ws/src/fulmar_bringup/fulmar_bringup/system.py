@@ -10,6 +10,7 @@ from fulmar_core.config import load_config
 from fulmar_core.controllers.classical import default_gains_note
 from fulmar_core.errors import ConfigError, UnknownNameError, did_you_mean
 from fulmar_core.estimation.kinds import default_estimator, estimator_kind
+from fulmar_core.flight.jsbsim_models import JSBSIM, is_jsbsim, jsbsim_model
 from fulmar_core.paths import config_names, config_path
 from fulmar_core.recording import Recording
 from fulmar_core.robot import load_robot
@@ -19,7 +20,7 @@ from fulmar_core.tasks import load_task
 from hardware_drivers.hardware import hardware_of, hardware_path, load_hardware
 from policy_server.controllers import FALLBACKS, controller_entry, usual_hz
 
-SIMULATED = ("mujoco", "mock", "jsbsim")
+SIMULATED = ("mujoco", "mock", JSBSIM)
 BACKENDS = (*SIMULATED, "hardware")
 
 
@@ -150,7 +151,7 @@ def modules_of(
     controller: str, backend: str, *, guards: Guards = NONE, hardware: str = "", emulated: bool = False
 ) -> tuple[str, ...]:
     """Modules of extras that the nodes of a controller, a backend, its guards and a hardware file import."""
-    simulated = ("mujoco",) if backend == "mujoco" or emulated else ("jsbsim",) * (backend == "jsbsim")
+    simulated = ("mujoco",) if backend == "mujoco" or emulated else (JSBSIM,) * is_jsbsim(backend)
     driven = load_hardware(hardware).needs if hardware else ()
     files = (*filter(None, (guards.estimator,)), *guards.estimators)
     estimated = (module for file in files for module in estimator_kind(file).needs)
@@ -174,12 +175,10 @@ def check_names(robot: str, task: str, controller: str, backend: str, hardware: 
     the_robot, the_task = load_robot(robot), load_task(task)
     the_task.check(the_robot)
     controller_entry(controller).check(the_robot, the_task)
-    if backend not in BACKENDS:
+    if is_jsbsim(backend):
+        jsbsim_model(the_robot, backend)
+    elif backend not in BACKENDS:
         raise UnknownNameError("backend", backend, BACKENDS)
-    if backend == "jsbsim" and not the_robot.flies:
-        raise ConfigError(
-            f"JSBSim flies aircraft only, and '{robot}' is none. Backends: {', '.join(SIMULATED[:2])}."
-        )
     if backend == "hardware":
         default_hardware(robot, hardware)
 

@@ -17,7 +17,7 @@ RUN_TASK_HELP = (
     f"{cli.TASK_HELP} By default the goal decides: go_to_position for x,y, go_to_pose for x,y,deg and without a goal, "
     "and the task that takes the goals of --goals. In space go_to_position_3d or go_to_pose_3d; satellites slew, point."
 )
-BACKEND_HELP = "mujoco, mock (Fulmar's own dynamics, perfect sensors), jsbsim (aircraft) or hardware."
+BACKEND_HELP = "mujoco, mock (Fulmar's own dynamics, perfect sensors), jsbsim[:MODEL] (aircraft) or hardware."
 DURATION_HELP = "Simulated seconds; the task's episode by default."
 GOAL_HELP = "Where to go [m, deg], in space x,y,z or x,y,z,roll,pitch,yaw; by default the seed draws it."
 START_HELP = "Where to begin [m, deg], in space x,y,z or x,y,z,roll,pitch,yaw; by default the seed draws it."
