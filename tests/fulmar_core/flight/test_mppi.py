@@ -153,6 +153,16 @@ def test_a_plan_moves_towards_the_noise_that_costs_less(weight):
     assert others.max() < np.abs(plan[0, 0, 0])
 
 
+def test_a_plan_stays_where_all_flights_cost_the_same():
+    """Noise comes in pairs of opposite sign; a single flight without its partner would move the plan."""
+    law = FlightMppi(ROBOT, TASK, FEW)
+    inputs = inputs_of_trim(law)
+    law.act(inputs)
+    law._rollouts = Cheap(0.0)
+    plan = law._improved(np.zeros_like(law._plan), inputs.state, law._law._servos, inputs)
+    assert np.abs(plan).max() < 1e-12
+
+
 def test_noise_that_leads_away_from_the_law_costs_what_it_takes():
     """Of flights that cost the same, those against the plan so far count more (Williams et al., eq. 38)."""
     law = FlightMppi(ROBOT, TASK, replace(SETTINGS, rollouts=2048))

@@ -34,7 +34,7 @@ class MppiSettings:
     noise: tuple[float, ...]  # standard deviation of each command, as a share of its largest one [-]
     cost: FlightCost = field(default_factory=FlightCost)
     feedback: float = 1.0  # share of the LQR's answer that flights follow; 0: level flight alone [-]
-    rollouts: int = 128  # flights of each plan, an even number
+    rollouts: int = 128  # flights of each plan in pairs of opposite noise; one more goes without any
     horizon_s: float = 1.2  # how far flights go [s]
     step_s: float = 0.04  # of them [s]
     plan_hz: float = 25.0  # plans a second of the robot's own time
@@ -151,12 +151,11 @@ class FlightMppi(FlightLaw):
         return np.asarray(plan + np.einsum("nk,nkjm->njm", weight, noise))
 
     def _noise(self, count: int) -> np.ndarray:
-        """Noise of the knots in pairs of opposite sign, but for a flight without any, shape (n, flights, knots, m)."""
+        """Noise of the knots: none, then pairs of opposite sign, shape (n, 1 + rollouts, knots, m)."""
         shape = self.gains.rollouts // 2, self._knots, len(self._sigma)
         drawn = np.stack([draws.standard_normal(shape) for draws in self._draws])
-        both = self._sigma * np.concatenate((drawn, -drawn), axis=1)
-        both[:, 0] = 0.0
-        return np.asarray(both[np.arange(count) % len(both)])
+        noise = self._sigma * np.concatenate((np.zeros_like(drawn[:, :1]), drawn, -drawn), axis=1)
+        return np.asarray(noise[np.arange(count) % len(noise)])
 
     def derived(self) -> dict[str, Any]:
         """What else the commands depend on."""
