@@ -147,7 +147,7 @@ def test_a_plan_moves_towards_the_noise_that_costs_less(weight):
     flown_before = inputs_of_trim(law)
     law.act(flown_before)
     law._rollouts = Cheap(weight)
-    plan = law._improved(np.zeros_like(law._plan), flown_before.state, law._law._servos, flown_before)
+    plan = law._improved(np.zeros_like(law._plan), flown_before.state, law._law._servos.now, flown_before)
     assert np.sign(plan[0, 0, 0]) == -np.sign(weight)
     others = np.abs(plan[0, 1:, 1:])
     assert others.max() < np.abs(plan[0, 0, 0])
@@ -159,7 +159,7 @@ def test_a_plan_stays_where_all_flights_cost_the_same():
     inputs = inputs_of_trim(law)
     law.act(inputs)
     law._rollouts = Cheap(0.0)
-    plan = law._improved(np.zeros_like(law._plan), inputs.state, law._law._servos, inputs)
+    plan = law._improved(np.zeros_like(law._plan), inputs.state, law._law._servos.now, inputs)
     assert np.abs(plan).max() < 1e-12
 
 
@@ -172,7 +172,7 @@ def test_noise_that_leads_away_from_the_law_costs_what_it_takes():
     law._rollouts = Cheap(0.0)
     plan = np.zeros_like(law._plan)
     plan[0, 0, 0] = law._sigma[0]
-    again = law._improved(plan, inputs.state, law._law._servos, inputs)
+    again = law._improved(plan, inputs.state, law._law._servos.now, inputs)
     # The mean of a Gaussian whose density is weighted by exp(-plan noise / sigma^2) lies at -plan.
     assert again[0, 0, 0] == pytest.approx(0.0, abs=0.15 * law._sigma[0])
     assert np.abs(again[0, 1:]).max() < 0.15 * law._sigma.max()

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from fulmar_core.controllers.controller import Inputs
-from fulmar_core.controllers.flight_law import FlightLaw
+from fulmar_core.controllers.flight_following import FlightFollowing
 from fulmar_core.controllers.flight_lqi import FlightLqr, FlightWeights, flight_lqr_weights
 from fulmar_core.controllers.flight_observer import ObserverNoise
 from fulmar_core.controllers.flight_rollouts import FlightCost, FlightRollouts
@@ -62,7 +62,7 @@ class MppiSettings:
             raise ValueError(f"seed = {self.seed} must not be negative.")
 
 
-class FlightMppi(FlightLaw):
+class FlightMppi(FlightFollowing):
     """Model-predictive path integral control of an aircraft.
 
     Attributes:

@@ -58,7 +58,7 @@ class FlightRollouts:
             step_s: Time step [s].
             share: Of the law's answer to departures that they follow; 0: commands of level flight alone [-].
         """
-        assert robot.airframe is not None  # as of `FlightLaw.follow`
+        assert robot.airframe is not None  # as of `FlightLaw.fly`
         timing = replace(robot.timing, physics_dt=step_s, control_hz=1.0 / step_s)
         self._robot = replace(robot, timing=timing)
         self._dynamics = FlightDynamics(self._robot, turbulent=False)

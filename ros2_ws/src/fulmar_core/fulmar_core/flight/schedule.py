@@ -88,16 +88,8 @@ class Schedule:
             [np.array([float(part) for part in model.trim.state.quat]) for model in models]
         )
 
-    def _weights(self, height: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        inside = np.clip(height, self.heights[0], self.heights[-1])
-        low = np.clip(np.searchsorted(self.heights, inside, side="right") - 1, 0, len(self.heights) - 2)
-        share = (inside - self.heights[low]) / (self.heights[low + 1] - self.heights[low])
-        return low, share
-
     def _between(self, values: np.ndarray, height: np.ndarray) -> np.ndarray:
-        low, share = self._weights(height)
-        share = share.reshape(-1, *(1,) * (values.ndim - 1))
-        return np.asarray((1.0 - share) * values[low] + share * values[low + 1])
+        return between(values, self.heights, height)
 
     def array(self, height: np.ndarray) -> np.ndarray:
         """What was computed, at heights (n,), shape (n, ...)."""
@@ -111,3 +103,14 @@ class Schedule:
         """Attitudes of the trims at heights, shape (n, 4)."""
         found = self._between(self._quats, height)
         return np.asarray(found / np.linalg.norm(found, axis=-1, keepdims=True))
+
+
+def between(values: np.ndarray, places: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Values at ascending places, at other ones (n,): linear between them, held beyond, shape (n, ...)."""
+    if len(places) == 1:
+        return np.repeat(values, len(at), axis=0)
+    inside = np.clip(at, places[0], places[-1])
+    low = np.clip(np.searchsorted(places, inside, side="right") - 1, 0, len(places) - 2)
+    share = (inside - places[low]) / (places[low + 1] - places[low])
+    share = share.reshape(-1, *(1,) * (values.ndim - 1))
+    return np.asarray((1.0 - share) * values[low] + share * values[low + 1])
