@@ -63,17 +63,12 @@ class MppiSettings:
 
 
 class FlightMppi(FlightFollowing):
-    """Model-predictive path integral control of an aircraft.
-
-    Attributes:
-        seeds: Of the noise, in turns among craft side by side; by default one, so that each flies as it would alone.
-    """
+    """Model-predictive path integral control of an aircraft; its one seed lets each craft fly as it would alone."""
 
     law = "mppi"
     title = "MPPI of aircraft"
 
     gains: MppiSettings
-    seeds: tuple[int, ...] = ()
 
     def bind(self) -> None:
         """See `Law.bind`."""
