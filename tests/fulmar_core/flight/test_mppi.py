@@ -8,18 +8,20 @@ import numpy as np
 import pytest
 
 from fulmar_benchmarks.falcon.cells import SCENARIOS, Cell, fly
+from fulmar_core.attitude import from_euler
 from fulmar_core.controllers.classical import load_classical
 from fulmar_core.controllers.controller import Inputs
 from fulmar_core.controllers.flight_lqi import FlightLqr
 from fulmar_core.controllers.flight_mppi import FlightMppi, mppi_settings
 from fulmar_core.controllers.flight_reference import Aim
-from fulmar_core.controllers.flight_rollouts import FlightCost, FlightRollouts
+from fulmar_core.controllers.flight_rollouts import FlightCost, FlightRollouts, loss_angles
 from fulmar_core.counter_rng import Draws
 from fulmar_core.errors import ConfigError
 from fulmar_core.flight.trim import find_trim
 from fulmar_core.goal import goal_in_float64
 from fulmar_core.robot import load_robot
 from fulmar_core.rollout import roll_out_in_batch
+from fulmar_core.spatial import SpatialState
 from fulmar_core.tasks import load_task
 
 ROBOT = load_robot("airship_v7")
@@ -88,6 +90,37 @@ def test_a_flight_into_the_water_costs_more_than_any_other():
     level, diving = rollouts.fly(state, servos, [aim] * 26, corrections)[0]
     assert level < 10.0
     assert diving > 1e7
+
+
+@pytest.mark.parametrize(
+    ("alpha_deg", "cost", "lost"),
+    [
+        (4.0, FlightCost(), False),
+        (5.0, FlightCost(), True),
+        (-2.0, FlightCost(), False),
+        (-3.0, FlightCost(), True),
+        (5.0, FlightCost(alpha_deg=6.0), False),
+        (-7.0, FlightCost(alpha_deg=6.0), True),
+    ],
+)
+def test_a_flight_outside_the_angles_that_the_coefficients_are_for_is_lost(alpha_deg, cost, lost):
+    """For airship_v7 from -2.5° to 4.5°; a setting takes their place, either way."""
+    law = FlightLqr(ROBOT, TASK, replace(SETTINGS.law, observer=None))
+    rollouts = FlightRollouts(ROBOT, law, cost, step_s=0.001, share=0.0)
+    nose = from_euler(np.zeros(1), np.radians([-alpha_deg]), np.zeros(1))
+    at, zero = np.full(1, 50.0), np.zeros(1)
+    state = SpatialState(zero, zero, at, *nose, np.full(1, 28.0), zero, zero, zero, zero, zero)
+    aim = Aim(np.array([[0.0, 50.0]]), np.zeros((1, 2)), np.zeros((1, 2)))
+    servos = np.concatenate((find_trim(ROBOT, 28.0, 50.0).command, np.zeros(3)))[None]
+    found = rollouts.fly(state, servos, [aim] * 2, np.zeros((1, 1, 1, 5)))[0, 0]
+    assert (found > 1e5) == lost
+
+
+@pytest.mark.parametrize(
+    ("robot", "angles"), [("airship_v7", (-2.5, 4.5)), ("sr22", (-6.0, 9.75)), ("a0s", (-9.75, 9.75))]
+)
+def test_flights_stay_within_most_of_the_stall_angle_too(robot, angles):
+    assert loss_angles(load_robot(robot)) == angles
 
 
 @pytest.mark.parametrize(
