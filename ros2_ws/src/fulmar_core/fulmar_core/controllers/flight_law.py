@@ -12,6 +12,7 @@ from fulmar_core.actuators.control_surfaces import ControlSurfaces
 from fulmar_core.controllers.controller import Inputs
 from fulmar_core.controllers.flight_observer import FlightObserver, ObserverNoise
 from fulmar_core.controllers.law import Law
+from fulmar_core.flight.atmosphere import SEA_LEVEL
 from fulmar_core.spatial import SpatialState
 
 
@@ -64,8 +65,8 @@ class FlightLaw(Law):
 
     @functools.cached_property
     def thrust_slope(self) -> float:
-        """Thrust of all motors per throttle at the cruising speed [N]."""
-        at, density = np.array([self._speed]), np.array([1.225])
+        """Thrust of all motors per throttle at the cruising speed and sea level [N]."""
+        at, density = np.array([self._speed]), np.array([SEA_LEVEL])
         total = 0.0
         for motor in self._craft.motors:
             low, high = (float(motor.engine.thrust_at(np.array([t]), at, density)[0]) for t in (0.3, 0.5))
