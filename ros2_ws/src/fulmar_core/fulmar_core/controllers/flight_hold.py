@@ -41,7 +41,7 @@ class Held:
 
 
 class FlightHold(FlightLaw):
-    """Holds attitude or airspeed; integral action where the weights of places have any."""
+    """Holds attitude or airspeed; integral action where the weights of places and those of angles have any."""
 
     law = "lqi"
     title = "LQI of aircraft that holds attitude or airspeed"

@@ -32,7 +32,7 @@ class FlightCost:
     side: float = 1000.0  # per m
     turning: float = 300.0  # per rad/s of the three turn rates together
     speed: float = 450.0  # per m/s away from the cruising speed
-    sideslip: float = 5.0  # times e^(2 |sideslip in degrees|) - 1
+    sideslip: float = 5.0  # times e^(2 |sideslip in degrees|) - 1, of 10° at most
     lost: float = 1e9  # in the water, or at an angle of attack beyond `alpha_deg`
     alpha_deg: float | None = None  # either way; None: beyond those of `loss_angles` [deg]
 

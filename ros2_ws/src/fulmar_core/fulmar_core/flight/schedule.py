@@ -15,7 +15,7 @@ from fulmar_core.robot import Robot
 
 # Where trims are solved, of the span; from the last one on it is nearly free air [-].
 HEIGHTS = (0.12, 0.2, 0.3, 0.5, 0.8, 1.2, 2.0, 3.0)
-MOTION = 11  # states of the motion: y, z, rotation vector, velocity and turn rate, three each
+MOTION = 11  # states of the motion: y and z; rotation vector, velocity and turn rate, three each
 PLACE, TURNED, SPEED, RATE = slice(0, 2), slice(2, 5), slice(5, 8), slice(8, 11)
 
 
