@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -83,6 +83,18 @@ class DeviceDriver(Protocol):
     @abstractmethod
     def close(self) -> None:
         """Release the device within 2 s; the safe command was written before. Called once."""
+        ...
+
+
+@runtime_checkable
+class Halting(Protocol):
+    """What a driver also has whose device goes on moving at the safe command, and can be stopped as a whole."""
+
+    def halt(self) -> None:
+        """Stop it where it is, within 0.5 s; called before the safe command, each time that commands end.
+
+        `begin` lets it go on.
+        """
         ...
 
 

@@ -13,7 +13,7 @@ from fulmar_core.episode import Episode
 from fulmar_core.errors import DeviceError
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
-from hardware_drivers.driver import DeviceDriver
+from hardware_drivers.driver import DeviceDriver, Halting
 
 STOPS = 5  # the safe command goes out this often: one may be lost
 # Between them, and after the last: publishers keep one message, and the process may end right after.
@@ -127,12 +127,29 @@ class FloatingDriverBackend(DriverBackend):
         return super()._write(command if self.bearing_on else self.robot.actuators.safe_command)
 
 
+class HaltingDriverBackend(DriverBackend):
+    """Backend of a driver that can stop its device as a whole; see `Halting`."""
+
+    def __init__(self, robot: Robot, driver: DeviceDriver, halting: Halting) -> None:
+        super().__init__(robot, driver)
+        self._halting = halting
+
+    def make_safe(self) -> None:
+        """Stop the device before the safe command reaches it; raises as of `DriverBackend`."""
+        try:
+            self._halting.halt()
+        finally:
+            super().make_safe()
+
+
 class _HangsError(DeviceError):
     """A write that does not come back."""
 
 
 def backend_of(robot: Robot, driver: DeviceDriver) -> DriverBackend:
-    """The backend of a driver, with its air bearing where it has one."""
+    """The backend of a driver, with what it has beside its actuators."""
     if isinstance(driver, AirBearing):
         return FloatingDriverBackend(robot, driver, driver)
+    if isinstance(driver, Halting):
+        return HaltingDriverBackend(robot, driver, driver)
     return DriverBackend(robot, driver)

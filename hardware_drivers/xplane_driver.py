@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import threading
 import time
 from collections.abc import Sequence
@@ -10,6 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from fulmar_core.actuators.control_surfaces import ControlSurfaces
+from fulmar_core.errors import DeviceError
 from fulmar_core.robot import Robot
 from fulmar_core.sensors.air_data import NAME as AIR_DATA
 from fulmar_core.sensors.air_data import AirData
@@ -21,7 +21,6 @@ from hardware_drivers.ports import Reader, open_port
 from hardware_drivers.settings import XPlane
 from hardware_drivers.xplane_messages import (
     KEEP,
-    PAUSE,
     RUN,
     AskPosition,
     AskReferences,
@@ -32,6 +31,7 @@ from hardware_drivers.xplane_messages import (
     Simulation,
     Values,
 )
+from hardware_drivers.xplane_pause import AGAIN_S, Pause
 from hardware_drivers.xplane_protocol import MalformedError, decode, encode
 from hardware_drivers.xplane_state import ASKED, Flight, Placed, check_place, flight_of, unbelievable
 
@@ -39,14 +39,14 @@ THROTTLES = "sim/flightmodel/engine/ENGN_thro"  # of each engine, from the left,
 # A positive elevator lowers the nose and a positive rudder turns it left; stick and pedals do the opposite.
 STICK = {"elevator": -1.0, "aileron": 1.0, "rudder": -1.0}
 STILL_NS = 150_000_000  # between two frames of an X-Plane that runs there is less
-AGAIN_S = 0.03  # a question without an answer for so long is lost
+HALT_S = 0.3  # for X-Plane to say that it is paused, of which it has time once a frame
 HINT = "Does X-Plane run there, not paused, with the plugin XPlaneConnect?"
 
 
 class XPlaneDriver(DeviceDriver):
     """Flies by CTRL and DREF, measures by GETP and GETD.
 
-    The driver pauses X-Plane until `begin` and again at its end, since an aircraft without commands falls.
+    The driver pauses X-Plane until `begin` and again where commands end, since an aircraft without commands falls.
     """
 
     def __init__(self, robot: Robot, settings: XPlane, *, patience_s: float) -> None:
@@ -65,6 +65,8 @@ class XPlaneDriver(DeviceDriver):
         self._believed: tuple[Flight, int, int] | None = None  # and when, by steady and wall clock [ns]
         self._placing = threading.Lock()  # no report is placed by an `odom` that has just moved
         self._running, self._refused = False, 0  # before it runs, a person may move the aircraft
+        self._lost = False  # X-Plane, and `read` has said so
+        self._pause = Pause(self._send)
         self._over, self._answered = threading.Event(), threading.Event()
         self._port = open_port(settings.port, 0, patience_s)
         self._reader = Reader(self._port, self._take, self._feedback.fail)
@@ -72,10 +74,10 @@ class XPlaneDriver(DeviceDriver):
         self._asking.start()
         try:
             self._feedback.wait(patience_s)
-            self._send(Simulation(PAUSE))
         except Exception:
-            self.close()
+            self._release()
             raise
+        self.halt()
 
     def begin(self, x: float, y: float, heading: float) -> None:
         """Let X-Plane run; without an origin, set the aircraft's pose in `odom`. See `DeviceDriver`."""
@@ -101,17 +103,38 @@ class XPlaneDriver(DeviceDriver):
 
     def read(self) -> Report:
         """See `DeviceDriver`."""
-        return self._feedback.read()
+        try:
+            return self._feedback.read()
+        except DeviceError:
+            self._lost = True
+            raise
 
     def health(self) -> dict[str, str]:
         """Refused datagrams; see `DeviceDriver`."""
         return {"refused_datagrams": str(self._refused), "warning": self._feedback.refusal}
 
+    def halt(self) -> None:
+        """Pause X-Plane; see `Halting`."""
+        with self._placing:
+            self._running = False
+        self._pause.confirmed(HALT_S)
+
     def close(self) -> None:
-        """Pause X-Plane, and close the link; see `DeviceDriver`."""
+        """Pause X-Plane, and close the link; see `DeviceDriver`.
+
+        Raises:
+            DeviceError: X-Plane does not say that it is paused, and `read` has not reported that it is lost.
+        """
+        paused = self._pause.confirmed(HALT_S)
+        self._release()
+        if not paused and not self._lost:
+            raise DeviceError(
+                f"X-Plane at {self._settings.port}: {HALT_S:g} s of PAUSE were not confirmed, and the aircraft may fly "
+                "on without commands. Pause it by the key P."
+            )
+
+    def _release(self) -> None:
         self._over.set()
-        with contextlib.suppress(OSError):
-            self._send(Simulation(PAUSE))
         self._asking.join(0.5)
         self._reader.stop()
 
@@ -137,8 +160,9 @@ class XPlaneDriver(DeviceDriver):
             if isinstance(message, Position):
                 self._position = message
             elif isinstance(message, Values):
-                self._answered.set()
-                self._answer(message, now_ns)
+                if not self._pause.take(message):
+                    self._answered.set()
+                    self._answer(message, now_ns)
             else:
                 raise MalformedError(f"{type(message).__name__} was not asked for")
         except MalformedError as error:

@@ -7,10 +7,12 @@ import time
 
 from fulmar_core.errors import DeviceError
 from hardware_drivers.ports import Reader, open_port
-from hardware_drivers.xplane_messages import AskPosition, Message, Position
+from hardware_drivers.xplane_messages import AskPosition, Message, Position, Values
+from hardware_drivers.xplane_pause import Pause
 from hardware_drivers.xplane_protocol import MalformedError, decode, encode
 
 ASK_S = 0.2  # a question that had no answer for so long is asked again [s]
+PAUSE_S = 1.0  # for it to pause [s]
 HINT = "Does X-Plane run there, with the plugin XPlaneConnect?"
 
 
@@ -31,7 +33,7 @@ class XPlaneLink:
         self._address, self._refusal = port, ""
         self._answered = threading.Event()
         self._answered_s = time.monotonic()
-        self._port = open_port(port, 0, 0.0)
+        self._port, self._pause = open_port(port, 0, 0.0), Pause(self.send)
         self._reader = Reader(self._port, self._take, self._end)
         until = time.monotonic() + within_s
         try:
@@ -61,6 +63,17 @@ class XPlaneLink:
         """Ask for an answer."""
         self.send(AskPosition())
 
+    def pause(self) -> None:
+        """Pause the physics.
+
+        Raises:
+            DeviceError: X-Plane does not say that they rest.
+        """
+        if not self._pause.confirmed(PAUSE_S):
+            raise DeviceError(
+                f"{self._address}: {PAUSE_S:g} s of PAUSE were not confirmed{self._refusal}. {HINT}"
+            )
+
     def check(self, silent_s: float) -> None:
         """Look whether answers come to what is asked; does not wait.
 
@@ -81,7 +94,9 @@ class XPlaneLink:
         except MalformedError as error:
             self._refusal = f"; what came: {error}"
             return
-        if isinstance(answer, Position):
+        if isinstance(answer, Values):
+            self._pause.take(answer)
+        elif isinstance(answer, Position):
             self._refusal, self._answered_s = "", time.monotonic()
             self._answered.set()
 

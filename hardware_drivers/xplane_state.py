@@ -32,7 +32,7 @@ ASKED = (
     f"{PLACE}alpha",  # [deg]
     f"{PLACE}beta",  # [deg]
     f"{PLACE}y_agl",  # above the ground or the water [m]
-    "sim/time/total_flight_time_sec",  # stands still while X-Plane is paused [s]
+    "sim/time/total_flight_time_sec",  # stands still while X-Plane is paused by its key P [s]
 )
 
 

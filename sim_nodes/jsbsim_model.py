@@ -54,11 +54,7 @@ def _function(name: str, body: Node) -> Node:
 
 
 def aircraft_xml(robot: Robot) -> str:
-    """The model of an aircraft.
-
-    Raises:
-        ConfigError: As of `Robot.flies`: it is none.
-    """
+    """The model of an aircraft; see `write_aircraft` for other robots."""
     frame, craft = robot.airframe, robot.actuators
     assert frame is not None and isinstance(craft, ControlSurfaces)  # as of `write_aircraft`
     root = _node("fdm_config", name=robot.name, version="2.0", release="BETA")

@@ -23,6 +23,8 @@ EQUATORIAL_M, POLAR_M = 6378137.0, 6356752.314245
 LONGEST = 4096
 BUFFER = 2**18  # bytes of what comes while the emulator does not read, of a second about
 UNCHANGED = -998.0
+RESTS = "sim/operation/override/override_planepath"  # whether the physics of each aircraft rest
+AIRCRAFT = 20
 PLACE = "sim/flightmodel/position/"
 ENGINES = "sim/flightmodel/engine/ENGN_thro"
 
@@ -33,6 +35,7 @@ class XPlaneEmulator:
     Attributes:
         paused: Whether time stands still, as it does at first; SIMU changes it.
         mute: Answer nothing, as an X-Plane that has crashed.
+        drop: Says of each datagram that comes whether it is lost on its way; None: none is.
         lie: Spoils the answers: takes each datagram, and gives the one to send; None: they are true.
     """
 
@@ -57,6 +60,7 @@ class XPlaneEmulator:
         self._frame: tuple[float, np.ndarray] | None = None  # time [s] and velocity of the last one
         self._acceleration = np.zeros(3)
         self.paused, self.mute = True, False
+        self.drop: Callable[[bytes], bool] | None = None
         self.lie: Callable[[bytes], bytes] | None = None
 
     def command(self, now_s: float) -> np.ndarray:
@@ -68,7 +72,8 @@ class XPlaneEmulator:
                 break
             except OSError:
                 continue  # a client that is gone refuses its answer
-            self._take(datagram, sender)
+            if self.drop is None or not self.drop(datagram):
+                self._take(datagram, sender)
         # Stick back and pedals right move elevator and rudder against the signs of the robot's commands.
         signs = {"elevator": -1.0, "aileron": 1.0, "rudder": -1.0}
         shares = [signs[surface.name] * self._stick[surface.name] for surface in self._actuators.surfaces]
@@ -140,7 +145,10 @@ class XPlaneEmulator:
         for _ in range(question[5]):
             name = question[at + 1 : at + 1 + question[at]].decode()
             at += 1 + question[at]
-            body += struct.pack("<Bf", 1, values[name]) if name in values else b"\0"
+            if name == RESTS:
+                body += struct.pack(f"<B{AIRCRAFT}f", AIRCRAFT, *[float(self.paused)] * AIRCRAFT)
+            else:
+                body += struct.pack("<Bf", 1, values[name]) if name in values else b"\0"
         return b"RESP\0" + question[5:6] + body
 
     def _references(self, state: RigidBodyState) -> dict[str, float]:

@@ -11,9 +11,10 @@ import pytest
 
 from fulmar_core.config import load_config
 from fulmar_core.errors import ConfigError
+from fulmar_core.flight.atmosphere import SEA_LEVEL
 from fulmar_core.robot import load_robot_file
 from fulmar_evaluation.new_airframe import coefficient_set as module
-from fulmar_evaluation.new_airframe.coefficient_set import DENSITY, coefficient_set
+from fulmar_evaluation.new_airframe.coefficient_set import coefficient_set
 from fulmar_evaluation.new_airframe.geometry import Flap, Geometry
 from fulmar_evaluation.new_airframe.robot_file import write_robot
 from tests.fulmar_cli.command_line import complaint
@@ -96,7 +97,7 @@ def test_coefficients_come_back_from_what_the_lattice_answers(lattice):
         if name == "CD":
             expected["1"] += CRAFT.profile_drag
         assert found[name] == pytest.approx(expected), name
-    lift = CRAFT.mass * 9.81 / (0.5 * DENSITY * CRAFT.speed**2 * CRAFT.wing.area)
+    lift = CRAFT.mass * 9.81 / (0.5 * SEA_LEVEL * CRAFT.speed**2 * CRAFT.wing.area)
     assert lattice[-1]["alpha"] == pytest.approx(np.rad2deg((lift - 0.3) / 5.0)), (
         "derivatives are those of cruise"
     )

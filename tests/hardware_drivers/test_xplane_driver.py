@@ -73,6 +73,58 @@ def test_x_plane_stands_still_until_the_flight_begins_and_after_its_end(bench):
     assert bench.command == pytest.approx(ROBOT.actuators.safe_command)
 
 
+def test_where_commands_end_x_plane_stands_still_before_the_safe_command_reaches_it(bench, driver):
+    """The driver is not closed yet: other nodes end first."""
+    begin(driver)
+    until(lambda: driver.step(trim()) and bench.command.any())
+    arrived: list[bytes] = []
+    bench.device.drop = lambda datagram: arrived.append(datagram)
+    driver.make_safe()
+    until(lambda: np.allclose(bench.command, ROBOT.actuators.safe_command))
+    assert bench.device.paused
+    heads = [found[:4] for found in arrived]
+    first = heads.index(b"SIMU")
+    before = [struct.unpack_from("<3f", found, 5) for found in arrived[:first] if found[:4] == b"CTRL"]
+    assert all(any(stick) for stick in before)
+    assert b"CTRL" in heads[first:]
+    begin(driver)
+    until(lambda: not bench.device.paused)
+
+
+@pytest.mark.parametrize("lost", ["the request", "the question"])
+def test_a_pause_that_is_lost_on_its_way_is_repeated_until_x_plane_says_that_it_stands_still(
+    bench, driver, lost, monkeypatch
+):
+    monkeypatch.setattr("hardware_drivers.xplane_driver.HALT_S", 5.0)  # for a busy machine
+    begin(driver)
+    until(lambda: driver.step(trim()) and bench.command.any())
+    head = {"the request": b"SIMU", "the question": b"GETD\0\1"}[lost]
+    sent: list[bytes] = []
+
+    def drop(datagram: bytes) -> bool:
+        sent.extend([datagram] * datagram.startswith(head))
+        return datagram.startswith(head) and len(sent) <= 3
+
+    bench.device.drop = drop
+    driver.make_safe()
+    assert bench.device.paused
+    assert len(sent) > 3
+
+
+def test_an_x_plane_that_does_not_say_that_it_is_paused_is_one_line_within_two_seconds(bench):
+    driver = backend_of(ROBOT, XPlaneDriver(ROBOT, settings_of(bench.device.address), patience_s=5.0))
+    begin(driver)
+    until(lambda: driver.step(trim()) and bench.command.any())
+    bench.device.drop = lambda datagram: datagram[:4] == b"SIMU"
+    began = time.monotonic()
+    with pytest.raises(
+        DeviceError, match=r"X-Plane at udp://\S+: 0\.3 s of PAUSE were not confirmed, .* by the key P"
+    ):
+        driver.close()
+    assert time.monotonic() - began < 2.0
+    assert not bench.device.paused
+
+
 def test_every_command_moves_its_own_actuator_as_far_as_it_says(bench, driver):
     commands = [*(0.5 * np.diag(ROBOT.actuators.scale)), trim(), ROBOT.actuators.safe_command]
     for command in commands:

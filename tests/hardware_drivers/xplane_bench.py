@@ -69,11 +69,13 @@ class Peer:
 
     Attributes:
         lie: Spoils the answers: takes each datagram, and gives the one to send; empty: none.
+        paused: As of the last SIMU.
     """
 
     def __init__(self, receive: Callable[[bytes], object] = lambda _datagram: None) -> None:
         """Listen on a free port; `receive` gets every datagram."""
         self._receive = receive
+        self.paused = False
         self.lie: Callable[[bytes], bytes] = lambda answer: answer
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.bind(("127.0.0.1", 0))
@@ -100,16 +102,20 @@ class Peer:
             except TimeoutError:
                 continue
             self._receive(question)
-            answer = self._answer(question[:4], time.monotonic() - began)
+            if question[:4] == b"SIMU":
+                self.paused = question[5] == 1
+            answer = self._answer(question, time.monotonic() - began)
             answer = answer and self.lie(answer)
             if answer:
                 self._socket.sendto(answer, sender)
 
-    @staticmethod
-    def _answer(head: bytes, time_s: float) -> bytes:
+    def _answer(self, question: bytes, time_s: float) -> bytes:
+        head = question[:4]
         if head == b"GETP":
             latitude = 49.5 + 2.5e-4 * time_s  # 28 m/s
             return struct.pack("<4sxB3d4f", b"POSI", 0, latitude, -3.0, 5.0, 0.0, 0.0, 0.0, 0.0)
+        if question == b"GETD\0\1\x29sim/operation/override/override_planepath":
+            return b"RESP\0\x01\x14" + struct.pack("<20f", *[float(self.paused)] * 20)
         if head == b"GETD":
             values = (0.0, 0.0, -28.0, *[0.0] * 6, 28.0, 0.0, 0.0, 5.0, time_s)
             return b"RESP\0\x0e" + b"".join(struct.pack("<Bf", 1, value) for value in values)

@@ -22,7 +22,7 @@ from fulmar_core.topics import COMMAND
 from fulmar_ros.plant_node import PlantNode
 from fulmar_ros.qos import publisher_qos
 from tests.conftest import RosDomain
-from tests.ros.cli import fulmar, json_of
+from tests.ros.cli import FULMAR, fulmar, json_of
 from tests.ros.neighbour import NAMESPACE, ROBOT, Neighbour, open_valves, until
 
 pytestmark = pytest.mark.real_time
@@ -143,3 +143,39 @@ def test_of_two_plants_that_start_at_once_not_both_live(ros_domain: RosDomain) -
         for one in both:
             one.kill()
             one.wait()
+
+
+@pytest.mark.slow
+def test_of_two_runs_of_one_name_that_start_at_once_no_more_than_one_runs_and_the_other_is_refused_in_one_line(
+    ros_domain: RosDomain, tmp_path: Path
+) -> None:
+    """Of two users, whose locks are apart. The first to see the nodes of the other ends; both may."""
+    asked = [
+        *FULMAR,
+        "run",
+        ROBOT,
+        "--controller",
+        "lqr",
+        "--goal",
+        "0.5,0,0",
+        "--lockstep",
+        "--record",
+        "bag",
+    ]
+    folders = [tmp_path / "one", tmp_path / "two"]
+    runs = []
+    for folder in folders:
+        folder.mkdir()
+        env = ros_domain.env | {"TMPDIR": str(folder)}
+        runs.append(subprocess.Popen(asked, env=env, cwd=folder, stderr=subprocess.PIPE, text=True))
+    words = [run.communicate(timeout=60.0)[1] for run in runs]
+    codes = [run.returncode for run in runs]
+    assert sorted(codes) in ([0, 2], [2, 2]), words
+    for code, said, folder in zip(codes, words, folders, strict=True):
+        assert "RCLError" not in said
+        if code == 2:
+            assert (
+                f"another run of this name goes on in ROS domain {ros_domain.id}: {NAMESPACE}/plant" in said
+            )
+            assert "set ROS_DOMAIN_ID to another number" in said
+            assert not (folder / "bag").exists()

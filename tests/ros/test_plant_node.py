@@ -8,6 +8,8 @@ import time
 import numpy as np
 import pytest
 from geometry_msgs.msg import TwistStamped
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
 from nav_msgs.msg import Odometry
 from rclpy.lifecycle import LifecycleNode
 from rclpy.qos import QoSProfile, ReliabilityPolicy
@@ -84,6 +86,26 @@ def test_a_stale_command_does_not_survive_a_deactivation(neighbour: Neighbour, p
     until(lambda: len(neighbour.applied) > before + 10)
     assert not any(applied.any() for applied in neighbour.applied[before:])
     assert plant.guard.watchdog.trips == 0
+
+
+def test_a_transition_that_does_not_fit_the_state_is_refused_and_the_plant_goes_on(
+    neighbour: Neighbour, plant: PlantNode
+) -> None:
+    """By its number and by its label; one that fits is made."""
+    client = neighbour.node.create_client(ChangeState, "plant/change_state")
+    assert client.wait_for_service(5.0)
+
+    def asked(**transition: object) -> bool:
+        future = client.call_async(ChangeState.Request(transition=Transition(**transition)))
+        until(future.done)
+        return bool(future.result().success)
+
+    assert not asked(id=Transition.TRANSITION_CONFIGURE)
+    assert not asked(label="configure")
+    before = len(neighbour.applied)
+    until(lambda: len(neighbour.applied) > before + 5)
+    assert asked(id=Transition.TRANSITION_DEACTIVATE)
+    assert asked(label="cleanup")
 
 
 def test_shutdown_from_active_stops_the_loop_and_closes_the_valves(

@@ -20,6 +20,7 @@ from fulmar_core.errors import RunFailed
 from fulmar_core.goal import goal_at
 from fulmar_core.topics import ESTOP, ESTOP_RELEASED, GOAL_POSE
 from fulmar_ros.controller_node import ControllerNode
+from fulmar_ros.living_plant import TwinRunError
 from fulmar_ros.operator_subscription import subscribe_operator
 from fulmar_ros.qos import publisher_qos
 from fulmar_ros.runtime import spinning
@@ -50,6 +51,24 @@ def test_a_plant_that_refuses_to_start_fails_the_run_with_its_own_reason(
         with spinning(plant, overseer.fail), pytest.raises(RunFailed) as caught:
             overseer.start_plant(lambda: None, lambda: "no model")
     assert str(caught.value) == words
+
+
+def test_a_run_whose_plant_is_there_twice_is_refused_with_every_node_that_is(ros_domain: RosDomain) -> None:
+    """As long as there is one of each, nothing is said; a neighbour of another name does not count."""
+    with supervisor(PLAN) as overseer:
+        nodes = [rclpy.create_node(name, namespace=NAMESPACE) for name in ("plant", "controller", "recorder")]
+        nodes.append(rclpy.create_node("plant", namespace="/another"))
+        until(lambda: overseer._node.get_node_names().count("plant") == 2)
+        overseer.refuse_twins()
+        nodes += [rclpy.create_node(name, namespace=NAMESPACE) for name in ("plant", "controller")]
+        until(lambda: overseer._node.get_node_names().count("controller") == 2)
+        with pytest.raises(TwinRunError) as caught:
+            overseer.refuse_twins()
+    assert str(caught.value) == (
+        f"another run of this name goes on in ROS domain {ros_domain.id}: {NAMESPACE}/plant, {NAMESPACE}/controller "
+        "are there twice, and two of one name would mix. Wait for it to end, give this robot another --name, or set "
+        "ROS_DOMAIN_ID to another number."
+    )
 
 
 class Button:

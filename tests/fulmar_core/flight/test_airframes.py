@@ -146,6 +146,8 @@ class TestCoefficients:
             ({"terms": {"CLL": {"1": 0.1}}}, "coefficient 'CLL' is not known"),
             ({"terms": {"CL": {"alhpa": 0.1}}}, "factor 'alhpa' .* Did you mean 'alpha'"),
             ({"terms": {"CL": {"alpha^x": 0.1}}}, "a power must be a whole number"),
+            ({"terms": {"Cm": {"alpha alphadot": 0.1}}}, "'alphadot' stands alone"),
+            ({"terms": {"Cm": {"alphadot^2": 0.1}}}, "'alphadot' stands alone"),
             ({"terms": {}, "signs": {"flap": -1.0}}, "'signs' takes 1 or -1"),
             ({"terms": {}, "alpha_range": (5.0, -5.0)}, "'alpha_range'"),
         ],

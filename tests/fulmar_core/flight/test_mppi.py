@@ -8,18 +8,20 @@ import numpy as np
 import pytest
 
 from fulmar_benchmarks.falcon.cells import SCENARIOS, Cell, fly
+from fulmar_core.attitude import from_euler
 from fulmar_core.controllers.classical import load_classical
 from fulmar_core.controllers.controller import Inputs
 from fulmar_core.controllers.flight_lqi import FlightLqr
 from fulmar_core.controllers.flight_mppi import FlightMppi, mppi_settings
 from fulmar_core.controllers.flight_reference import Aim
-from fulmar_core.controllers.flight_rollouts import FlightCost, FlightRollouts
+from fulmar_core.controllers.flight_rollouts import FlightCost, FlightRollouts, loss_angles
 from fulmar_core.counter_rng import Draws
 from fulmar_core.errors import ConfigError
 from fulmar_core.flight.trim import find_trim
 from fulmar_core.goal import goal_in_float64
 from fulmar_core.robot import load_robot
 from fulmar_core.rollout import roll_out_in_batch
+from fulmar_core.spatial import SpatialState
 from fulmar_core.tasks import load_task
 
 ROBOT = load_robot("airship_v7")
@@ -91,6 +93,37 @@ def test_a_flight_into_the_water_costs_more_than_any_other():
 
 
 @pytest.mark.parametrize(
+    ("alpha_deg", "cost", "lost"),
+    [
+        (4.0, FlightCost(), False),
+        (5.0, FlightCost(), True),
+        (-2.0, FlightCost(), False),
+        (-3.0, FlightCost(), True),
+        (5.0, FlightCost(alpha_deg=6.0), False),
+        (-7.0, FlightCost(alpha_deg=6.0), True),
+    ],
+)
+def test_a_flight_outside_the_angles_that_the_coefficients_are_for_is_lost(alpha_deg, cost, lost):
+    """For airship_v7 from -2.5° to 4.5°; a setting takes their place, either way."""
+    law = FlightLqr(ROBOT, TASK, replace(SETTINGS.law, observer=None))
+    rollouts = FlightRollouts(ROBOT, law, cost, step_s=0.001, share=0.0)
+    nose = from_euler(np.zeros(1), np.radians([-alpha_deg]), np.zeros(1))
+    at, zero = np.full(1, 50.0), np.zeros(1)
+    state = SpatialState(zero, zero, at, *nose, np.full(1, 28.0), zero, zero, zero, zero, zero)
+    aim = Aim(np.array([[0.0, 50.0]]), np.zeros((1, 2)), np.zeros((1, 2)))
+    servos = np.concatenate((find_trim(ROBOT, 28.0, 50.0).command, np.zeros(3)))[None]
+    found = rollouts.fly(state, servos, [aim] * 2, np.zeros((1, 1, 1, 5)))[0, 0]
+    assert (found > 1e5) == lost
+
+
+@pytest.mark.parametrize(
+    ("robot", "angles"), [("airship_v7", (-2.5, 4.5)), ("sr22", (-6.0, 9.75)), ("a0s", (-9.75, 9.75))]
+)
+def test_flights_stay_within_most_of_the_stall_angle_too(robot, angles):
+    assert loss_angles(load_robot(robot)) == angles
+
+
+@pytest.mark.parametrize(
     ("changed", "said"),
     [
         ({"step_s": 0.05}, "step_s = 0.05 must be greater than 0, and at most 0.04 s"),
@@ -147,10 +180,20 @@ def test_a_plan_moves_towards_the_noise_that_costs_less(weight):
     flown_before = inputs_of_trim(law)
     law.act(flown_before)
     law._rollouts = Cheap(weight)
-    plan = law._improved(np.zeros_like(law._plan), flown_before.state, law._law._servos, flown_before)
+    plan = law._improved(np.zeros_like(law._plan), flown_before.state, law._law._servos.now, flown_before)
     assert np.sign(plan[0, 0, 0]) == -np.sign(weight)
     others = np.abs(plan[0, 1:, 1:])
     assert others.max() < np.abs(plan[0, 0, 0])
+
+
+def test_a_plan_stays_where_all_flights_cost_the_same():
+    """Noise comes in pairs of opposite sign; a single flight without its partner would move the plan."""
+    law = FlightMppi(ROBOT, TASK, FEW)
+    inputs = inputs_of_trim(law)
+    law.act(inputs)
+    law._rollouts = Cheap(0.0)
+    plan = law._improved(np.zeros_like(law._plan), inputs.state, law._law._servos.now, inputs)
+    assert np.abs(plan).max() < 1e-12
 
 
 def test_noise_that_leads_away_from_the_law_costs_what_it_takes():
@@ -162,7 +205,7 @@ def test_noise_that_leads_away_from_the_law_costs_what_it_takes():
     law._rollouts = Cheap(0.0)
     plan = np.zeros_like(law._plan)
     plan[0, 0, 0] = law._sigma[0]
-    again = law._improved(plan, inputs.state, law._law._servos, inputs)
+    again = law._improved(plan, inputs.state, law._law._servos.now, inputs)
     # The mean of a Gaussian whose density is weighted by exp(-plan noise / sigma^2) lies at -plan.
     assert again[0, 0, 0] == pytest.approx(0.0, abs=0.15 * law._sigma[0])
     assert np.abs(again[0, 1:]).max() < 0.15 * law._sigma.max()

@@ -32,10 +32,15 @@ def raise_if_ended(group: ProcessGroup) -> None:
 
 
 def while_starting(group: ProcessGroup, overseer: Supervisor) -> Callable[[], None]:
-    """A check to call while nodes get ready; it raises RunFailed once a process ended or the time is over."""
+    """A check to call while nodes get ready.
+
+    It raises RunFailed once a process ended or the time is over, and TwinRunError where another run of this name
+    begins at the same time.
+    """
     began_s = time.monotonic()
 
     def alive() -> None:
+        overseer.refuse_twins()  # first: they make each other's nodes end
         raise_if_ended(group)
         if time.monotonic() - began_s > START_TIMEOUT_S:
             plant, controller = _last_status(overseer.plant), _last_status(overseer.controller)

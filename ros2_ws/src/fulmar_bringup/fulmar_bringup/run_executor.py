@@ -37,6 +37,7 @@ from fulmar_core.robot import load_robot
 from fulmar_core.safety.estop import HOLDS
 from fulmar_core.safety.watchdog import NO_COMMAND
 from fulmar_core.topics import SIMULATION_START_NS
+from fulmar_ros.living_plant import TwinRunError
 from hardware_drivers.hardware import load_hardware
 from hardware_drivers.presence import check_presence
 from policy_server.controllers import controller_entry
@@ -109,6 +110,9 @@ def _run(request: RunRequest, watch: Watch) -> Execution:
             plant = overseer.plant
             try:
                 failure = watch(request, plan, overseer, group)
+            except TwinRunError:  # before anything has run
+                _withdraw(group, specs, request.record)
+                raise
             except KeyboardInterrupt as stop:
                 failure = str(stop) or STOPPED
                 overseer.stop_plant()  # a plant that goes on would miss the commands of a controller that ends

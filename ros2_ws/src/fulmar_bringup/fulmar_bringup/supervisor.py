@@ -18,7 +18,7 @@ from lifecycle_msgs.srv import ChangeState
 from rclpy.node import Node
 from visualization_msgs.msg import MarkerArray
 
-from fulmar_bringup.run_plan import RunPlan
+from fulmar_bringup.run_plan import NODES, RunPlan
 from fulmar_core.errors import RunFailed
 from fulmar_core.goal import Goal, goal_at
 from fulmar_core.safety.estop import HOLDS, SILENT
@@ -27,7 +27,7 @@ from fulmar_core.topics import DIAGNOSTICS, GOAL_WIRES, OBSTACLES, STATUS
 from fulmar_core.wire_check import Offer
 from fulmar_ros.goal_messages import TYPES, GoalMessage, goal_message, obstacles_message
 from fulmar_ros.graph import offers_of
-from fulmar_ros.living_plant import refuse_living_plant, sees_living_plant
+from fulmar_ros.living_plant import refuse_living_plant, refuse_twins, sees_living_plant
 from fulmar_ros.operator_subscription import SUBSCRIPTIONS, LateSubscribers
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.runtime import ros_node
@@ -93,6 +93,10 @@ class Supervisor:
     def refuse_living_plant(self) -> None:
         """Raise ConfigError, with name, process and host, where a plant of this robot runs already."""
         refuse_living_plant(self._node, self._plan.namespace, since_s=self._made_s, spins=True)
+
+    def refuse_twins(self) -> None:
+        """Raise TwinRunError where another run of this name begins at the same time; call while ours gets ready."""
+        refuse_twins(self._node, self._plan.namespace, NODES)
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
@@ -243,6 +247,7 @@ class Supervisor:
         Raises:
             RunFailed: The plant refuses; with its reason.
         """
+        alive()
         while not self._plant_service.wait_for_service(0.1):
             alive()
         steps = {"configured": Transition.TRANSITION_CONFIGURE, "activated": Transition.TRANSITION_ACTIVATE}
@@ -252,6 +257,7 @@ class Supervisor:
                 alive()
                 time.sleep(0.005)
             if not future.result().success:
+                alive()  # a run that begins at the same time may have been faster
                 raise RunFailed(f"plant: could not be {what}: {self._reason_of_plant(last_words)}")
 
     def stop_plant(self, within_s: float = STOP_S) -> None:

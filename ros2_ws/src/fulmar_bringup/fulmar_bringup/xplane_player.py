@@ -17,7 +17,7 @@ from hardware_drivers.earth_frame import LocalFrame
 from hardware_drivers.hardware import load_hardware
 from hardware_drivers.settings import Geodetic, XPlane
 from hardware_drivers.xplane_link import XPlaneLink
-from hardware_drivers.xplane_messages import PAUSE, Position, Simulation
+from hardware_drivers.xplane_messages import Position
 from hardware_drivers.xplane_state import shown_at
 
 SHOWN_AT = Geodetic(49.5, -3.0)  # where a hardware file without an origin puts it: open water of the Channel
@@ -113,14 +113,14 @@ def show(
         stop: Ends it early.
 
     Raises:
-        DeviceError: No X-Plane answers, or it falls silent.
+        DeviceError: No X-Plane answers, or it does not pause, or it falls silent.
     """
     stop = stop or threading.Event()
     link = XPlaneLink(port, within_s=CONNECT_S)
     projector = _Projector(film, link, rate, stop)
     rounds = 0
     try:
-        link.send(Simulation(PAUSE))
+        link.pause()
         while not stop.is_set():
             projector.show_once()
             rounds += 1

@@ -6,7 +6,8 @@ import contextlib
 import os
 import socket
 import time
-from collections.abc import Callable, Iterator
+from collections import Counter
+from collections.abc import Callable, Collection, Iterator
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.executors import SingleThreadedExecutor
@@ -48,9 +49,8 @@ def refuse_living_plant(
         return
     where = _where(node, namespace, spins=spins)
     if where:
-        domain = os.environ.get("ROS_DOMAIN_ID", "") or "0"
         raise ConfigError(
-            f"a plant of the name {namespace.rstrip('/')}/{PLANT} lives in ROS domain {domain} already: {where}. "
+            f"a plant of the name {namespace.rstrip('/')}/{PLANT} lives in ROS domain {ros_domain()} already: {where}. "
             "Two would drive one robot, or be driven by one controller. Stop that one, give this robot another name, "
             "or set ROS_DOMAIN_ID to another number."
         )
@@ -80,6 +80,36 @@ def living_plants(node: Node, namespace: str) -> list[str]:
         same = [found for found in node.get_node_names_and_namespaces() if found == (PLANT, namespace or "/")]
         names += [own] * (len(same) - 1)
     return names
+
+
+class TwinRunError(ConfigError):
+    """Another run of the same name begins in the same ROS domain."""
+
+
+def refuse_twins(node: Node, namespace: str, names: Collection[str]) -> None:
+    """Refuse a run beside another one of its name that has begun at the same time: neither plant publishes yet.
+
+    Args:
+        node: Looks at the graph.
+        namespace: Of the run, absolute.
+        names: Nodes that the message may name.
+
+    Raises:
+        TwinRunError: The plant is there twice; with every node that is.
+    """
+    found = Counter(name for name, space in node.get_node_names_and_namespaces() if space == namespace)
+    if found[PLANT] < 2:
+        return
+    twice = ", ".join(f"{namespace}/{name}" for name in names if found[name] > 1)
+    raise TwinRunError(
+        f"another run of this name goes on in ROS domain {ros_domain()}: {twice} are there twice, and two of one name "
+        "would mix. Wait for it to end, give this robot another --name, or set ROS_DOMAIN_ID to another number."
+    )
+
+
+def ros_domain() -> str:
+    """Number of the ROS domain of this process."""
+    return os.environ.get("ROS_DOMAIN_ID", "") or "0"
 
 
 def _where(node: Node, namespace: str, *, spins: bool) -> str:

@@ -21,6 +21,7 @@ from fulmar_core.safety.watchdog import Watchdog
 from fulmar_core.tasks import load_task
 from fulmar_core.topics import CLOCK, DIAGNOSTICS
 from fulmar_ros.air_bearing import AirBearingWires
+from fulmar_ros.lifecycle_requests import refuse_impossible_transitions
 from fulmar_ros.living_plant import BRIEFLY_S, LATE_S, others_in, refuse_living_plant
 from fulmar_ros.motion_capture import MakeCapture, capture_maker
 from fulmar_ros.node_identity import identity_of
@@ -67,6 +68,7 @@ class PlantNode(LifecycleNode):
             FulmarError: A parameter or a configuration file is wrong, or another plant of this name lives.
         """
         super().__init__("plant", cli_args=cli_args)
+        refuse_impossible_transitions(self)
         self._made_s = time.monotonic()
         self._started_ns = time.time_ns()
         self.settings = read_parameters(self, settings_class)

@@ -13,7 +13,6 @@ import numpy as np
 from fulmar_benchmarks.falcon.published import BESIDE
 from fulmar_core.controllers.classical import FLIGHT_LAWS, gains_of
 from fulmar_core.controllers.controller import Controller
-from fulmar_core.controllers.flight_mppi import FlightMppi
 from fulmar_core.disturbances.parts import Air, Sensing
 from fulmar_core.disturbances.scenario import Scenario
 from fulmar_core.flight.turbulence import CLASSES
@@ -26,7 +25,8 @@ from policy_server.controllers import Choice, load_controller, usual_hz
 
 TASKS = ("hold", *PATHS)
 CONTROLLERS = ("lqi", "lqr", "mppi", "pid", "policy")
-RANDOM = ("mppi",)  # controllers that draw: flights with exact state differ by their seeds
+# Controllers that draw: flights with exact state differ by their seeds.
+RANDOM = tuple(name for name, entry in FLIGHT_LAWS.items() if entry.draws)
 LATE_S = 0.02  # delay of measurements in `delay` and `all`
 NOISY = 2.0  # times the noise of the sensors: the mild row of FALCON-S
 SETTLED_M = 0.1  # a flight has settled once it stays so near to its reference
@@ -79,7 +79,7 @@ def controller_of(robot: Robot, cell: Cell) -> Controller:
     if cell.scenario == "exact":
         gains = replace(gains, observer=None)
     law = FLIGHT_LAWS[cell.controller].law(robot, task, gains, name=cell.controller)
-    if isinstance(law, FlightMppi):
+    if cell.controller in RANDOM:
         law.seeds = tuple(range(cell.seed, cell.seed + cell.episodes))
     return law
 

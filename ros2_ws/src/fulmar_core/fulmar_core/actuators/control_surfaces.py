@@ -23,6 +23,12 @@ from fulmar_core.plausible_ranges import BODY, Plausible, edge_inertia
 from fulmar_core.rotation import Array
 
 Vector3 = tuple[float, float, float]
+THROTTLE = "throttle"  # how the names of motors begin
+
+
+def is_throttle(name: str) -> bool:
+    """Whether the name of an actuator is that of a motor, and not of a surface."""
+    return name.startswith(THROTTLE)
 
 
 @dataclass(frozen=True)
@@ -51,9 +57,9 @@ class Motor:
     rotation: Literal[1, -1] = 1  # 1: clockwise, seen from behind
 
     def __post_init__(self) -> None:
-        if not self.name.startswith("throttle"):
+        if not is_throttle(self.name):
             raise ValueError(
-                f"motor '{self.name}': its name must begin with 'throttle', as in throttle_left."
+                f"motor '{self.name}': its name must begin with '{THROTTLE}', as in throttle_left."
             )
         if self.lag_s < 0.0:
             raise ValueError(f"motor '{self.name}': 'lag_s' must not be negative.")

@@ -74,6 +74,7 @@ class Entry:
     tasks: tuple[str, ...]  # kinds that it does
     defaults: Callable[[Robot], Any] | None = None  # gains of a robot without a YAML; None: it needs one
     others: Mapping[str, type[Law]] = field(default_factory=dict)  # by kinds of tasks, in the place of `law`
+    draws: bool = False  # noise, by the field `seed` of its gains; see `Law.seeds`
 
     def law_of(self, task: Task) -> type[Law]:
         """The class that does a task."""
@@ -111,7 +112,7 @@ ATTITUDE_LAWS = {
 FLIGHT_LAWS = {
     "lqi": Entry(FlightLqi, FlightWeights, FLIGHTS, flight_lqi_weights, dict.fromkeys(HOLDS, FlightHold)),
     "lqr": Entry(FlightLqr, FlightWeights, FLIGHTS, flight_lqr_weights, dict.fromkeys(HOLDS, FlightHoldLqr)),
-    "mppi": Entry(FlightMppi, MppiSettings, ("follow_reference",), mppi_settings),
+    "mppi": Entry(FlightMppi, MppiSettings, ("follow_reference",), mppi_settings, draws=True),
     "pid": Entry(FlightPid, FlightPidGains, ("follow_reference",), flight_pid_gains),
 }
 FLYING_FAMILIES = tuple(kind for kind, each in FAMILIES.items() if each.flies)
@@ -252,7 +253,7 @@ def load_classical(
     check_pair(robot, task, law=law)
     entry = entry_of(robot, law)
     gains = gains_of(robot, law)
-    if seed and isinstance(gains, MppiSettings):
+    if seed and entry.draws:
         gains = replace(gains, seed=gains.seed + seed)
     try:
         return entry.law_of(task)(robot, task, gains, control_hz=control_hz, name=law or "classical")

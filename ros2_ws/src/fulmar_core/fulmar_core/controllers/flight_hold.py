@@ -13,14 +13,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fulmar_core.actuators.control_surfaces import ControlSurfaces
 from fulmar_core.attitude import Quaternion, euler_of, length, scaled, turn, turn_back
 from fulmar_core.controllers.controller import Inputs
-from fulmar_core.controllers.flight_lqi import FlightLqi
-from fulmar_core.controllers.flight_observer import FlightObserver
+from fulmar_core.controllers.flight_law import FlightLaw
+from fulmar_core.controllers.flight_lqi import FlightWeights
+from fulmar_core.controllers.flight_servos import FlightServos
 from fulmar_core.controllers.lqr import regulator
 from fulmar_core.dynamics.hydrodynamics import GRAVITY
-from fulmar_core.flight.schedule import PLACE, SPEED, TURNED, flight_model
+from fulmar_core.flight.schedule import PLACE, SPEED, TURNED, between, flight_model
 from fulmar_core.flight.trim import Trim, find_trim
 from fulmar_core.spatial import SpatialState, quat_of
 from fulmar_core.tasks.flight_terms import angle_of_attack, tilt_error, up_in_body
@@ -32,7 +32,7 @@ BODY_VELOCITY, BODY_RATE = slice(2, 5), slice(5, 8)
 
 
 @dataclass(frozen=True)
-class Aim:
+class Held:
     """What n craft shall hold."""
 
     quat: Quaternion  # each (n,); the heading does not count
@@ -40,26 +40,24 @@ class Aim:
     climb: np.ndarray  # (n,) sine of the path's angle
 
 
-class FlightHold(FlightLqi):
-    """Holds attitude or airspeed; integral action where the weights of places have any."""
+class FlightHold(FlightLaw):
+    """Holds attitude or airspeed; integral action where the weights of places and those of angles have any."""
 
+    law = "lqi"
     title = "LQI of aircraft that holds attitude or airspeed"
+
+    gains: FlightWeights
 
     def bind(self) -> None:
         """See `Law.bind`."""
-        if not isinstance(self.robot.actuators, ControlSurfaces) or self.robot.airframe is None:
-            raise ValueError("the law flies aircraft; this robot is none.")
+        self.fly()
         if not isinstance(self.task, HoldAttitude | HoldAirspeed):
             raise ValueError(f"the law holds attitude or airspeed, and '{self.task.name}' is about neither.")
-        self._craft, self._holds_climb = self.robot.actuators, isinstance(self.task, HoldAirspeed)
-        self._speed = self.robot.airframe.speed
+        self._holds_climb = isinstance(self.task, HoldAirspeed)
         low, high = self.task.speed if isinstance(self.task, HoldAirspeed) else (1.0, 1.0)
         self._speeds = self._speed * np.linspace(low, high, SPEEDS if high > low else 1)
-        self._dt = self.robot.timing.substeps(self.control_hz) * self.robot.timing.physics_dt
-        noise = self.gains.observer
-        self._observer = (
-            None if noise is None else FlightObserver(self.robot, noise, self._dt, any_heading=True)
-        )
+        self.believe(self.gains.observer, any_heading=True)
+        self._servos = FlightServos(self._craft, self._dt)
 
     def prepare(self) -> None:
         """Solve for the gains at every speed."""
@@ -72,10 +70,9 @@ class FlightHold(FlightLqi):
 
     def reset(self) -> None:
         """Forget the past."""
-        self._servos: np.ndarray | None = None
+        super().reset()
+        self._servos.reset()
         self._sums: np.ndarray | None = None
-        if self._observer is not None:
-            self._observer.reset()
 
     def _gain_at(self, trim: Trim) -> np.ndarray:
         """Gain over the reduced state and the three integrals, shape (m, n + 3)."""
@@ -105,47 +102,28 @@ class FlightHold(FlightLqi):
 
     def _between(self, values: np.ndarray, speed: np.ndarray) -> np.ndarray:
         """Values at the solved speeds, at other ones, shape (n, ...)."""
-        last = len(self._speeds) - 1
-        if last == 0:
-            return np.repeat(values, len(speed), axis=0)
-        at = np.interp(speed, self._speeds, np.arange(last + 1))
-        low = np.clip(np.floor(at).astype(int), 0, last - 1)
-        share = (at - low).reshape(-1, *(1,) * (values.ndim - 1))
-        return np.asarray((1.0 - share) * values[low] + share * values[low + 1])
+        return between(values, self._speeds, speed)
 
-    def _aim(self, inputs: Inputs) -> Aim:
+    def _aim(self, inputs: Inputs) -> Held:
         """What the goals ask for; speeds that the task does not have count as its nearest."""
         target = np.asarray(inputs.goal.current, dtype=float)
         if self._holds_climb:
             speed = np.clip(target[:, 0], self._speeds[0], self._speeds[-1])
             quats = self._between(self._quats, speed)
             quats /= np.linalg.norm(quats, axis=-1, keepdims=True)
-            return Aim(quat_of_rows(quats), speed, 0.0 * speed)
+            return Held(quat_of_rows(quats), speed, 0.0 * speed)
         quat = quat_of(target)
         level = euler_of(quat_of_rows(self._quats[:1]))[1]
-        return Aim(quat, np.full(len(target), self._speed), np.sin(level - euler_of(quat)[1]))
+        return Held(quat, np.full(len(target), self._speed), np.sin(level - euler_of(quat)[1]))
 
     def command(self, inputs: Inputs) -> np.ndarray:
         """Choose commands; shapes as in `Controller.act`."""
-        state, aim = inputs.state, self._aim(inputs)
-        assert isinstance(state, SpatialState)
-        if self._observer is not None:
-            state = self._observer.update(state, inputs)
-        count, surfaces = len(aim.speed), self._craft.positions
-        if self._servos is None or len(self._servos) != count:
-            self._servos = np.concatenate((inputs.previous, np.zeros((count, surfaces))), axis=-1)
-            self._sums = np.zeros((count, 3))
-        else:
-            self._servos = self._followed(self._servos, inputs.previous)
-        assert self._sums is not None
+        aim, state, servos = self._aim(inputs), self.believed(inputs), self._servos.after(inputs.previous)
+        if self._sums is None or len(self._sums) != len(servos):
+            self._sums = np.zeros((len(servos), 3))
         motion, held, free = self._motion_from(state, aim)
         trim = self._trim_at(aim)
-        ends = self._servos.shape[-1] - surfaces
-        off = np.concatenate(
-            (self._servos[:, :surfaces] - trim[:, :surfaces], self._servos[:, ends:]), axis=-1
-        )
-        levels = self._servos[:, surfaces:ends] - trim[:, surfaces:]
-        x = np.concatenate((motion, off, levels), axis=-1)
+        x = np.concatenate((motion, self._servos.departures(servos, trim)), axis=-1)
         if self._integrates:
             x = np.concatenate((x, self._sums), axis=-1)
         wanted = np.asarray(trim - np.einsum("nij,nj->ni", self._between(self._solved, aim.speed), x))
@@ -154,7 +132,7 @@ class FlightHold(FlightLqi):
             self._sums = self._sums + self._dt * np.where(free, held, 0.0)
         return wanted
 
-    def _trim_at(self, aim: Aim) -> np.ndarray:
+    def _trim_at(self, aim: Held) -> np.ndarray:
         """Commands of the trim, with the thrust that a climb takes, shape (n, m)."""
         command = np.array(self._between(self._trims, aim.speed))
         command[:, self._craft.positions :] += (
@@ -162,7 +140,7 @@ class FlightHold(FlightLqi):
         )[:, None]
         return command
 
-    def _motion_from(self, state: SpatialState, aim: Aim) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _motion_from(self, state: SpatialState, aim: Held) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Departures of the motion (n, 8), what is held (n, 3), and whether each of that counts in full (n, 3)."""
         hold = self.gains.hold
         tilt, up = tilt_error(state.quat, aim.quat), up_in_body(aim.quat)
@@ -188,7 +166,7 @@ class FlightHold(FlightLqi):
         climbs = np.abs(middle) < hold.speed_limit if self._holds_climb else small
         return motion, held, np.stack((small, climbs & small, np.abs(fast) < hold.speed_limit), axis=-1)
 
-    def _within_margin(self, pitch: np.ndarray, state: SpatialState, aim: Aim) -> np.ndarray:
+    def _within_margin(self, pitch: np.ndarray, state: SpatialState, aim: Held) -> np.ndarray:
         """Errors of the pitch as far as the angle of attack, some time ahead, leaves room for them, shape (n,) [rad].
 
         Beyond its margin the error changes its sign, and the nose goes back.

@@ -1,4 +1,4 @@
-"""What the laws of aircraft have in common: the smoothed reference, the believed state, commands of level flight."""
+"""What the laws of aircraft have in common: craft, believed state, limits that cut, and thrust of the motors."""
 
 from __future__ import annotations
 
@@ -9,35 +9,33 @@ from typing import Any
 import numpy as np
 
 from fulmar_core.actuators.control_surfaces import ControlSurfaces
-from fulmar_core.attitude import from_euler, product, rotation_error
 from fulmar_core.controllers.controller import Inputs
 from fulmar_core.controllers.flight_observer import FlightObserver, ObserverNoise
-from fulmar_core.controllers.flight_reference import Aim, SmoothReference
 from fulmar_core.controllers.law import Law
-from fulmar_core.dynamics.hydrodynamics import GRAVITY
-from fulmar_core.flight.schedule import Schedule
+from fulmar_core.flight.atmosphere import SEA_LEVEL
 from fulmar_core.spatial import SpatialState
-from fulmar_core.tasks.follow_reference import FollowReference
 
 
 class FlightLaw(Law):
-    """A law that flies an aircraft along a reference that is known ahead."""
+    """A law that flies an aircraft."""
 
-    def follow(self, *, smooth_s: float, observer: ObserverNoise | None) -> None:
-        """Prepare for robot and task; arguments as of `FlightWeights`.
+    def fly(self) -> None:
+        """Prepare for the robot; call first in `bind`.
 
         Raises:
-            ValueError: The robot is no aircraft, or the task has no reference.
+            ValueError: The robot is no aircraft.
         """
         if not isinstance(self.robot.actuators, ControlSurfaces) or self.robot.airframe is None:
             raise ValueError("the law flies aircraft; this robot is none.")
-        if not isinstance(self.task, FollowReference):
-            raise ValueError(f"the law follows references, and '{self.task.name}' has none.")
         self._craft = self.robot.actuators
         self._speed = self.robot.airframe.speed
         self._dt = self.robot.timing.substeps(self.control_hz) * self.robot.timing.physics_dt
-        self._reference = SmoothReference(self.task, over_s=smooth_s, dt=self._dt)
-        self._observer = None if observer is None else FlightObserver(self.robot, observer, self._dt)
+
+    def believe(self, noise: ObserverNoise | None, *, any_heading: bool = False) -> None:
+        """Believe states as of a `FlightObserver`, whose arguments these are, or, without noise, as measured."""
+        self._observer = (
+            None if noise is None else FlightObserver(self.robot, noise, self._dt, any_heading=any_heading)
+        )
 
     def derived(self) -> dict[str, Any]:
         """See `Law.derived`; gains and observer follow from the aerodynamics and the sensors, aims from the task."""
@@ -47,37 +45,14 @@ class FlightLaw(Law):
     def reset(self) -> None:
         """Forget the past."""
         super().reset()
-        self._reference.reset()
         if self._observer is not None:
             self._observer.reset()
 
-    def see(self, inputs: Inputs) -> tuple[Aim, SpatialState]:
-        """The aim of now and the believed state, of n craft."""
-        aim, state = self._reference.at(inputs), inputs.state
+    def believed(self, inputs: Inputs) -> SpatialState:
+        """The believed state of n craft."""
+        state = inputs.state
         assert isinstance(state, SpatialState)
-        if self._observer is not None:
-            state = self._observer.update(state, inputs)
-        return aim, state
-
-    def level(self, schedule: Schedule, aim: Aim) -> np.ndarray:
-        """Commands of level flight where n craft shall be, with the thrust that a climb takes, shape (n, m)."""
-        command = schedule.command(aim.place[:, 1])
-        thrust = self.robot.body.mass * GRAVITY * aim.rate[:, 1] / self._speed
-        command[:, self._craft.positions :] += (thrust / self.thrust_slope)[:, None]
-        return command
-
-    def motion(self, schedule: Schedule, state: SpatialState, aim: Aim) -> np.ndarray:
-        """Departures from what an aim takes, shape (n, 9): rotation [rad], velocity [m/s] and turn rate [rad/s].
-
-        A climb takes pitch, a drift heading, and a bend bank.
-        """
-        (drift, climb), bend, speed = aim.rate.T, aim.bend, self._speed
-        heading, rise, bank = np.arctan2(drift, speed), -climb / speed, -bend[:, 0] / GRAVITY
-        aimed = product(from_euler(bank, rise, heading), tuple(schedule.quat(state.z).T))
-        turned = rotation_error(aimed, state.quat)
-        velocity = state.vx - speed, state.vy - drift, state.vz - climb
-        rates = state.wx, state.wy + bend[:, 1] / speed, state.wz - bend[:, 0] / speed
-        return np.stack((*turned, *velocity, *rates), axis=-1)
+        return state if self._observer is None else self._observer.update(state, inputs)
 
     def saturated(self, command: np.ndarray) -> np.ndarray:
         """Whether limits cut commands (n, m) of ailerons, elevators and motors, shape (n, 3): integrals rest there."""
@@ -90,8 +65,8 @@ class FlightLaw(Law):
 
     @functools.cached_property
     def thrust_slope(self) -> float:
-        """Thrust of all motors per throttle at the cruising speed [N]."""
-        at, density = np.array([self._speed]), np.array([1.225])
+        """Thrust of all motors per throttle at the cruising speed and sea level [N]."""
+        at, density = np.array([self._speed]), np.array([SEA_LEVEL])
         total = 0.0
         for motor in self._craft.motors:
             low, high = (float(motor.engine.thrust_at(np.array([t]), at, density)[0]) for t in (0.3, 0.5))

@@ -7,15 +7,15 @@ climb rate, heading for a drift, bank for a bend (thesis §5.5.2 has the LQR; th
 
 from __future__ import annotations
 
-import functools
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from fulmar_core.controllers.controller import Inputs
-from fulmar_core.controllers.flight_law import FlightLaw
+from fulmar_core.controllers.flight_following import FlightFollowing
 from fulmar_core.controllers.flight_observer import ObserverNoise
 from fulmar_core.controllers.flight_reference import Aim
+from fulmar_core.controllers.flight_servos import FlightServos
 from fulmar_core.controllers.lqr import regulator
 from fulmar_core.flight.schedule import FlightModel, Schedule
 from fulmar_core.robot import Robot
@@ -76,7 +76,7 @@ class FlightWeights:
             raise ValueError("weights must not be negative.")
 
 
-class FlightLqi(FlightLaw):
+class FlightLqi(FlightFollowing):
     """Linear-quadratic regulator of an aircraft, with integral action where the weights have any."""
 
     law = "lqi"
@@ -87,6 +87,7 @@ class FlightLqi(FlightLaw):
     def bind(self) -> None:
         """See `Law.bind`."""
         self.follow(smooth_s=self.gains.smooth_s, observer=self.gains.observer)
+        self._servos = FlightServos(self._craft, self._dt)
 
     def prepare(self) -> None:
         """Solve for the gains at every height."""
@@ -109,7 +110,7 @@ class FlightLqi(FlightLaw):
     def reset(self) -> None:
         """Forget the past."""
         super().reset()
-        self._servos: np.ndarray | None = None
+        self._servos.reset()
         self._sums: np.ndarray | None = None
 
     def command(self, inputs: Inputs) -> np.ndarray:
@@ -120,13 +121,9 @@ class FlightLqi(FlightLaw):
     def servos_after(self, inputs: Inputs) -> np.ndarray:
         """Deflections and thrust levels, then rates of the servos, as of the commands that were sent, shape (n, k)."""
         count = len(inputs.previous)
-        if self._servos is None or len(self._servos) != count:
-            still = np.zeros((count, self._craft.positions))
-            self._servos = np.concatenate((inputs.previous, still), axis=-1)
+        if self._sums is None or len(self._sums) != count:
             self._sums = np.zeros((count, 2))
-        else:
-            self._servos = self._followed(self._servos, inputs.previous)
-        return self._servos
+        return self._servos.after(inputs.previous)
 
     def answer(self, state: SpatialState, aim: Aim, servos: np.ndarray) -> np.ndarray:
         """Commands for n craft, before the actuators' limits, shape (n, m).
@@ -171,35 +168,8 @@ class FlightLqi(FlightLaw):
         """Departures from level flight along an aim, those of the place cut, shape (n, k)."""
         limit = self.gains.error_limit
         off = np.clip(np.stack((state.y, state.z), axis=-1) - aim.place, -limit, limit)
-        parts = off, self.motion(self.schedule, state, aim), self._actuators(servos, level)
+        parts = off, self.motion(self.schedule, state, aim), self._servos.departures(servos, level)
         return np.concatenate(parts, axis=-1)
-
-    def _actuators(self, servos: np.ndarray, level: np.ndarray) -> np.ndarray:
-        """Departures of deflections, their rates, and levels, shape (n, k); servos as of `servos_after`."""
-        surfaces, motors = self._craft.positions, len(self._craft.motors)
-        places = servos[:, :surfaces] - level[:, :surfaces]
-        levels = servos[:, surfaces : surfaces + motors] - level[:, surfaces:]
-        return np.concatenate((places, servos[:, surfaces + motors :], levels), axis=-1)
-
-    @functools.cached_property
-    def _servo_matrix(self) -> np.ndarray:
-        """How a servo goes on in a control step, shape (2, 2)."""
-        return self._craft.servo_matrix(self._dt)
-
-    def _followed(self, servos: np.ndarray, command: np.ndarray) -> np.ndarray:
-        """Where servos and motors are a control step after a command, shape (n, m + surfaces)."""
-        surfaces, motors = self._craft.positions, len(self._craft.motors)
-        matrix = self._servo_matrix
-        off = servos[:, :surfaces] - command[:, :surfaces]
-        rates = servos[:, surfaces + motors :]
-        places = command[:, :surfaces] + matrix[0, 0] * off + matrix[0, 1] * rates
-        keep = np.array(
-            [np.exp(-self._dt / motor.lag_s) if motor.lag_s else 0.0 for motor in self._craft.motors]
-        )
-        levels = command[:, surfaces:] + keep * (
-            servos[:, surfaces : surfaces + motors] - command[:, surfaces:]
-        )
-        return np.concatenate((places, levels, matrix[1, 0] * off + matrix[1, 1] * rates), axis=-1)
 
 
 class FlightLqr(FlightLqi):
@@ -210,7 +180,7 @@ class FlightLqr(FlightLqi):
 
 
 def flight_lqi_weights(robot: Robot) -> FlightWeights:
-    """Weights of an aircraft without a file: those of airship_v7, in proportion to its size and speed."""
+    """Weights of an aircraft without a file: those of airship_v7, of the place in proportion to the span."""
     assert robot.airframe is not None
     size = robot.airframe.span / 5.0
     noise = ObserverNoise() if robot.sensors.odometry.position.std > 0.0 else None

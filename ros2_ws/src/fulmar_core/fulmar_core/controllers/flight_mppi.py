@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from fulmar_core.controllers.controller import Inputs
-from fulmar_core.controllers.flight_law import FlightLaw
+from fulmar_core.controllers.flight_following import FlightFollowing
 from fulmar_core.controllers.flight_lqi import FlightLqr, FlightWeights, flight_lqr_weights
 from fulmar_core.controllers.flight_observer import ObserverNoise
 from fulmar_core.controllers.flight_rollouts import FlightCost, FlightRollouts
@@ -34,7 +34,7 @@ class MppiSettings:
     noise: tuple[float, ...]  # standard deviation of each command, as a share of its largest one [-]
     cost: FlightCost = field(default_factory=FlightCost)
     feedback: float = 1.0  # share of the LQR's answer that flights follow; 0: level flight alone [-]
-    rollouts: int = 128  # flights of each plan, an even number
+    rollouts: int = 128  # flights of each plan in pairs of opposite noise; one more goes without any
     horizon_s: float = 1.2  # how far flights go [s]
     step_s: float = 0.04  # of them [s]
     plan_hz: float = 25.0  # plans a second of the robot's own time
@@ -62,18 +62,13 @@ class MppiSettings:
             raise ValueError(f"seed = {self.seed} must not be negative.")
 
 
-class FlightMppi(FlightLaw):
-    """Model-predictive path integral control of an aircraft.
-
-    Attributes:
-        seeds: Of the noise, in turns among craft side by side; by default one, so that each flies as it would alone.
-    """
+class FlightMppi(FlightFollowing):
+    """Model-predictive path integral control of an aircraft; its one seed lets each craft fly as it would alone."""
 
     law = "mppi"
     title = "MPPI of aircraft"
 
     gains: MppiSettings
-    seeds: tuple[int, ...] = ()
 
     def bind(self) -> None:
         """See `Law.bind`."""
@@ -151,12 +146,11 @@ class FlightMppi(FlightLaw):
         return np.asarray(plan + np.einsum("nk,nkjm->njm", weight, noise))
 
     def _noise(self, count: int) -> np.ndarray:
-        """Noise of the knots in pairs of opposite sign, but for a flight without any, shape (n, flights, knots, m)."""
+        """Noise of the knots: none, then pairs of opposite sign, shape (n, 1 + rollouts, knots, m)."""
         shape = self.gains.rollouts // 2, self._knots, len(self._sigma)
         drawn = np.stack([draws.standard_normal(shape) for draws in self._draws])
-        both = self._sigma * np.concatenate((drawn, -drawn), axis=1)
-        both[:, 0] = 0.0
-        return np.asarray(both[np.arange(count) % len(both)])
+        noise = self._sigma * np.concatenate((np.zeros_like(drawn[:, :1]), drawn, -drawn), axis=1)
+        return np.asarray(noise[np.arange(count) % len(noise)])
 
     def derived(self) -> dict[str, Any]:
         """What else the commands depend on."""

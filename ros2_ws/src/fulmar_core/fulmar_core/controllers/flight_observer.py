@@ -1,7 +1,8 @@
 """Kalman filter of an aircraft on its own model: what it measures, less the noise.
 
 The prediction is the craft's own dynamics in still air under the commands that were sent; the gain is the steady one of
-the linear model at cruise (Kwakernaak and Sivan, Linear Optimal Control Systems, 1972, §6.4).
+the linear model at cruise, half a span above the ground (Kwakernaak and Sivan, Linear Optimal Control Systems, 1972,
+§6.4).
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fulmar_core.controllers.controller import Inputs
-from fulmar_core.controllers.flight_law import FlightLaw
+from fulmar_core.controllers.flight_following import FlightFollowing
 from fulmar_core.controllers.flight_observer import ObserverNoise
 from fulmar_core.dynamics.hydrodynamics import GRAVITY
 from fulmar_core.flight.schedule import Schedule
@@ -98,7 +98,7 @@ def _within(angle: np.ndarray, most_deg: float) -> np.ndarray:
     return np.asarray(np.clip(angle, -most, most))
 
 
-class FlightPid(FlightLaw):
+class FlightPid(FlightFollowing):
     """Cascaded PID of an aircraft."""
 
     law = "pid"

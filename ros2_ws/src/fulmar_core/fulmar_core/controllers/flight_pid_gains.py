@@ -49,7 +49,7 @@ class _Loops:
 
     def __init__(self, robot: Robot) -> None:
         craft, frame = robot.actuators, robot.airframe
-        assert isinstance(craft, ControlSurfaces) and frame is not None  # as of `FlightLaw.follow`
+        assert isinstance(craft, ControlSurfaces) and frame is not None  # as of `FlightLaw.fly`
         self._robot, self._craft, self._frame = robot, craft, frame
         trim = find_trim(robot, frame.speed, 0.5 * frame.span)
         self._rates, self._effects = continuous_model(robot, trim)

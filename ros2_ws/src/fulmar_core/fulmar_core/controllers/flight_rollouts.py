@@ -32,9 +32,9 @@ class FlightCost:
     side: float = 1000.0  # per m
     turning: float = 300.0  # per rad/s of the three turn rates together
     speed: float = 450.0  # per m/s away from the cruising speed
-    sideslip: float = 5.0  # times e^(2 |sideslip in degrees|) - 1
-    lost: float = 1e9  # in the water, or beyond `alpha_deg` either way
-    alpha_deg: float | None = None  # angles of attack beyond count as lost; None: of `loss_angle` [deg]
+    sideslip: float = 5.0  # times e^(2 |sideslip in degrees|) - 1, of 10° at most
+    lost: float = 1e9  # in the water, or at an angle of attack beyond `alpha_deg`
+    alpha_deg: float | None = None  # either way; None: beyond those of `loss_angles` [deg]
 
     def __post_init__(self) -> None:
         if min(self.height, self.side, self.turning, self.speed, self.sideslip, self.lost) < 0.0:
@@ -58,13 +58,14 @@ class FlightRollouts:
             step_s: Time step [s].
             share: Of the law's answer to departures that they follow; 0: commands of level flight alone [-].
         """
-        assert robot.airframe is not None  # as of `FlightLaw.follow`
+        assert robot.airframe is not None  # as of `FlightLaw.fly`
         timing = replace(robot.timing, physics_dt=step_s, control_hz=1.0 / step_s)
         self._robot = replace(robot, timing=timing)
         self._dynamics = FlightDynamics(self._robot, turbulent=False)
         self._law, self._cost, self._dt, self._share = law, cost, step_s, share
         self._speed, self._lowest = robot.airframe.speed, -robot.hull_span[0]
-        self._most_deg = loss_angle(robot) if cost.alpha_deg is None else cost.alpha_deg
+        most = cost.alpha_deg
+        self._alphas_deg = loss_angles(robot) if most is None else (-most, most)
         self._world: Any = still_air(self._robot, 1)
 
     def fly(
@@ -117,7 +118,8 @@ class FlightRollouts:
         cost += c.turning * _sum_of_sizes(state.rate) + c.speed * np.abs(speed - self._speed)
         cost += c.sideslip * np.expm1(np.minimum(2.0 * slip, 20.0))
         # The dynamics stop a craft in the water where it was before it touched it.
-        lost = (state.z <= self._lowest) | (speed == 0.0) | (np.abs(alpha) > self._most_deg)
+        low, high = self._alphas_deg
+        lost = (state.z <= self._lowest) | (speed == 0.0) | (alpha < low) | (alpha > high)
         return np.where(np.isfinite(cost), cost + c.lost * lost, WORST)
 
 
@@ -125,11 +127,14 @@ def _sum_of_sizes(parts: tuple[Array, ...]) -> np.ndarray:
     return np.asarray(sum(np.abs(part) for part in parts))
 
 
-def loss_angle(robot: Robot) -> float:
-    """Angle of attack that flights avoid: the end of what the coefficients are for, or most of the stall's [deg]."""
+def loss_angles(robot: Robot) -> tuple[float, float]:
+    """Smallest and largest angle of attack that flights stay between [deg].
+
+    They are the ends of what the coefficients are for, where these lie within most of the stall angle either way.
+    """
     assert robot.airframe is not None
     coefficients, stall = robot.airframe.aerodynamics, 0.75 * robot.airframe.stall_deg
     if coefficients.alpha_range is None:
-        return stall
-    end = coefficients.alpha_range[1]
-    return min(end if coefficients.unit == "deg" else math.degrees(end), stall)
+        return -stall, stall
+    low, high = (end if coefficients.unit == "deg" else math.degrees(end) for end in coefficients.alpha_range)
+    return max(low, -stall), min(high, stall)

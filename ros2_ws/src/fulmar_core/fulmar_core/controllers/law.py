@@ -22,10 +22,13 @@ class Law(ABC):
 
     Attributes:
         estimator: See `Controller`.
+        seeds: Of the noise of a law that draws any, in turns among craft side by side.
     """
 
     law: ClassVar[str]  # the end of its gains' file name
     title: ClassVar[str]  # for lists
+
+    seeds: tuple[int, ...] = ()
 
     def __init__(
         self,

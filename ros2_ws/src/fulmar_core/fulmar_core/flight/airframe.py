@@ -14,7 +14,7 @@ from typing import Literal
 
 from fulmar_core.arrays import array_namespace, clip
 from fulmar_core.attitude import Vector
-from fulmar_core.flight.coefficients import Coefficients
+from fulmar_core.flight.coefficients import ALPHADOT, Coefficients
 from fulmar_core.flight.ground_effect import GroundEffect, near_ground
 from fulmar_core.rotation import Array
 
@@ -70,7 +70,7 @@ class Airframe:
         found = {}
         for name, terms in self.aerodynamics.parsed.items():
             for number, factors in terms:
-                if factors == (("alphadot", 1),):
+                if factors == ((ALPHADOT, 1),):
                     found[name] = number
         return found
 

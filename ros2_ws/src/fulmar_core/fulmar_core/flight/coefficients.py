@@ -1,8 +1,8 @@
 """Aerodynamic coefficients as sums of terms: derivative sets, polynomials and look-up tables are one form.
 
 A file names each term by its factors, such as `1`, `alpha`, `alpha^2 elevator` or `q`. Angles are in the file's unit;
-`p`, `q`, `r` and `alphadot` are dimensionless: p b / 2V, q c / 2V, r b / 2V and α̇ c / 2V. Axes are those of flight
-mechanics: x ahead, y right, z down; lift and drag are along the wind's.
+`p`, `q`, `r` and `alphadot` are dimensionless: p b / 2V, q c / 2V, r b / 2V and α̇ c / 2V; `alphadot` is the one factor
+of its terms. Axes are those of flight mechanics: x ahead, y right, z down; lift and drag are along the wind's.
 """
 
 from __future__ import annotations
@@ -12,14 +12,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-from fulmar_core.arrays import array_namespace, clip
+from fulmar_core.arrays import clip
 from fulmar_core.errors import did_you_mean
 from fulmar_core.rotation import Array
 
 NAMES = ("CL", "CD", "CY", "Cl", "Cm", "Cn")
 SURFACES = ("elevator", "aileron", "rudder")
 ANGLES = ("alpha", "beta", *SURFACES)
-RATES = ("p", "q", "r", "alphadot")
+ALPHADOT = "alphadot"
+RATES = ("p", "q", "r", ALPHADOT)
 FACTORS = (*ANGLES, *RATES)
 Term = tuple[float, tuple[tuple[str, int], ...]]  # number, and powers of factors
 Flow = Mapping[str, Array]  # factors by name: angles [rad], rates dimensionless, shapes (...,)
@@ -89,13 +90,6 @@ class Coefficients:
         """Terms of each coefficient, angles in the file's unit and the source's signs."""
         return self._parsed  # type: ignore[attr-defined, no-any-return]
 
-    @property
-    def uses_alphadot(self) -> bool:
-        """Whether any coefficient depends on how fast the angle of attack changes."""
-        return any(
-            name == "alphadot" for each in self.parsed.values() for _, powers in each for name, _ in powers
-        )
-
     def scaled_flow(self, flow: Flow) -> dict[str, Array]:
         """Factors in the file's unit, signs and origin; those that are missing count as 0."""
         per = math.degrees(1.0) if self.unit == "deg" else 1.0
@@ -163,7 +157,7 @@ def _powers(words: str) -> tuple[tuple[str, int], ...]:
     """Factors of a term such as `alpha^2 elevator`; none for `1`.
 
     Raises:
-        ValueError: A factor is not known, or its power is no whole number of 1 or more.
+        ValueError: A factor is not known, its power is no whole number of 1 or more, or one goes with `alphadot`.
     """
     found: dict[str, int] = {}
     for word in () if words.strip() == "1" else words.split():
@@ -176,10 +170,6 @@ def _powers(words: str) -> tuple[tuple[str, int], ...]:
         if hat and (not power.isdigit() or int(power) < 1):
             raise ValueError(f"the term '{words}': a power must be a whole number of 1 or more.")
         found[name] = found.get(name, 0) + (int(power) if hat else 1)
+    if ALPHADOT in found and found != {ALPHADOT: 1}:
+        raise ValueError(f"the term '{words}': '{ALPHADOT}' stands alone, since its terms are solved for.")
     return tuple(found.items())
-
-
-def zero_flow(like: Array) -> dict[str, Array]:
-    """Every factor as 0, shapes of `like`."""
-    zero = array_namespace(like).zeros_like(like)
-    return dict.fromkeys(FACTORS, zero)

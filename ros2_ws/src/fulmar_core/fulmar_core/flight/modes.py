@@ -95,7 +95,7 @@ def _longitudinal(values: list[complex]) -> list[Mode]:
 
 
 def _lateral(values: list[complex]) -> list[Mode]:
-    """A pair is the Dutch roll; of real ones the fastest is the roll, the slowest the spiral."""
+    """The faster pair is the Dutch roll, a second one roll and spiral; of real ones the fastest is the roll."""
     pairs = [value for value in values if value.imag]
     reals = [value for value in values if not value.imag]
     found = [Mode("roll" if i == 0 else "spiral", value.real, 0.0) for i, value in enumerate(reals)]

@@ -15,7 +15,7 @@ from fulmar_core.robot import Robot
 
 # Where trims are solved, of the span; from the last one on it is nearly free air [-].
 HEIGHTS = (0.12, 0.2, 0.3, 0.5, 0.8, 1.2, 2.0, 3.0)
-MOTION = 11  # states of the motion: y, z, rotation vector, velocity and turn rate, three each
+MOTION = 11  # states of the motion: y and z; rotation vector, velocity and turn rate, three each
 PLACE, TURNED, SPEED, RATE = slice(0, 2), slice(2, 5), slice(5, 8), slice(8, 11)
 
 
@@ -88,16 +88,8 @@ class Schedule:
             [np.array([float(part) for part in model.trim.state.quat]) for model in models]
         )
 
-    def _weights(self, height: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        inside = np.clip(height, self.heights[0], self.heights[-1])
-        low = np.clip(np.searchsorted(self.heights, inside, side="right") - 1, 0, len(self.heights) - 2)
-        share = (inside - self.heights[low]) / (self.heights[low + 1] - self.heights[low])
-        return low, share
-
     def _between(self, values: np.ndarray, height: np.ndarray) -> np.ndarray:
-        low, share = self._weights(height)
-        share = share.reshape(-1, *(1,) * (values.ndim - 1))
-        return np.asarray((1.0 - share) * values[low] + share * values[low + 1])
+        return between(values, self.heights, height)
 
     def array(self, height: np.ndarray) -> np.ndarray:
         """What was computed, at heights (n,), shape (n, ...)."""
@@ -111,3 +103,14 @@ class Schedule:
         """Attitudes of the trims at heights, shape (n, 4)."""
         found = self._between(self._quats, height)
         return np.asarray(found / np.linalg.norm(found, axis=-1, keepdims=True))
+
+
+def between(values: np.ndarray, places: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Values at ascending places, at other ones (n,): linear between them, held beyond, shape (n, ...)."""
+    if len(places) == 1:
+        return np.repeat(values, len(at), axis=0)
+    inside = np.clip(at, places[0], places[-1])
+    low = np.clip(np.searchsorted(places, inside, side="right") - 1, 0, len(places) - 2)
+    share = (inside - places[low]) / (places[low + 1] - places[low])
+    share = share.reshape(-1, *(1,) * (values.ndim - 1))
+    return np.asarray((1.0 - share) * values[low] + share * values[low + 1])

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from fulmar_core.actuators.control_surfaces import is_throttle
 from fulmar_core.plausible_ranges import Plausible
 from fulmar_core.sensors.joints import JointSensors, JointSpec
 from fulmar_core.sensors.kind import MessageFields, SensorKind, Truth
@@ -40,7 +41,7 @@ class ServoSensors(JointSensors):
         if truth.surfaces is None or not self._sampling.is_due(time_s):
             return None
         true = truth.surfaces
-        turned = np.array([not name.startswith("throttle") for name in true.names])
+        turned = np.array([not is_throttle(name) for name in true.names])
         positions, covariance = self.with_errors(true.positions, turned)
         return Reading(SurfacePositions(true.names, positions), covariance=covariance)
 

@@ -42,10 +42,10 @@ FINE_RAD, FINE_SPEED = 0.1, 0.5  # where magnified errors saturate [rad, m/s]
 
 @dataclass(frozen=True)
 class HoldStart:
-    """How episodes begin: at cruising speed along the craft's own nose, at an attitude so far from level."""
+    """How episodes begin: in level flight at cruising speed, turned, with the velocity, so far about any axis."""
 
     height: Range  # above the ground [m]
-    tilt_deg: Range = (0.0, 0.0)  # turned about any axis from the attitude of level flight [deg]
+    tilt_deg: Range = (0.0, 0.0)  # from level flight [deg]
 
     def __post_init__(self) -> None:
         for name in ("height", "tilt_deg"):

@@ -15,10 +15,10 @@ import numpy as np
 
 from fulmar_core.dynamics.hydrodynamics import GRAVITY
 from fulmar_core.errors import ConfigError
+from fulmar_core.flight.atmosphere import SEA_LEVEL
 from fulmar_evaluation.new_airframe.geometry import Geometry
 
 SCRIPT = Path(__file__).with_name("vortex_lattice.py")
-DENSITY = 1.225  # of the air at sea level [kg/m³]
 ALPHAS_DEG = (-3.0, -1.0, 1.0, 3.0, 5.0)  # over which lift, drag and pitching moment are fitted
 STEP_DEG, STEP_RATE = 1.0, 0.02  # of angles [deg], and of dimensionless rates
 LONGEST_S = 300.0  # of a run of the lattice [s]
@@ -40,7 +40,7 @@ def coefficient_set(geometry: Geometry, python: Path) -> Terms:
     alphas = np.deg2rad(ALPHAS_DEG)
     fits = {name: np.polynomial.polynomial.polyfit(alphas, sweep[name], 1) for name in ("CL", "Cm")}
     drag = np.polynomial.polynomial.polyfit(alphas, sweep["CD"], 2)
-    wanted = geometry.mass * GRAVITY / (0.5 * DENSITY * geometry.speed**2 * geometry.wing.area)
+    wanted = geometry.mass * GRAVITY / (0.5 * SEA_LEVEL * geometry.speed**2 * geometry.wing.area)
     cruise = float(np.rad2deg((wanted - fits["CL"][0]) / fits["CL"][1]))
     moves = {
         "beta": {"beta": STEP_DEG}, "elevator": {"elevator": STEP_DEG}, "aileron": {"aileron": STEP_DEG},
@@ -92,7 +92,7 @@ def _loads(geometry: Geometry, python: Path, states: list[dict[str, Any]]) -> di
     """Coefficients of some states, each of shape (states,)."""
     job = {
         "speed": geometry.speed,
-        "density": DENSITY,
+        "density": SEA_LEVEL,
         "cg": [0.0, 0.0, 0.0],
         "surfaces": [{"name": name, "mesh": mesh.tolist()} for name, mesh in geometry.meshes().items()],
         "states": states,
@@ -104,7 +104,7 @@ def _loads(geometry: Geometry, python: Path, states: list[dict[str, Any]]) -> di
     x, y, z = forces.T
     back = -x * ca - z * sa  # drag without sideslip
     wing = geometry.wing
-    push = 0.5 * DENSITY * geometry.speed**2 * wing.area
+    push = 0.5 * SEA_LEVEL * geometry.speed**2 * wing.area
     arms = push * np.array([wing.span, wing.mean_chord, wing.span])
     roll, pitch, yaw = (moments / arms).T
     return {

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from fulmar_core.actuators.control_surfaces import ControlSurfaces
+from fulmar_core.actuators.control_surfaces import ControlSurfaces, is_throttle
 from fulmar_core.tasks.follow_reference import FollowReference
 from fulmar_evaluation.report.run_view import View, evaluated
 from fulmar_evaluation.report.style import BODY_AXES, CONTROLLER_COLOURS, DASHED, INK, legend, quiet_grid
@@ -102,7 +102,7 @@ def draw_surfaces(rows: Sequence[Axes] | np.ndarray, run: View) -> None:
             names, values = craft.names, result.run.shares[0] * craft.scale
             time_s = result.time_s
         for number, name in enumerate(names):
-            turned = not name.startswith("throttle")
+            turned = not is_throttle(name)
             shown = np.rad2deg(values[:, number]) if turned else values[:, number]
             rows[0 if turned else 1].plot(
                 time_s, shown, color=PARTS[number % len(PARTS)], linewidth=0.9, label=name.replace("_", " ")
