@@ -14,6 +14,8 @@ from fulmar_core.robot import Robot
 from sim_nodes.jsbsim_model import STILL_PLANET, write_aircraft
 
 STEPS = 4  # of JSBSim in a physics tick
+_ERRORS_ONLY = jsbsim.DefaultLogger()
+_ERRORS_ONLY.set_min_level(jsbsim.LogLevel.FATAL)
 
 
 class JsbsimCraft(Protocol):
@@ -39,6 +41,13 @@ class JsbsimCraft(Protocol):
         ...
 
 
+def silent_model() -> jsbsim.FGFDMExec:
+    """An empty model that prints neither JSBSim's banner nor its notes: standard output is for a command's result."""
+    jsbsim.FGJSBBase().debug_lvl = 0  # of all models; the banner comes before a model's own level can be set
+    jsbsim.set_logger(_ERRORS_ONLY)
+    return jsbsim.FGFDMExec(None)
+
+
 def model_in(folder: Path, name: str, robot: Robot) -> jsbsim.FGFDMExec:
     """Load a model over a planet that does not turn.
 
@@ -52,8 +61,7 @@ def model_in(folder: Path, name: str, robot: Robot) -> jsbsim.FGFDMExec:
     """
     planet = folder / "still_planet.xml"
     planet.write_text(STILL_PLANET, encoding="utf-8")
-    model = jsbsim.FGFDMExec(None)
-    model.set_debug_level(0)
+    model = silent_model()
     model.set_aircraft_path(str(folder))
     if not (model.load_planet(str(planet), False) and model.load_model(name, True)):
         raise ConfigError(f"JSBSim cannot load the model '{name}'.")

@@ -90,3 +90,21 @@ def test_the_help_states_what_every_figure_means():
     assert all(name in text for name in FIGURES)
     assert " ".join(SUCCESS.split()[:9]) in " ".join(text.split())
     assert max(map(len, meanings(70).splitlines())) <= 70
+
+
+@pytest.mark.parametrize(
+    ("robot", "task", "way"),
+    [("airship_v7", "fly_hold", "jsbsim"), ("cessna_182", "fly_attitude", "jsbsim:c172x")],
+)
+def test_aircraft_are_evaluated_in_jsbsim_which_prints_nothing_of_its_own(robot, task, way, capfd):
+    words = f"evaluate {robot} {task} --controller lqi --through {way} --scenario ideal --episodes 1"
+    found = evaluate(f"{words} --episode-s 10")
+    assert (found["through"], found["success_rate"]) == (way, 1.0)
+    assert capfd.readouterr().out == ""
+
+
+def test_a_way_or_a_model_that_is_none_is_one_line_with_the_nearest():
+    for way, nearest in (("jsbsm", "jsbsim"), ("jsbsim:L71", "L17")):
+        words = f"evaluate navion fly_attitude --controller lqi --through {way}"
+        with pytest.raises(ConfigError, match=f"Did you mean '{nearest}'"):
+            evaluate(words)

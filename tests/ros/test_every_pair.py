@@ -39,7 +39,7 @@ from tests.spaces import robot_for, task_for
 SEED = 5
 LASTS_S = {"track_velocities": 14.0, "track_velocities_3d": 14.0}  # long enough for a second velocity
 BRIEFLY_S = 6.0  # short enough to leave no geofence and to touch no obstacle
-FLIES_S = 2.0  # of aircraft, which are commanded more often
+FLIES_S = 1.0  # of aircraft, which are commanded more often
 # A second task of a kind with other figures brings nothing new onto the wires; robots alike are in tests/conftest.py.
 ALIKE = {
     "drift_go_to_pose",

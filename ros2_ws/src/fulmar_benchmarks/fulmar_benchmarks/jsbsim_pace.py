@@ -6,10 +6,9 @@ import tempfile
 import time
 from pathlib import Path
 
-import jsbsim
-
 from fulmar_core.errors import ConfigError
 from fulmar_core.robot import Robot
+from sim_nodes.jsbsim_craft import silent_model
 from sim_nodes.jsbsim_model import FOOT, write_aircraft
 
 MILSPEC, LIGHT = 3, 3  # JSBSim's turbulence of MIL-F-8785C; a severity of 0 switches it off
@@ -34,8 +33,7 @@ class JsbsimPace:
         folder = Path(self._folder.name)
         write_aircraft(robot, folder)
         assert robot.airframe is not None  # as of `write_aircraft`
-        self._model = model = jsbsim.FGFDMExec(None)
-        model.set_debug_level(0)
+        self._model = model = silent_model()
         model.set_aircraft_path(str(folder))
         if not model.load_model(robot.name, True):
             raise ConfigError(f"JSBSim cannot load the model of '{robot.name}'.")

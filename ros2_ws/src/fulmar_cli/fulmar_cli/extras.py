@@ -62,7 +62,7 @@ def check_plan(plan: RunPlan, *, through: str = "ros") -> None:
 
     Args:
         plan: What is to run.
-        through: `ros`, or what runs it in place of nodes: `mujoco`, or `batch` for Fulmar's own dynamics.
+        through: `ros`, or what runs it in place of nodes: the plan's simulator, or `batch` for Fulmar's own dynamics.
 
     Raises:
         ConfigError: For all modules that are not installed.

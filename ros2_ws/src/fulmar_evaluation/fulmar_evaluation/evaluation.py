@@ -1,4 +1,4 @@
-"""One controller evaluated over many episodes, in one of three ways; what `evaluate` and `benchmark` share."""
+"""One controller evaluated over many episodes, in one of several ways; what `evaluate` and `benchmark` share."""
 
 from __future__ import annotations
 
@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fulmar_bringup.run_plan import RunPlan
+from fulmar_core.backend import Backend
 from fulmar_core.controllers.controller import Controller
-from fulmar_core.disturbances.scenario import load_scenario
+from fulmar_core.disturbances.scenario import Scenario, load_scenario
 from fulmar_core.episode import Episode, draw_episodes
+from fulmar_core.flight.jsbsim_models import jsbsim_model
 from fulmar_core.metrics import Trajectories, episode_metrics, successes, summarise
 from fulmar_core.path_task import evaluated_task
 from fulmar_core.robot import Robot, load_robot
@@ -23,7 +25,7 @@ from fulmar_evaluation.waypoint_score import bound_figures, has_bound, waypoint_
 if TYPE_CHECKING:
     from fulmar_evaluation.ros_evaluation import RosPool
 
-WAYS = ("batch", "mujoco", "ros")
+WAYS = ("batch", "mujoco", "ros")  # aircraft may go through `jsbsim` and `jsbsim:MODEL` too
 EPISODES, BATCH_EPISODES = 256, 4096  # by default; the second in the batch
 BOUNDED_EPISODES = 256  # whose bound `evaluate` computes by default: a boat's takes 40 ms each
 Progress = Callable[[int], None]
@@ -34,7 +36,7 @@ class Trial:
     """What to evaluate, and how."""
 
     plan: RunPlan  # robot, task, controller, rate, scenario, seed; its duration is the length of an episode
-    through: str  # one of WAYS
+    through: str  # one of WAYS, `jsbsim` or `jsbsim:MODEL`
     episodes: int
     worlds: int = WORLDS  # of a batch at once
     jobs: int = 1  # pairs of processes, through ros
@@ -105,17 +107,27 @@ def runs_of(
             progress=progress,
         )
         return
-    from sim_nodes.mujoco_backend import MujocoBackend
-
     yield roll_out_in_backends(
         trial.controller(),
-        lambda: MujocoBackend.of(robot, task, scenario),
+        _simulator(trial, robot, task, scenario),
         task,
         scenario,
         episodes=trial.episodes,
         seed=plan.seed,
         progress=progress,
     )
+
+
+def _simulator(trial: Trial, robot: Robot, task: Task, scenario: Scenario) -> Callable[[], Backend]:
+    """What builds one simulator of a trial through MuJoCo or JSBSim."""
+    if trial.through == "mujoco":
+        from sim_nodes.mujoco_backend import MujocoBackend
+
+        return lambda: MujocoBackend.of(robot, task, scenario)
+    from sim_nodes.jsbsim_backend import JsbsimBackend
+
+    model = jsbsim_model(robot, trial.through)
+    return lambda: JsbsimBackend.of(robot, task, scenario, model)
 
 
 class Tally:

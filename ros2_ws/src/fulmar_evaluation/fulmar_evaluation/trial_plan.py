@@ -19,6 +19,7 @@ from fulmar_core.disturbances.scenario import check_delays, load_scenario
 from fulmar_core.episode import episode_steps
 from fulmar_core.errors import ConfigError, UnknownNameError
 from fulmar_core.figures import FIGURES
+from fulmar_core.flight.jsbsim_models import JSBSIM, is_jsbsim
 from fulmar_core.robot import load_robot
 from fulmar_core.rollout import WORLDS
 from fulmar_core.tasks import load_task
@@ -57,7 +58,7 @@ def plan_trial(
         task: Name of the task.
         controller: Name of the controller.
         policy: Bundle.
-        through: One of `WAYS`.
+        through: One of `WAYS`, `jsbsim` or `jsbsim:MODEL`.
         episodes: Number of episodes.
         seed: Seed of the episodes.
         scenario: Name of the scenario.
@@ -72,9 +73,10 @@ def plan_trial(
         ConfigError: Unknown name or impossible value.
         BundleError: The policy is damaged or made for something else.
     """
-    if through not in WAYS:
-        raise UnknownNameError("way", through, WAYS)
-    check_names(robot, task, controller, "mujoco")
+    if through not in WAYS and not is_jsbsim(through):
+        raise UnknownNameError("way", through, (*WAYS, JSBSIM))
+    backend = through if is_jsbsim(through) else "mujoco"
+    check_names(robot, task, controller, backend)
     if controller_entry(controller).is_external:
         raise ConfigError(
             f"controller '{controller}' is a node of your own, which no evaluation can restart for each episode. "
@@ -109,7 +111,7 @@ def plan_trial(
         robot=robot,
         task=task,
         controller=controller,
-        backend="mujoco",
+        backend=backend,
         control_hz=hz,
         policy=str(policy.absolute()) if policy else "",
         scenario=scenario,

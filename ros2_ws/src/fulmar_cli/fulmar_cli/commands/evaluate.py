@@ -34,8 +34,9 @@ def evaluate(
     through: Annotated[
         str,
         option(
-            "batch|mujoco|ros",
-            "batch: the core's own dynamics. mujoco: an independent simulator. ros: the deployed nodes over DDS.",
+            "WAY",
+            "batch: the core's own dynamics. mujoco: an independent simulator. ros: the deployed nodes over DDS. "
+            "jsbsim[:MODEL]: an aircraft in JSBSim, from its own file or a model that comes with JSBSim.",
         ),
     ] = "mujoco",
     episodes: Annotated[
