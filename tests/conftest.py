@@ -39,7 +39,7 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
         metafunc.parametrize("seed_of_series", range(1, metafunc.config.getoption("seeds") + 1))
 
 
-# Robots that differ from another one by figures alone: where a test has both, they are left to `make test-all`.
+# Robots and tasks that differ from another by figures alone: where a test has both, they are left to `make test-all`.
 ALIKE = {
     "microsat": "cubesat_wheels",
     "smallsat": "cubesat_wheels",
@@ -52,11 +52,13 @@ ALIKE = {
     "skywalker_x8": "airship_v7",
     "sr22": "airship_v7",
     "floating_platform_roboran": "floating_platform",
+    **dict.fromkeys(("fly_b", "fly_c", "fly_d", "fly_e", "fly_f"), "fly_a"),
+    "fly_recover": "fly_attitude",
 }
 
 
-def robot_names(item: pytest.Item) -> dict[tuple[str, str], str]:
-    """Names of robots among the parameters of a test, by the test and the parameter."""
+def parameter_names(item: pytest.Item) -> dict[tuple[str, str], str]:
+    """Names of robots and tasks among the parameters of a test, by the test and the parameter."""
     parameters = item.callspec.params if hasattr(item, "callspec") else {}
     named = {
         key: value if isinstance(value, str) else getattr(value, "name", "")
@@ -71,10 +73,10 @@ def robot_names(item: pytest.Item) -> dict[tuple[str, str], str]:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark tests of robots that are like another one of the same test as slow."""
-    found = {(key, name) for item in items for key, name in robot_names(item).items()}
+    """Mark tests of robots and tasks that are like another one of the same test as slow."""
+    found = {(key, name) for item in items for key, name in parameter_names(item).items()}
     for item in items:
-        if any((key, ALIKE.get(name)) in found for key, name in robot_names(item).items()):
+        if any((key, ALIKE.get(name)) in found for key, name in parameter_names(item).items()):
             item.add_marker(pytest.mark.slow)
 
 

@@ -38,15 +38,21 @@ LEARNED = {
 WORLDS = 12
 
 
+SAID = {}  # whether a controller does a kind of task on a robot: some solve for their gains before they say so
+
+
 def has_one(name, robot, task):
     """Whether a controller says that it does a task on a robot."""
     if name == "policy":
         return (robot.name, task.name) in LEARNED
-    try:
-        CONTROLLERS[name].check(robot, task)
-    except ConfigError:
-        return False
-    return True
+    key = name, robot.name, task.kind
+    if key not in SAID:
+        try:
+            CONTROLLERS[name].check(robot, task)
+            SAID[key] = True
+        except ConfigError:
+            SAID[key] = False
+    return SAID[key]
 
 
 LOADED = [name for name, entry in CONTROLLERS.items() if not entry.is_external]

@@ -10,6 +10,7 @@ for every dotted path of a class.
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 import re
 import types
@@ -101,6 +102,12 @@ def _compose(path: Path) -> Node:
     return root
 
 
+@functools.cache
+def _hints_of(cls: type) -> dict[str, Any]:
+    """Types of a class's fields; to evaluate them again for each file takes most of the time of reading it."""
+    return typing.get_type_hints(cls, include_extras=True)
+
+
 class _Builder:
     """Turns YAML nodes into typed values and remembers where each came from."""
 
@@ -168,7 +175,7 @@ class _Builder:
         return [(str(key.value), key, value) for key, value in node.value]
 
     def _dataclass(self, cls: type, node: Node, where: str) -> Any:
-        hints = typing.get_type_hints(cls, include_extras=True)
+        hints = _hints_of(cls)
         fields = {field.name: field for field in dataclasses.fields(cls) if field.init}
         values: dict[str, Any] = {}
         for name, key_node, value in self._pairs(node, where):
@@ -210,7 +217,7 @@ class _Builder:
 
     def _member(self, members: list[Any], node: Node, where: str) -> Any:
         """The member of a union of dataclasses that the key `kind` names."""
-        hints = {member: typing.get_type_hints(member)["kind"] for member in members}
+        hints = {member: _hints_of(member)["kind"] for member in members}
         kinds = {typing.get_args(hint)[0]: member for member, hint in hints.items() if hint is not str}
         own = next((member for member, hint in hints.items() if hint is str), None)
         more = f" Or name a class of your own: {EXAMPLE}." if own else ""
