@@ -56,6 +56,7 @@ def test_two_runs_of_one_seed_go_on_alike_by_the_stars(env, tmp_path: Path) -> N
     assert {topic for topic in one if one[topic] != two.get(topic)} == set()
 
 
+@pytest.mark.slow
 def test_the_gyroscope_dies_and_the_attitude_goes_on_by_the_stars(env, tmp_path: Path) -> None:
     done = fulmar(*GYRO_DIES, "--record", "one", env=env, cwd=tmp_path)
     assert json_of(done.stdout)["failure"] is None, done.stderr

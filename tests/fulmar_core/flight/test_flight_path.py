@@ -40,6 +40,20 @@ def test_the_goal_has_the_path_at_the_craft_s_own_speed():
     np.testing.assert_allclose(goal.targets[0, at, 1:3], [8.0, 8.0], atol=0.05)
 
 
+def test_going_to_the_side_as_fast_as_a_ramp_does_is_rewarded_where_the_task_weighs_it():
+    task = load_task("fly_c").fitted(ROBOT)
+    state, goal = task.draw(Draws(1, np.arange(1), np.zeros(1)), ROBOT, training=False)
+    goal = task.advance(goal, state, np.array([5.0]))  # on the first ramp, which goes 1 m/s to the left
+    along, astray = (replace(state, vy=state.vy + drift) for drift in (1.0, -1.0))
+
+    def gain(weighed):
+        return weighed.reward(state, along, goal, goal) - weighed.reward(state, astray, goal, goal)
+
+    unweighed = replace(task, reward_weights=replace(task.reward_weights, drift=0.0))
+    assert abs(float(gain(unweighed)[0])) < 0.01
+    assert float(gain(task)[0]) > 1.0
+
+
 @pytest.mark.slow
 def test_lqi_follows_the_first_climb_and_turn():
     task = replace(TASK, episode_s=12.0)
