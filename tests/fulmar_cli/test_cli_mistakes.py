@@ -122,7 +122,7 @@ def broken_configs(tmp_path, monkeypatch):
         ([*RUN, "--controller", "lqr", "--policy", SHIPPED], "controller 'lqr' runs no policy bundle"),
         ([*EVALUATE, "--policy", SHIPPED], "controller 'lqr' runs no policy bundle"),
         ([*RUN, "--record", "/tmp"], "/tmp exists already; nothing recorded is overwritten"),
-        ([*EVALUATE, "--through", "gazebo"], "unknown way 'gazebo'. Known: batch, mujoco, ros."),
+        ([*EVALUATE, "--through", "gazebo"], "unknown way 'gazebo'. Known: batch, jsbsim, mujoco, ros."),
         ([*EVALUATE, "--scenario", "storm"], "unknown scenario 'storm'"),
         ([*EVALUATE, "--episodes", "0"], "--episodes"),
         ([*EVALUATE, "--episodes", "many"], "--episodes"),
