@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -39,7 +40,7 @@ from tests.spaces import robot_for, task_for
 SEED = 5
 LASTS_S = {"track_velocities": 14.0, "track_velocities_3d": 14.0}  # long enough for a second velocity
 BRIEFLY_S = 6.0  # short enough to leave no geofence and to touch no obstacle
-FLIES_S = 1.0  # of aircraft, which are commanded more often
+FLIES_S = 2.0  # of aircraft, which are commanded more often
 # A second task of a kind with other figures brings nothing new onto the wires; robots alike are in tests/conftest.py.
 ALIKE = {
     "drift_go_to_pose",
@@ -145,15 +146,16 @@ def check_pair(robot: Robot, task: Task, make: Callable[[Robot, Task], Controlle
                 way.append((*sample.truth.position_in_world, turning, *command))
 
             plant.run_episode(episode, number=number, seed=SEED, steps=steps, on_step=on_step)
-    alone = roll_out_in_backends(
-        make(robot, task),
-        lambda: MujocoBackend.of(robot, task, scenario),
-        task,
-        scenario,
-        episodes=2,
-        seed=SEED,
-    )
     assert episode_steps(task, dt) >= steps
+    with patch("fulmar_core.rollout.episode_steps", return_value=steps):  # as far as they are compared
+        alone = roll_out_in_backends(
+            make(robot, task),
+            lambda: MujocoBackend.of(robot, task, scenario),
+            task,
+            scenario,
+            episodes=2,
+            seed=SEED,
+        )
     for number, way in enumerate(map(np.array, ways)):
         moved = way[:, 3:4] if task.turns_only else way[:, :2]
         assert np.ptp(moved, axis=0).max() > (0.001 if task.turns_only else 0.02), (
