@@ -23,7 +23,7 @@ def refuse_impossible_transitions(node: LifecycleNode) -> None:
             return obey(request, response)
         node.get_logger().warning(
             f"asked for the transition {asked.label or asked.id}, which the state '{machine.current_state[1]}' does "
-            "not have: refused"
+            "not have: refused. Does another run of this name begin in this ROS domain?"
         )
         response.success = False
         return response
