@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import gc
 import math
 import threading
 from dataclasses import replace
@@ -12,6 +14,7 @@ import pytest
 from fulmar_benchmarks.descent.batch import fly_in_batch
 from fulmar_benchmarks.descent.campaign import requirements, summary
 from fulmar_benchmarks.descent.flights import KILLED_S, Descent, DescentLog, Flights
+from fulmar_benchmarks.descent.live import fly_in_lockstep
 from fulmar_core.actuators.refuge import StopAtOnce
 from fulmar_core.attitude import from_euler
 from fulmar_core.errors import ConfigError, UnknownNameError
@@ -148,6 +151,14 @@ def test_without_a_controller_the_watchdog_acts_at_the_tick_at_which_it_would_by
 def test_killed_aircraft_come_down_level_and_softly_in_the_batch(height: float):
     found = summary(fly_in_batch(replace(FLIGHTS, height=height, count=16)))
     assert found["good"] == 16, found
+
+
+@pytest.mark.slow
+def test_a_flight_takes_no_plant_of_an_earlier_one_in_its_process_for_another_run(ros_domain, monkeypatch):
+    """Three in one domain; memory settles as outside of tests."""
+    monkeypatch.setattr("fulmar_ros.runtime.gc", gc)
+    monkeypatch.setattr("fulmar_benchmarks.descent.live.own_domain", contextlib.nullcontext)
+    assert all(fly_in_lockstep(FLIGHTS, number).good for number in range(3))
 
 
 @pytest.mark.slow

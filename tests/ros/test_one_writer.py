@@ -149,10 +149,7 @@ def test_of_two_plants_that_start_at_once_not_both_live(ros_domain: RosDomain) -
 def test_of_two_runs_of_one_name_that_start_at_once_no_more_than_one_runs_and_the_other_is_refused_in_one_line(
     ros_domain: RosDomain, tmp_path: Path
 ) -> None:
-    """Of two users, whose locks are apart. The one that sees the other's nodes ends, and both may.
-
-    Until it has ended, the plant of the other keeps its valves closed, since two controllers publish commands.
-    """
+    """Of two users, whose locks are apart. The first to see the nodes of the other ends; both may."""
     asked = [
         *FULMAR,
         "run",
@@ -173,12 +170,9 @@ def test_of_two_runs_of_one_name_that_start_at_once_no_more_than_one_runs_and_th
         runs.append(subprocess.Popen(asked, env=env, cwd=folder, stderr=subprocess.PIPE, text=True))
     words = [run.communicate(timeout=60.0)[1] for run in runs]
     codes = [run.returncode for run in runs]
-    assert sorted(codes) in ([0, 2], [1, 2], [2, 2]), words
+    assert sorted(codes) in ([0, 2], [2, 2]), words
     for code, said, folder in zip(codes, words, folders, strict=True):
         assert "RCLError" not in said
-        if code == 1:
-            reasons = ("2 nodes publish commands, and only one may", "Does another run of this name begin")
-            assert any(reason in said for reason in reasons)
         if code == 2:
             assert (
                 f"another run of this name goes on in ROS domain {ros_domain.id}: {NAMESPACE}/plant" in said

@@ -15,13 +15,11 @@ from fulmar_core.errors import RunFailed
 from fulmar_core.robot import load_robot
 from fulmar_core.topics import ODOMETRY, Wire, command_wire
 from fulmar_core.wire_check import Offer, wire_problems
-from fulmar_ros.living_plant import LOOK_S, TwinRunError
 from fulmar_ros.recorder_health import COMMANDERS
 from hardware_drivers.adapter_node import message_class
 from hardware_drivers.hardware import TOPIC_DRIVERS, load_hardware
 
 EXTERNAL_TIMEOUT_S = 20.0  # for an external controller to publish, and to read
-TWINS_S = 0.5  # beside ours, a plant of another run that is just ending is gone by then
 CONTROLLER_AND_RECORDER = 2  # nodes that receive the goal before anything moves
 
 
@@ -37,31 +35,20 @@ def while_starting(group: ProcessGroup, overseer: Supervisor) -> Callable[[], No
     """A check to call while nodes get ready.
 
     It raises RunFailed once a process ended or the time is over, and TwinRunError where another run of this name
-    begins at the same time: its plant stays beside ours for `TWINS_S`, or a process of ours ends beside it.
+    begins at the same time.
     """
     began_s = time.monotonic()
-    twins: list[TwinRunError] = []
 
     def alive() -> None:
-        seen_s = time.monotonic()
-        while seen := overseer.twins():
-            twins[:] = seen
-            if time.monotonic() - seen_s > TWINS_S:
-                raise twins[0]
-            time.sleep(LOOK_S)
-        try:
-            raise_if_ended(group)
-            if time.monotonic() - began_s > START_TIMEOUT_S:
-                plant, controller = _last_status(overseer.plant), _last_status(overseer.controller)
-                raise RunFailed(
-                    f"the nodes did not get ready within {START_TIMEOUT_S:g} s (the plant said: {plant}; "
-                    f"the controller said: {controller}). "
-                    "Is another system running in this ROS domain? Try `fulmar doctor`."
-                )
-        except RunFailed as failure:
-            if twins:  # they make each other's nodes end
-                raise twins[0] from failure
-            raise
+        overseer.refuse_twins()  # first: they make each other's nodes end
+        raise_if_ended(group)
+        if time.monotonic() - began_s > START_TIMEOUT_S:
+            plant, controller = _last_status(overseer.plant), _last_status(overseer.controller)
+            raise RunFailed(
+                f"the nodes did not get ready within {START_TIMEOUT_S:g} s (the plant said: {plant}; "
+                f"the controller said: {controller}). "
+                "Is another system running in this ROS domain? Try `fulmar doctor`."
+            )
 
     return alive
 

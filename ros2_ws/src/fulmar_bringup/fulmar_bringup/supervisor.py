@@ -27,7 +27,7 @@ from fulmar_core.topics import DIAGNOSTICS, GOAL_WIRES, OBSTACLES, STATUS
 from fulmar_core.wire_check import Offer
 from fulmar_ros.goal_messages import TYPES, GoalMessage, goal_message, obstacles_message
 from fulmar_ros.graph import offers_of
-from fulmar_ros.living_plant import TwinRunError, refuse_living_plant, sees_living_plant, twins
+from fulmar_ros.living_plant import refuse_living_plant, refuse_twins, sees_living_plant
 from fulmar_ros.operator_subscription import SUBSCRIPTIONS, LateSubscribers
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.runtime import ros_node
@@ -94,9 +94,9 @@ class Supervisor:
         """Raise ConfigError, with name, process and host, where a plant of this robot runs already."""
         refuse_living_plant(self._node, self._plan.namespace, since_s=self._made_s, spins=True)
 
-    def twins(self) -> list[TwinRunError]:
-        """What to raise where another run of this name begins at the same time; empty where none is seen."""
-        return twins(self._node, self._plan.namespace, NODES)
+    def refuse_twins(self) -> None:
+        """Raise TwinRunError where another run of this name begins at the same time; call while ours gets ready."""
+        refuse_twins(self._node, self._plan.namespace, NODES)
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:

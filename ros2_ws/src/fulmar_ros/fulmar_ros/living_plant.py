@@ -86,26 +86,25 @@ class TwinRunError(ConfigError):
     """Another run of the same name begins in the same ROS domain."""
 
 
-def twins(node: Node, namespace: str, names: Collection[str]) -> list[TwinRunError]:
-    """What to say of another run of the same name that has begun at the same time: neither plant publishes yet.
+def refuse_twins(node: Node, namespace: str, names: Collection[str]) -> None:
+    """Refuse a run beside another one of its name that has begun at the same time: neither plant publishes yet.
 
     Args:
         node: Looks at the graph.
         namespace: Of the run, absolute.
         names: Nodes that the message may name.
 
-    Returns:
-        One error, with every node that is there twice, where the plant is; a plant that was killed counts for seconds.
+    Raises:
+        TwinRunError: The plant is there twice; with every node that is.
     """
     found = Counter(name for name, space in node.get_node_names_and_namespaces() if space == namespace)
     if found[PLANT] < 2:
-        return []
+        return
     twice = ", ".join(f"{namespace}/{name}" for name in names if found[name] > 1)
-    error = TwinRunError(
+    raise TwinRunError(
         f"another run of this name goes on in ROS domain {ros_domain()}: {twice} are there twice, and two of one name "
         "would mix. Wait for it to end, give this robot another --name, or set ROS_DOMAIN_ID to another number."
     )
-    return [error]
 
 
 def ros_domain() -> str:
