@@ -6,7 +6,7 @@ import socket
 import struct
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -17,11 +17,17 @@ from fulmar_core.flight.trim import find_trim, flying_at
 from fulmar_core.robot import load_robot
 from fulmar_core.spatial import SpatialState
 from fulmar_core.tasks import load_task
+from hardware_drivers.driver_backend import DriverBackend, backend_of
+from hardware_drivers.settings import Geodetic, XPlane
+from hardware_drivers.xplane_driver import XPlaneDriver
 from sim_nodes.emulators.xplane import XPlaneEmulator
 from sim_nodes.mock_backend import MockBackend
 
 ROBOT = load_robot("airship_v7")
 START = (30.0, -20.0, 4.0, 0.0, 0.0, 70.0)  # m, deg: nose a little east of north
+
+ORIGIN = Geodetic(49.5, -3.0)
+SILENT_S = 0.3
 
 
 def episode_at(start: tuple[float, ...]) -> Episode:
@@ -128,3 +134,27 @@ def until(condition: Callable[[], bool], timeout_s: float = 5.0) -> None:
     while not condition():
         assert time.monotonic() < end, "it did not happen in time"
         time.sleep(0.005)
+
+
+def settings_of(address: str, **more: object) -> XPlane:
+    """Settings of an X-Plane at an address, which counts as lost after `SILENT_S`."""
+    return replace(XPlane("xplane", address, origin=ORIGIN, silent_s=SILENT_S), **more)
+
+
+def running_bench() -> Iterator[XPlaneBench]:
+    """Fixture `bench` of tests."""
+    bench = XPlaneBench()
+    yield bench
+    bench.stop()
+
+
+def driver_at(bench: XPlaneBench) -> Iterator[DriverBackend]:
+    """Fixture `driver` of tests."""
+    driver = backend_of(ROBOT, XPlaneDriver(ROBOT, settings_of(bench.device.address), patience_s=5.0))
+    yield driver
+    driver.close()
+
+
+def begin(driver: DriverBackend) -> None:
+    """Let the flight begin at the start."""
+    driver.reset(episode_at(START), seed=0)
