@@ -41,7 +41,7 @@ SEED = 5
 LASTS_S = {"track_velocities": 14.0, "track_velocities_3d": 14.0}  # long enough for a second velocity
 BRIEFLY_S = 6.0  # short enough to leave no geofence and to touch no obstacle
 FLIES_S = 2.0  # of aircraft, which are commanded more often
-# A second task of a kind with other figures brings nothing new onto the wires; robots alike are in tests/conftest.py.
+# A second task of a kind with other figures brings nothing new onto the wires; tests/conftest.py has more of them.
 ALIKE = {
     "drift_go_to_pose",
     "drift_track_velocities",
@@ -49,14 +49,8 @@ ALIKE = {
     "race_wayposes",
     "point_inertial",
     "slew",
-    "fly_b",
-    "fly_c",
-    "fly_d",
-    "fly_e",
-    "fly_f",
     "fly_airspeed",
     "fly_path",
-    "fly_recover",
 }
 ROBOTS, TASKS = (
     [pytest.param(name, marks=pytest.mark.slow if name in ALIKE else ()) for name in config_names(kind)]
