@@ -101,7 +101,11 @@ def test_no_multicast_is_wrong_only_where_discovery_needs_it():
     assert "ufw allow in proto udp to 224.0.0.0/4" in wide.fix
 
 
-@pytest.mark.skipif(not MAY_UNSHARE, reason="this user may not make a network namespace")
+@pytest.mark.skipif(
+    not MAY_UNSHARE,
+    reason="a host without loopback or multicast needs a network namespace, which this kernel refuses this user; the "
+    "checks themselves run above on the host as it is",
+)
 @pytest.mark.parametrize(
     ("before", "environment", "level", "words"),
     [
@@ -256,7 +260,9 @@ def test_a_port_that_this_user_may_not_open_is_wrong_on_a_robot(port):
     assert f"no right to read and write {port}" in found[0].found
 
 
-@pytest.mark.skipif(os.geteuid() != 0, reason="only root gives a file to another group")
+@pytest.mark.skipif(
+    os.geteuid() != 0, reason="the kernel lets only root give a file to a group that it is not in"
+)
 def test_a_port_of_a_group_is_opened_by_joining_the_group(port):
     group = next(each for each in grp.getgrall() if each.gr_gid not in (0, NOBODY))
     os.chown(port, 0, group.gr_gid)

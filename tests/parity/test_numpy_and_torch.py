@@ -93,7 +93,8 @@ def test_torch_plays_every_task_as_numpy_does(name):
 
 
 ON_A_CARD = pytest.mark.skipif(
-    not torch.cuda.is_available(), reason="no CUDA device; the same comparison on the processor runs above"
+    not torch.cuda.is_available(),
+    reason="needs an NVIDIA card; the same comparison runs above on the processor",
 )
 
 
