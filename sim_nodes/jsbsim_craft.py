@@ -14,8 +14,8 @@ from fulmar_core.robot import Robot
 from sim_nodes.jsbsim_model import STILL_PLANET, write_aircraft
 
 STEPS = 4  # of JSBSim in a physics tick
-_ERRORS_ONLY = jsbsim.DefaultLogger()
-_ERRORS_ONLY.set_min_level(jsbsim.LogLevel.FATAL)
+_FATAL_ONLY = jsbsim.DefaultLogger()
+_FATAL_ONLY.set_min_level(jsbsim.LogLevel.FATAL)
 
 
 class JsbsimCraft(Protocol):
@@ -44,7 +44,7 @@ class JsbsimCraft(Protocol):
 def silent_model() -> jsbsim.FGFDMExec:
     """An empty model that prints neither JSBSim's banner nor its notes: standard output is for a command's result."""
     jsbsim.FGJSBBase().debug_lvl = 0  # of all models; the banner comes before a model's own level can be set
-    jsbsim.set_logger(_ERRORS_ONLY)
+    jsbsim.set_logger(_FATAL_ONLY)
     return jsbsim.FGFDMExec(None)
 
 
