@@ -93,11 +93,10 @@ def test_the_help_states_what_every_figure_means():
 
 
 @pytest.mark.parametrize(
-    ("robot", "task", "way"),
-    [("airship_v7", "fly_hold", "jsbsim"), ("cessna_182", "fly_attitude", "jsbsim:c172x")],
+    ("pair", "way"), [("airship_v7 fly_hold", "jsbsim"), ("navion fly_attitude", "jsbsim:L17")]
 )
-def test_aircraft_are_evaluated_in_jsbsim_which_prints_nothing_of_its_own(robot, task, way, capfd):
-    words = f"evaluate {robot} {task} --controller lqi --through {way} --scenario ideal --episodes 1"
+def test_aircraft_are_evaluated_in_jsbsim_which_prints_nothing_of_its_own(pair, way, capfd):
+    words = f"evaluate {pair} --controller lqi --through {way} --scenario ideal --episodes 1"
     found = evaluate(f"{words} --episode-s 10")
     assert (found["through"], found["success_rate"]) == (way, 1.0)
     assert capfd.readouterr().out == ""

@@ -49,5 +49,5 @@ def test_a_model_that_does_not_stand_for_a_robot_is_one_line(ros_domain: RosDoma
     done = fulmar("run", *asked, env=ros_domain.env, cwd=tmp_path)
     assert done.returncode == 2
     assert done.stderr.splitlines() == [
-        "fulmar: --backend jsbsim:L71: JSBSim's 'L71' does not stand for 'navion'. Did you mean 'L17'?"
+        "fulmar: jsbsim:L71: JSBSim's 'L71' does not stand for 'navion'. Did you mean 'L17'?"
     ]

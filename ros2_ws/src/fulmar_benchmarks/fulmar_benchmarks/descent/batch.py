@@ -45,10 +45,8 @@ class _Batch:
         self._loop.reset()
         self._loop.begin(goal_in_float64(simulation.goal))
         self._period = round(self._loop.dt / simulation.control_dt)  # ticks of the batch between two commands
-        refuge, timeout_ns = (
-            refuge_of(robot, 1.0 / simulation.control_dt),
-            round(1e9 * default_timeout(self._loop.dt)),
-        )
+        refuge = refuge_of(robot, 1.0 / simulation.control_dt)
+        timeout_ns = round(1e9 * default_timeout(self._loop.dt))
         self._guards = [
             ActuatorGuard(
                 robot.actuators, Watchdog(timeout_ns), control_dt=self._loop.dt, refuge=copy.deepcopy(refuge)

@@ -38,9 +38,7 @@ class Airframe:
     # have it by mistake; for an aircraft whose flights are to be theirs.
     wind_axes: Literal["standard", "mirrored"] = "standard"
     estimated: bool = False  # True: the source has gaps, and numbers here are no figures to compare with
-    jsbsim: tuple[
-        str, ...
-    ] = ()  # models that come with JSBSim and may stand for the craft: --backend jsbsim:NAME
+    jsbsim: tuple[str, ...] = ()  # models that come with JSBSim and may stand for the craft, as jsbsim:NAME
 
     def __post_init__(self) -> None:
         for name in ("span", "area", "chord", "speed", "stall_deg"):

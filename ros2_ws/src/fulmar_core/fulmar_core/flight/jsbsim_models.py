@@ -1,4 +1,4 @@
-"""The backend `jsbsim`, and the models that come with JSBSim: `jsbsim:L17` flies one where a robot's file names it."""
+"""JSBSim as a simulator, and the models that come with JSBSim: `jsbsim:L17` flies one where a robot's file names it."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ def jsbsim_model(robot: Robot, backend: str) -> str:
         ConfigError: The robot is no aircraft, or its file does not name the model.
     """
     if robot.airframe is None:
-        raise ConfigError(f"JSBSim flies aircraft only, and '{robot.name}' is none. Backends: mujoco, mock.")
+        raise ConfigError(f"JSBSim flies aircraft only, and '{robot.name}' is none. MuJoCo simulates it.")
     _, colon, model = backend.partition(":")
     known = robot.airframe.jsbsim
     if not colon or model in known:
         return model
     if not known:
         raise ConfigError(
-            f"--backend {backend}: no model of JSBSim's own stands for '{robot.name}'. --backend {JSBSIM} flies "
+            f"{backend}: no model of JSBSim's own stands for '{robot.name}'. {JSBSIM} alone flies "
             f"its own file; 'airframe: {JSBSIM}: [NAME]' of a robot's file names others."
         )
     raise ConfigError(
-        f"--backend {backend}: JSBSim's '{model}' does not stand for '{robot.name}'.{did_you_mean(model, known)}"
+        f"{backend}: JSBSim's '{model}' does not stand for '{robot.name}'.{did_you_mean(model, known)}"
     )

@@ -260,9 +260,8 @@ class ActuatorGuard:
         time_ns = now_ns if plant_ns is None else plant_ns
         if self._stopped(now_ns) is not None:
             if self._steers:
-                self.command = self._actuators.limited(
-                    np.asarray(values, dtype=float)
-                )  # what goes on after the stop
+                # What goes on after the stop.
+                self.command = self._actuators.limited(np.asarray(values, dtype=float))
             elif self._is_safe(self.output(now_ns)):
                 self.command = self._actuators.safe_command  # nothing is left to slow down from
         else:
