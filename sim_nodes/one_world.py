@@ -42,10 +42,10 @@ class OneWorld:
     def begin_episode(self, episode: Episode) -> None:
         """Take the world of an episode, without a batch axis; actuators begin as its start has them."""
         self.world = episode.world.mapped(lambda part: np.asarray(part, dtype=float)[..., None])
-        self.actuation = actuation_of(self._robot, self._safe)
         late = self.world.action_delay[0] + self.world.opening_delay[0]
         response = self._robot.actuators.response
         self.latest_s = float(response.delay_s + response.opening_delay_s + late)
+        self.actuation = actuation_of(self._robot, self._safe, latest_s=self.latest_s)
         self.outside: Any = None  # before the first command
         self._constant_push = self.dynamics.push_is_constant(self.world)
         self._blurred = self.dynamics.blurs(self.world)

@@ -9,7 +9,7 @@ from fulmar_core.paths import config_names
 from fulmar_core.robot import load_robot
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import load_task
-from tests.spaces import prompt, task_for
+from tests.spaces import task_for
 
 ROBOTS = {name: load_robot(name) for name in config_names("robots")}
 PLATFORM, BASE = ROBOTS["floating_platform"], ROBOTS["turtlebot2"]
@@ -23,7 +23,7 @@ def build(scenario=STILL, robot=PLATFORM, task=None, *, worlds=5, seed=3, **kwar
     return BatchSimulation(
         robot,
         task or task_for(robot, "go_to_pose"),
-        prompt(scenario, robot),
+        scenario,
         worlds=worlds,
         seed=seed,
         **kwargs,

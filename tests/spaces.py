@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from fulmar_core.actuators.pushing import PLANAR, Pushing
-from fulmar_core.disturbances.scenario import Scenario
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.state import State
@@ -50,13 +48,6 @@ def task_for(robot: Robot, name: str) -> Task:
     if robot.actuators.turns_only or robot.flies:
         return load_task("fly_hold" if robot.flies else "point_inertial")
     return load_task(name if robot.state_type is PlanarState else f"{name}_3d")
-
-
-def prompt(scenario: Scenario, robot: Robot) -> Scenario:
-    """A scenario without the delays of commands that are longer than a control step of an aircraft."""
-    if not robot.flies:
-        return scenario
-    return replace(scenario, actuation=replace(scenario.actuation, delay_s=0.0, opening_delay_s=(0.0, 0.0)))
 
 
 def at_target(task: Task, target: Any) -> State:

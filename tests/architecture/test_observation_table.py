@@ -19,7 +19,6 @@ from fulmar_core.simulation import BatchSimulation
 from fulmar_core.spatial import SpatialState
 from fulmar_core.tasks import load_task
 from fulmar_core.tasks.go_to_position_with_obstacles import GoToPositionWithObstacles
-from tests.spaces import prompt
 
 TASKS = config_names("tasks")
 UNITS = {"fine_distance": " m", "fine_heading_deg": "°", "fine_speed": " m/s", "fine_velocity": " m/s"} | {
@@ -76,7 +75,7 @@ def test_the_table_has_exactly_the_terms_of_all_tasks(terms):
 def test_values_stay_in_the_stated_range(terms, task):
     flies, rounding = load_task(task).flies, 1e-5
     robot = load_robot("airship_v7") if flies else ROBOT_OF[load_task(task).state_type]
-    scenario = prompt(load_scenario("randomised"), robot)
+    scenario = load_scenario("randomised")
     worlds = BatchSimulation(robot, load_task(task), scenario, worlds=64, seed=1)
     seen = []
     for _ in range(5):

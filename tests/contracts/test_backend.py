@@ -60,8 +60,8 @@ PAIRS = [
 
 
 def episode_of(robot, scenario="nominal", start=None, **world):
-    if robot.flies:  # whose control step is shorter than other scenarios' delays, and which cannot stand
-        scenario, start = "nominal", start or [float(part) for part in flying_at(robot, ALOFT).columns()]
+    if robot.flies:  # which cannot stand
+        start = start or [float(part) for part in flying_at(robot, ALOFT).columns()]
     drawn = draw_episode(
         robot, task_for(robot, "go_to_pose"), load_scenario(scenario), seed=0, number=0
     ).world

@@ -19,7 +19,6 @@ from fulmar_core.paths import OWN_FOLDERS, config_names
 from fulmar_core.tasks import load_task
 from tests.new_robots import robots_of_every_family, write_new_robots
 from tests.pairs import each_pair
-from tests.spaces import prompt
 from training.environments import environment_id
 from training.gym_env import TaskEnv
 from training.vec_env import BatchVecEnv
@@ -54,7 +53,7 @@ def test_the_checker_of_stable_baselines_accepts_it(robot, task):
 
 @EACH_PAIR
 def test_two_updates_of_ppo_run_and_stay_finite(robot, task):
-    env = BatchVecEnv(robot, task, prompt(RANDOMISED, robot), worlds=4, seed=1)
+    env = BatchVecEnv(robot, task, RANDOMISED, worlds=4, seed=1)
     model = PPO(
         "MlpPolicy", env, n_steps=8, batch_size=16, n_epochs=1, policy_kwargs={"net_arch": [8]}, seed=1, device="cpu"
     )  # fmt: skip

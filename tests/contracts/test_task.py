@@ -25,7 +25,7 @@ from fulmar_core.tasks import ShippedTask, load_task
 from fulmar_core.topics import GOAL_WIRES
 from tests.new_robots import robots_of_every_family
 from tests.pairs import each_pair
-from tests.spaces import at_target, prompt
+from tests.spaces import at_target
 
 TASKS = {name: load_task(name) for name in config_names("tasks")}
 ROBOTS = robots_of_every_family()
@@ -150,7 +150,7 @@ def test_torch_makes_of_it_what_numpy_does(task, robot):
 
 @EACH_PAIR
 def test_fifty_random_steps_stay_finite_with_worlds_that_begin_anew(task, robot):
-    simulation = BatchSimulation(robot, task, prompt(RANDOMISED, robot), worlds=20, seed=4, training=True)
+    simulation = BatchSimulation(robot, task, RANDOMISED, worlds=20, seed=4, training=True)
     rng = np.random.default_rng(5)
     for step in range(50):
         before, goal = simulation.truth, simulation.goal

@@ -18,9 +18,13 @@ ROBOT = load_robot("turtlebot2")
 NOMINAL = draw_world(ROBOT, load_scenario("ideal"), Draws(0, np.arange(WORLDS), np.zeros(WORLDS), WORLD))
 
 
-def actuation(*, binary=False, scale=(1.0, 1.0), **response):
+def actuation(*, binary=False, scale=(1.0, 1.0), delay_ticks=0, **response):
     return ActuationState(
-        Response(**response), binary=binary, scale=np.array(scale), safe=np.zeros((2, WORLDS))
+        Response(**response),
+        binary=binary,
+        scale=np.array(scale),
+        safe=np.zeros((2, WORLDS)),
+        delay_ticks=delay_ticks,
     )
 
 
@@ -52,6 +56,26 @@ def test_a_world_s_own_delay_comes_on_top():
     state.begin(full(), replace(NOMINAL, action_delay=np.array([0.0, 0.02, 0.04])), None)
     seen = np.array([state.advance(DT, latest_s=1.0)[0] for _ in range(4)])
     assert seen.sum(axis=0).tolist() == [3.0, 2.0, 1.0]
+
+
+def test_delays_longer_than_a_control_step_play_every_command_later():
+    state = actuation(delay_ticks=4, delay_s=0.02)
+    late = replace(NOMINAL, action_delay=np.array([0.0, 0.02, 0.06]))
+    seen = []
+    for command in range(1, 6):
+        state.begin(full(float(command)), late, None)
+        seen += [state.advance(DT, latest_s=0.08)[0].tolist() for _ in range(2)]
+    given = np.repeat(np.arange(1.0, 6.0), 2)
+    for world, ticks in enumerate((1, 2, 4)):
+        assert [row[world] for row in seen] == [0.0] * ticks + given[:-ticks].tolist()
+
+
+def test_a_world_brought_back_has_no_commands_of_before_on_their_way():
+    state = actuation(delay_ticks=2, delay_s=0.04)
+    state.begin(full(), NOMINAL, None)
+    state.reset(np.array([1]), np.zeros((2, 1)))
+    seen = np.array([state.advance(DT, latest_s=0.04)[0] for _ in range(3)])
+    assert seen.T.tolist() == [[0.0, 0.0, 1.0], [0.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
 
 
 def test_valves_open_late_and_close_at_once():

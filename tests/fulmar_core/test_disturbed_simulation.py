@@ -84,6 +84,19 @@ def test_late_commands_act_after_their_delay_and_not_before():
     np.testing.assert_allclose(late.truth.yaw_rate, prompt.truth.yaw_rate * share, rtol=1e-9)
 
 
+def test_a_command_may_be_late_by_several_control_steps():
+    late = build(replace(STILL, actuation=Actuation(delay_s=0.5)), dtype=np.float64)
+    prompt = build(STILL, dtype=np.float64)
+    courses = []
+    for step in range(5):
+        for simulation in (late, prompt):
+            simulation.step(np.eye(8)[[0] * 5] * (step == 0))
+        courses.append(late.truth.yaw_rate / prompt.truth.yaw_rate)
+    begun = np.ceil(late.world.action_delay / 0.02 - 0.5) * 0.02
+    for step, course in enumerate(courses, start=1):  # a pulse of one control step of 0.2 s, later
+        np.testing.assert_allclose(course, np.clip((step * 0.2 - begun) / 0.2, 0.0, 1.0), atol=1e-9)
+
+
 def test_valves_open_late_whether_the_robot_or_the_scenario_says_so():
     own = replace(PLATFORM.actuators, response=replace(PLATFORM.actuators.response, opening_delay_s=0.06))
     slow_robot = build(robot=replace(PLATFORM, actuators=own))

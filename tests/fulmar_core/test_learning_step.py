@@ -16,7 +16,7 @@ from fulmar_core.robot import load_robot
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.state import State
 from fulmar_core.tasks import load_task
-from tests.spaces import prompt, robot_for
+from tests.spaces import robot_for
 
 BASE = load_robot("turtlebot2")
 POSITION, PUSH = load_task("go_to_position"), load_task("push_block")
@@ -101,7 +101,7 @@ def test_torch_rewards_as_numpy_does(name):
     task = load_task(name)
     robot = robot_for(task, BASE)
     simulation = BatchSimulation(
-        robot, task, prompt(load_scenario("randomised"), robot), worlds=40, seed=2, dtype=np.float64
+        robot, task, load_scenario("randomised"), worlds=40, seed=2, dtype=np.float64
     )
     before, goal, previous = simulation.truth, simulation.goal, simulation.command
     simulation.step(np.tile(robot.actuators.scale, (40, 1)))

@@ -89,6 +89,11 @@ ENTRIES = {
     "actuation.opening_delay_s": (STILL, {"actuation": Actuation(opening_delay_s=(0.01, 0.02))}, {"opening_delay"}),
     "actuation.gain": (STILL, {"actuation": Actuation(gain=(0.8, 0.9))}, {"gain"}),
     "actuation.delay_s": (STILL, {"actuation": Actuation(delay_s=0.1)}, {"action_delay"}),
+    "actuation.least_delay": (
+        replace(STILL, actuation=Actuation(delay_s=0.1)),
+        {"actuation": Actuation(delay_s=0.1, least_delay=0.9)},
+        {"action_delay"},
+    ),
     "actuation.failures": (
         replace(STILL, actuation=Actuation(failures=1, failure_chance=0.5)),
         {"actuation": Actuation(failures=3, failure_chance=0.5)},
@@ -328,10 +333,10 @@ def test_a_world_of_a_batch_is_picked_written_and_cast_whole():
     ("actuation", "words"),
     [
         (
-            Actuation(delay_s=0.5),
-            "up to 0.5 s late .* at most one control step, 0.2 s of 'floating_platform'",
+            Actuation(delay_s=0.15, opening_delay_s=(0.0, 0.1)),
+            "up to 0.25 s late .* at most one control step, 0.2 s of 'floating_platform'",
         ),
-        (Actuation(delay_s=0.15, opening_delay_s=(0.0, 0.1)), "up to 0.25 s late"),
+        (Actuation(opening_delay_s=(0.0, 0.3)), "up to 0.3 s late"),
     ],
 )
 def test_what_a_robot_cannot_have_is_refused_instead_of_cut(actuation, words):

@@ -30,6 +30,7 @@ STILL = Scenario("nothing happens", sensor_noise=False, body="nominal")
         (lambda: Slope(milliradians=(2.0, 1.0)), "low <= high"),
         (lambda: Actuation(opening_delay_s=(0.2, 0.1)), "low <= high"),
         (lambda: Actuation(least_noise=1.5), "must lie in"),
+        (lambda: Actuation(least_delay=-0.5), "must lie in"),
         (lambda: Sensing(velocity_noise=(0.2, 0.1)), "low <= high"),
         (lambda: Kick(force=-1.0), "must not be negative"),
         (lambda: Kick(every_s=(0.0, 1.0)), "greater than 0"),

@@ -15,7 +15,7 @@ from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import load_task
 from tests.new_robots import new_robot
 from tests.pairs import covering
-from tests.spaces import prompt, robot_for
+from tests.spaces import robot_for
 
 torch = pytest.importorskip("torch")
 
@@ -31,7 +31,7 @@ def trajectory(robot, task, library, dtype, device=None):
     """States and observations of some worlds under commands that are the same everywhere, with resets in between."""
     kind = getattr(library, dtype)
     simulation = BatchSimulation(
-        robot, task, prompt(RANDOMISED, robot), worlds=WORLDS, seed=5, xp=library, device=device, dtype=kind
+        robot, task, RANDOMISED, worlds=WORLDS, seed=5, xp=library, device=device, dtype=kind
     )
     rng = np.random.default_rng(6)
     seen = []

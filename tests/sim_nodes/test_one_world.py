@@ -17,12 +17,14 @@ from sim_nodes.one_world import OneWorld
 from tests.states import planar_state
 
 ROBOT = load_robot("floating_platform")  # ten ticks to a control step
-LATE = replace(
-    ROBOT, actuators=replace(ROBOT.actuators, response=replace(ROBOT.actuators.response, delay_s=0.06))
-)
 HERE = planar_state(0.0, 0.0, 0.0)
 FIRST, SECOND = np.eye(8)[0], np.eye(8)[1]
 DT = ROBOT.timing.physics_dt
+
+
+def late(delay_s):
+    response = replace(ROBOT.actuators.response, delay_s=delay_s)
+    return replace(ROBOT, actuators=replace(ROBOT.actuators, response=response))
 
 
 def begun(robot, episode, noisy=False, **world):
@@ -45,11 +47,18 @@ def ticks(one, command, count, at_once):
 
 @pytest.mark.parametrize("at_once", [1, 10], ids=["tick by tick", "in lock step"])
 def test_a_delay_counts_from_the_change_of_the_command_alone(episode, at_once):
-    one = begun(LATE, episode)
+    one = begun(late(0.06), episode)
     applied, _ = ticks(one, FIRST, 30, at_once)
     np.testing.assert_array_equal(applied[:, 0], [0.0] * 3 + [1.0] * 27)
     applied, _ = ticks(one, SECOND, 30, at_once)
     np.testing.assert_array_equal(applied[:, 0], [1.0] * 3 + [0.0] * 27)
+
+
+@pytest.mark.parametrize("at_once", [1, 10], ids=["tick by tick", "in lock step"])
+def test_a_pulse_shorter_than_its_delay_is_applied_whole_afterwards(episode, at_once):
+    one = begun(late(0.5), episode)  # 25 ticks
+    applied = [ticks(one, command, 10, at_once)[0][:, 0] for command in (FIRST, SECOND, SECOND, SECOND)]
+    np.testing.assert_array_equal(np.concatenate(applied), [0.0] * 25 + [1.0] * 10 + [0.0] * 5)
 
 
 def test_a_command_that_changes_between_control_steps_acts_at_once(episode):

@@ -18,7 +18,6 @@ from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import load_task
 from tests.new_robots import new_robot
 from tests.pairs import each_pair
-from tests.spaces import prompt
 from training import kernel
 from training.compiled import CompiledStep
 from training.kernel import leaves, parts_of
@@ -35,9 +34,7 @@ EACH_PAIR = each_pair(
 
 def assert_moves_as_in_numpy(robot, task, steps=60, control_hz=None, scenario=RANDOMISED):
     plain, batch = (
-        BatchSimulation(
-            robot, task, prompt(scenario, robot), worlds=WORLDS, seed=5, training=True, control_hz=control_hz
-        )
+        BatchSimulation(robot, task, scenario, worlds=WORLDS, seed=5, training=True, control_hz=control_hz)
         for _ in range(2)
     )
     compiled, rng = CompiledStep(batch), np.random.default_rng(6)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from typing import Any
 
 import numpy as np
@@ -26,25 +27,31 @@ from fulmar_core.sensors.surfaces import SurfacePositions
 from fulmar_core.sensors.wheels import WheelSpeeds
 
 
-def actuation_of(robot: Robot, safe: Array, *, opens_late: bool = True) -> ActuationState:
+def actuation_of(
+    robot: Robot, safe: Array, *, opens_late: bool = True, latest_s: float = 0.0
+) -> ActuationState:
     """The actuators of a robot in their safe state.
 
     Args:
         robot: The robot.
         safe: Its safe command in every world, shape (n, worlds).
         opens_late: As of `may_open_late`.
+        latest_s: As of `longest_delay` [s].
     """
     response = robot.actuators.response
     if isinstance(robot.actuators, Rolling):
         response = dataclasses.replace(response, lag_s=0.0)  # the wheels' own servos bring it in
+    timing = robot.timing
+    delay_ticks = math.ceil(latest_s / timing.physics_dt) if timing.is_over_within(latest_s) else 0
     usual: dict[str, Any] = {
         "binary": robot.actuators.binary,
         "scale": robot.actuators.scale,
         "safe": safe,
         "opens_late": opens_late,
+        "delay_ticks": delay_ticks,
     }
     if isinstance(robot.actuators, ControlSurfaces):
-        return FlightActuation(robot.actuators, safe)
+        return FlightActuation(robot.actuators, safe, delay_ticks=delay_ticks)
     if isinstance(robot.actuators, ReactionWheels):
         return WheelActuation(response, count=robot.actuators.count, **usual)
     return ActuationState(response, **usual)

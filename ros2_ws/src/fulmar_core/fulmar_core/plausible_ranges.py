@@ -186,7 +186,7 @@ SCENARIO: tuple[Plausible, ...] = (
     Plausible("orbit_rate", "rad/s", (0.0, 0.1), (0.0, 0.00125), "circular orbits of the Earth: 84 min and longer"),
     Plausible("actuation.noise", "of 1", (0.0, 1.0), (0.0, 0.3), "share of full command"),
     Plausible("actuation.gain.*", "of 1", (0.0, 3.0), (0.3, 1.5), "share of a command that is done"),
-    Plausible("actuation.delay_s", "s", (0.0, 2.0), (0.0, 0.5), "at most one control step"),
+    Plausible("actuation.delay_s", "s", (0.0, 2.0), (0.0, 0.5), "links and drives answer within half a second"),
     Plausible("actuation.opening_delay_s.*", "s", (0.0, 2.0), (0.0, 0.3), "solenoid valves: 0.005 to 0.06 s"),
     Plausible("sensing.noise", "times", (0.0, 100.0), (0.0, 10.0), "factor on the robot's own noise"),
     Plausible("sensing.bias", "times", (0.0, 100.0), (0.0, 10.0), "factor on the robot's own bias"),

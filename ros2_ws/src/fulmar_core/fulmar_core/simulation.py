@@ -106,7 +106,9 @@ class BatchSimulation(MutableState, Generic[S]):
         )
         safe = np.tile(robot.actuators.safe_command[:, None], (1, worlds))
         self._safe = self._real(safe)
-        self._actuation = actuation_of(robot, self._safe, opens_late=may_open_late(robot, scenario))
+        self._actuation = actuation_of(
+            robot, self._safe, opens_late=may_open_late(robot, scenario), latest_s=self._latest_s
+        )
         self.command: Array = self._safe.T
         self._upcoming = UpcomingEpisodes(self._draw, worlds)
         self.truth, self.goal, self.world = self._draw_parts(np.arange(worlds), np.zeros(worlds, dtype=int))

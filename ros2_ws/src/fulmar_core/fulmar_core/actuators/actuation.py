@@ -25,6 +25,7 @@ class ActuationState(MutableState):
         "_since_s",
         "_late",
         "_open_late",
+        "_line",
     )
 
     def __init__(
@@ -35,6 +36,7 @@ class ActuationState(MutableState):
         scale: np.ndarray,
         safe: Array,
         opens_late: bool = True,
+        delay_ticks: int = 0,
     ) -> None:
         """Begin in the safe state.
 
@@ -44,6 +46,8 @@ class ActuationState(MutableState):
             scale: Largest command of each actuator, shape (n,).
             safe: Safe command of every world, shape (n, worlds), of the floating type to compute in.
             opens_late: Whether closed valves may open later than open ones close; saves the work where none does.
+            delay_ticks: Physics ticks by which the latest command may act late, where these are longer than a control
+                step; 0 otherwise, which costs less. Valves that open late need 0.
         """
         self._response, self._binary, self._opens_late = response, binary, opens_late
         self._scale = array_namespace(safe).asarray(scale, dtype=safe.dtype, device=device(safe))[:, None]
@@ -52,6 +56,10 @@ class ActuationState(MutableState):
         self._since_s = 0.0
         self._late = array_namespace(safe).zeros_like(safe[0])  # until the command acts, in every world [s]
         self._open_late = self._late  # until closed valves are open [s]
+        # What was commanded at the ticks before, the latest first.
+        self._line = (
+            array_namespace(safe).zeros((delay_ticks, 1, 1), dtype=safe.dtype, device=device(safe)) + safe
+        )
         self._slew: Array | None = None
         if response.slew:
             xp = array_namespace(safe)
@@ -64,9 +72,9 @@ class ActuationState(MutableState):
             which: Their numbers.
             safe: Safe command, shape (n, 1).
         """
-        for name in ("_before", "_wanted", "applied"):
+        for name in ("_before", "_wanted", "applied", "_line"):
             values = array_namespace(safe).asarray(getattr(self, name), copy=True)
-            values[:, which] = safe
+            values[..., which] = safe
             setattr(self, name, values)
 
     def hold(self, command: Array) -> None:
@@ -76,6 +84,7 @@ class ActuationState(MutableState):
             command: Within the actuators' limits, shape (n, worlds).
         """
         self._before = self._wanted = self.applied = command
+        self._line = 0.0 * self._line + command
 
     def begin(self, command: Array, world: World, noise: Array | None) -> None:
         """Take a new command.
@@ -119,6 +128,8 @@ class ActuationState(MutableState):
 
     def _target(self, dt: float, *, latest_s: float) -> Array:
         """The command that acts while time passes, shape (n, worlds); arguments as of `advance`."""
+        if self._line.shape[0]:
+            return self._from_line(dt)
         target = self._wanted
         xp = array_namespace(target)
         now_s = self._since_s + 0.5 * dt
@@ -127,4 +138,14 @@ class ActuationState(MutableState):
                 target = xp.where(now_s < self._open_late, xp.minimum(self._before, target), target)
             target = xp.where(now_s < self._late, self._before, target)
         self._since_s += dt
+        return target
+
+    def _from_line(self, dt: float) -> Array:
+        """The command of as many ticks ago as each world is late, shape (n, worlds); `dt` is the time of a tick [s]."""
+        xp = array_namespace(self._wanted)
+        line = xp.concat((self._wanted[None], self._line))
+        target = self._wanted
+        for ticks in range(1, line.shape[0]):
+            target = xp.where((ticks - 0.5) * dt < self._late, line[ticks], target)
+        self._line = line[:-1]
         return target

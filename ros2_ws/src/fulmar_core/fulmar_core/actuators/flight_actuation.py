@@ -27,9 +27,16 @@ class FlightActuation(ActuationState):
 
     MUTABLE = (*ActuationState.MUTABLE, "servo_rates", "gusts", "gust_steps")
 
-    def __init__(self, actuators: ControlSurfaces, safe: Array) -> None:
-        """Begin in the safe state, in still air; `safe` as of `ActuationState`."""
-        super().__init__(actuators.response, binary=False, scale=actuators.scale, safe=safe, opens_late=False)
+    def __init__(self, actuators: ControlSurfaces, safe: Array, *, delay_ticks: int) -> None:
+        """Begin in the safe state, in still air; `safe` and `delay_ticks` as of `ActuationState`."""
+        super().__init__(
+            actuators.response,
+            binary=False,
+            scale=actuators.scale,
+            safe=safe,
+            opens_late=False,
+            delay_ticks=delay_ticks,
+        )
         self._actuators, self._count = actuators, actuators.positions
         xp, worlds = array_namespace(safe), safe.shape[1]
         self._kwargs = {"dtype": safe.dtype, "device": device(safe)}

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 class Response:
     """From a command to what an actuator does; 0 or nothing switches a part off."""
 
-    delay_s: float = 0.0  # before anything happens, at most one control step [s]
+    delay_s: float = 0.0  # before anything happens; of valves that open late at most one control step [s]
     slew: tuple[float, ...] = ()  # fastest change of each actuator, in its command's unit [per s]
     lag_s: float = 0.0  # time constant of a first-order lag [s]
     opening_delay_s: float = 0.0  # by which closed valves open later than others close [s]

@@ -139,7 +139,8 @@ class Actuation:
     noise: float = 0.0  # largest error at each control step, uniform, as a share of full command [-]
     least_noise: float = 0.0  # smallest of these, as a share of the largest [-]
     gain: Range = (1.0, 1.0)  # each actuator's own factor, for a whole episode [-]
-    delay_s: float = 0.0  # largest delay of commands; with that of opening at most one control step [s]
+    delay_s: float = 0.0  # largest delay of commands; with one of opening at most one control step [s]
+    least_delay: float = 0.0  # smallest of these, as a share of the largest [-]
     opening_delay_s: Range = (0.0, 0.0)  # by which closed valves open late; closing does not wait [s]
     failures: int = 0  # most actuators that stay closed or still for a whole episode
     failure_chance: float = 0.0  # of each of these [-]
@@ -160,8 +161,8 @@ class Actuation:
         if self.stranding and not self.failures:  # word: key of scenario files
             needs = "'stranding' needs 'failures'"  # word: key of scenario files
             raise ValueError(f"{needs}, the number of those that are lost together.")
-        if not 0.0 <= self.least_noise <= 1.0:
-            raise ValueError("'least_noise' must lie in [0, 1].")
+        if not (0.0 <= self.least_noise <= 1.0 and 0.0 <= self.least_delay <= 1.0):
+            raise ValueError("'least_noise' and 'least_delay' must lie in [0, 1].")
 
 
 @dataclass(frozen=True)

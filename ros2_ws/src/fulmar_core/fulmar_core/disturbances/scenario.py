@@ -107,23 +107,27 @@ def bearing_late_s(scenario: Scenario, *, seed: int, number: int) -> float:
 
 def longest_delay(robot: Robot, scenario: Scenario) -> float:
     """Until the latest command of any world acts; only valves open late [s]."""
-    actuation = scenario.actuation
-    opening_s = actuation.opening_delay_s[1] if robot.actuators.opens_late else 0.0
-    return robot.actuators.response.latest_s + actuation.delay_s + opening_s
+    return robot.actuators.response.delay_s + scenario.actuation.delay_s + _longest_opening(robot, scenario)
+
+
+def _longest_opening(robot: Robot, scenario: Scenario) -> float:
+    """By which closed valves of any world open later than others close [s]."""
+    drawn_s = scenario.actuation.opening_delay_s[1] if robot.actuators.opens_late else 0.0
+    return robot.actuators.response.opening_delay_s + drawn_s
 
 
 def check_delays(robot: Robot, scenario: Scenario) -> None:
-    """Reject a scenario in which commands would be late by more than a control step.
+    """Reject a scenario in which valves that open late would begin later than after a control step.
 
     Raises:
         ConfigError: They would.
     """
     late_s = longest_delay(robot, scenario)
-    if robot.timing.is_over_within(late_s):
+    if _longest_opening(robot, scenario) > 0.0 and robot.timing.is_over_within(late_s):
         raise ConfigError(
-            f"scenario '{scenario.title}': commands would be up to {late_s:g} s late ('delay_s' and 'opening_delay_s' "
+            f"scenario '{scenario.title}': valves would open up to {late_s:g} s late ('delay_s' and 'opening_delay_s' "
             f"of 'actuation', with the robot's own); at most one control step, {robot.timing.control_s:g} s of "
-            f"'{robot.name}'."
+            f"'{robot.name}', where 'opening_delay_s' is not 0."
         )
 
 
@@ -193,7 +197,7 @@ def draw_world(robot: Robot, scenario: Scenario, draws: Draws) -> World:
     kick_direction = draws.uniform(-math.pi, math.pi)
     gain_share, lottery = draws.uniform(0.0, 1.0, count), draws.uniform(0.0, 1.0, count)
     chances = draws.uniform(0.0, 1.0, count)
-    delay, noise = draws.uniform(0.0, 1.0), draws.uniform(faults.least_noise, 1.0)
+    delay, noise = draws.uniform(faults.least_delay, 1.0), draws.uniform(faults.least_noise, 1.0)
     bias, scale = draws.normal(1.0, 6), draws.normal(1.0, 6)
     sensor_delay, dropout = draws.uniform(sensing.least_delay, 1.0), draws.uniform(0.0, 1.0)
     tether, slope = scenario.tether, scenario.slope

@@ -158,7 +158,7 @@ def draw_spatial_world(robot: Robot, scenario: Scenario, draws: Draws) -> Spatia
     low, high = faults.gain
     gain = low + (high - low) * draws.uniform(0.0, 1.0, count)
     lottery, chances = draws.uniform(0.0, 1.0, count), draws.uniform(0.0, 1.0, count)
-    delay, noise = draws.uniform(0.0, 1.0), draws.uniform(faults.least_noise, 1.0)
+    delay, noise = draws.uniform(faults.least_delay, 1.0), draws.uniform(faults.least_noise, 1.0)
     opening = draws.uniform(*faults.opening_delay_s)
     bias, scale = draws.normal(1.0, SENSED), draws.normal(1.0, SENSED)
     sensor_delay, dropout = draws.uniform(sensing.least_delay, 1.0), draws.uniform(0.0, 1.0)
