@@ -8,8 +8,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fulmar_benchmarks.falcon.campaign import Request, cells_of, requirements
-from fulmar_benchmarks.falcon.cells import figures
+from fulmar_benchmarks.falcon.campaign import Request, cells_of, ground_effect, requirements
+from fulmar_benchmarks.falcon.cells import figures, first_flight
 from fulmar_core.robot import load_robot
 
 ROBOT = load_robot("airship_v7")
@@ -77,7 +77,7 @@ def flown(heights, *, lost=(), control_dt=1.0):
     touching[list(lost), -1] = True
     return SimpleNamespace(
         position_error=np.abs(heights - 1.0), control_dt=control_dt, z=heights, touching=touching,
-        shares=np.zeros((*heights.shape, 5)),
+        shares=np.full((*heights.shape, 5), 0.4), speed=np.full(heights.shape, 20.0), y=0.0 * heights,
     )  # fmt: skip
 
 
@@ -100,3 +100,23 @@ def test_most_flights_must_settle_before_there_is_a_time_of_settling():
     settles, never = [2.0, 1.0, 1.0, 1.0], [2.0] * 4
     assert figures(flown([settles, settles, never]), "hold", ROBOT)["settling_s"] == pytest.approx(1.0)
     assert figures(flown([settles, never, never]), "hold", ROBOT)["settling_s"] is None
+
+
+def test_energy_per_metre_is_that_of_the_throttles_over_the_speed():
+    assert figures(flown([[1.0] * 4]), "hold", ROBOT)["energy_per_m"] == pytest.approx(0.4**2 / 20.0)
+
+
+def test_a_drawn_flight_ends_where_the_craft_is_lost():
+    run = flown([[1.0, 0.9, 0.8, 0.1], [1.0] * 4], lost=[0])
+    drawn = first_flight(run, ROBOT)
+    assert drawn["time_s"].tolist() == [1.0, 2.0, 3.0]
+    assert drawn["height_m"].tolist() == [1.0, 0.9, 0.8]
+    assert drawn["energy"] == pytest.approx([0.16, 0.32, 0.48])
+    assert drawn["surfaces_deg"]["elevator"] == pytest.approx([8.0] * 3)
+    assert len(first_flight(flown([[1.0] * 40], control_dt=0.1), ROBOT)["time_s"]) == 20
+
+
+def test_least_energy_per_metre_is_that_of_some_trim_near_the_cruise():
+    ground = ground_effect("airship_v7")
+    assert 0.0 < ground["least_energy_per_m"] <= ground["energy_per_m"]
+    assert 22.4 <= ground["least_energy_speed"] <= 33.6

@@ -52,14 +52,14 @@ def test_a_flight_has_the_stated_keys(fulmar, brief, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_report_is_a_page_with_both_plots(fulmar, brief, tmp_path):
+def test_a_report_is_a_page_of_errors_flights_and_ground_effect(fulmar, brief, tmp_path):
     words = ("--tasks", "a,hold", "--controllers", "lqi", "--scenarios", "exact,light", "--episodes", 2)
     code, out, _ = fulmar("benchmark", "falcon", *words, "--out", tmp_path / "falcon")
     assert code == 0
     assert "hold" in out
     (page,) = (tmp_path / "falcon").glob("*.html")
     text = page.read_text(encoding="utf-8")
-    assert text.count("<svg") == 2
+    assert text.count("<svg") == 3
     assert "Ground effect" in text
 
 

@@ -100,7 +100,7 @@ def test_limits_of_nothing_are_refused(name):
 @pytest.mark.slow
 @pytest.mark.parametrize("task", ["a", "b", "c", "d", "e", "f"])
 def test_it_flies_every_reference_of_the_thesis(task):
-    found = fly(Cell("airship_v7", task, "pid", "exact", 1, 3))
+    found = fly(Cell("airship_v7", task, "pid", "exact", 1, 3))[0]
     assert found["survival"] == 1.0
     assert found["rmse_per_axis_m"] <= 0.15
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -10,10 +11,10 @@ import numpy as np
 
 from fulmar_benchmarks.falcon.cells import RANDOM, Cell, fly
 from fulmar_benchmarks.workers import mapped
-from fulmar_core.errors import FulmarError
+from fulmar_core.errors import ConfigError, FulmarError
 from fulmar_core.flight.ground_effect import induced_drag_ratio, lift_ratio
-from fulmar_core.flight.trim import find_trim
-from fulmar_core.robot import load_robot
+from fulmar_core.flight.trim import Trim, find_trim
+from fulmar_core.robot import Robot, load_robot
 from policy_server.controllers import shipped_policy
 
 Progress = Callable[[float, float], None]
@@ -22,6 +23,7 @@ THESIS_ENERGY = (0.303, 0.590, 0.689, 0.723, 0.743)  # same
 HALF = 0.5  # of the thesis' RMSE, which exact state must stay below
 WITH_SENSORS = {"a": 0.03, "d": 0.03, "e": 0.03}  # limits with sensors; elsewhere the thesis' own [m]
 MPPI_LIMIT = {"a": 0.03, "d": 0.03, "e": 0.03}  # of MPPI with exact state [m]
+DRAWN = "calm"  # scenario whose flights the report draws, where it is flown
 SEEDS = 5  # of a controller that draws, with exact state
 HOLD = "hold"  # the task whose flights begin at different heights
 STEADY = (HOLD, "a", "d", "e", "f")  # tasks that must survive noise, delay and light turbulence
@@ -45,20 +47,27 @@ class Request:
     policy: str = ""  # folder of a bundle; empty: the shipped ones
 
 
-def run_falcon(request: Request, progress: Progress) -> dict[str, Any]:
-    """Fly every cell, and put the figures together; JSON-ready."""
+Flights = dict[str, dict[str, dict[str, Any]]]  # by task and controller, as of `cells.first_flight`
+
+
+def run_falcon(request: Request, progress: Progress) -> tuple[dict[str, Any], Flights]:
+    """Fly every cell; all figures, JSON-ready, and a flight of each task by each controller, in calm air if flown."""
     cells = cells_of(request)
     flown = mapped(_fly, [(cell,) for cell in cells], jobs=request.jobs, progress=progress)
     tasks: dict[str, Any] = {}
-    for cell, figures in zip(cells, flown, strict=True):
+    flights: Flights = {}
+    for cell, (figures, flight) in zip(cells, flown, strict=True):
         tasks.setdefault(cell.task, {}).setdefault(cell.controller, {})[cell.scenario] = figures
-    return {
+        if flight and (cell.scenario == DRAWN or cell.controller not in flights.get(cell.task, {})):
+            flights.setdefault(cell.task, {})[cell.controller] = flight
+    document = {
         "robot": request.robot,
         "seed": request.seed,
         "episodes": request.episodes,
         "tasks": tasks,
         "ground_effect": ground_effect(request.robot),
     }
+    return document, flights
 
 
 def cells_of(request: Request) -> list[Cell]:
@@ -89,11 +98,11 @@ def _episodes(request: Request, task: str, controller: str, scenario: str) -> in
     return min(request.episodes, SEEDS) if controller in RANDOM else 1
 
 
-def _fly(cell: Cell) -> dict[str, Any]:
+def _fly(cell: Cell) -> tuple[dict[str, Any], dict[str, Any]]:
     try:
         return fly(cell)
     except FulmarError as error:
-        return {"error": str(error), "survival": None, "episodes": 0}
+        return {"error": str(error), "survival": None, "episodes": 0}, {}
 
 
 def ground_effect(name: str) -> dict[str, Any]:
@@ -103,15 +112,28 @@ def ground_effect(name: str) -> dict[str, Any]:
     assert frame is not None  # of an aircraft
     trims = [find_trim(robot, frame.speed, height) for height in HEIGHTS_M]
     over_span = np.geomspace(0.1, 3.0, 40)
+    best = _least_energy(robot, frame.speed)
     return {
         "heights_m": list(HEIGHTS_M),
         "energy": [trim.throttle**2 for trim in trims],
         "thrust_n": [trim.thrust for trim in trims],
         "thesis_energy": list(THESIS_ENERGY),
+        "energy_per_m": trims[0].throttle ** 2 / frame.speed,
+        "least_energy_per_m": best.throttle**2 / best.speed,
+        "least_energy_speed": best.speed,
         "height_over_span": over_span.tolist(),
         "lift_ratio": lift_ratio(over_span, frame.aspect_ratio, frame.taper).tolist(),
         "induced_drag_ratio": induced_drag_ratio(over_span, frame.aspect_ratio, frame.taper).tolist(),
     }
+
+
+def _least_energy(robot: Robot, speed: float) -> Trim:
+    """Trim at the first of `HEIGHTS_M` that takes the least mean squared throttle per metre, near a speed [m/s]."""
+    trims = []
+    for share in np.linspace(0.8, 1.2, 41):
+        with contextlib.suppress(ConfigError):  # there is no level flight as slow as that
+            trims.append(find_trim(robot, share * speed, HEIGHTS_M[0]))
+    return min(trims, key=lambda trim: float(trim.throttle**2 / trim.speed))
 
 
 def requirements(document: dict[str, Any]) -> list[tuple[str, str, str, bool]]:
@@ -131,7 +153,7 @@ def requirements(document: dict[str, Any]) -> list[tuple[str, str, str, bool]]:
                 good = rmse is not None and rmse <= limit and found["survival"] == 1.0
                 shown = "crashed" if rmse is None else f"{rmse:.4f} m"
                 rows.append((f"LQI, ({task}), {scenario}: RMSE per axis", f"<= {limit:.4f} m", shown, good))
-            if scenario in ("noise", "delay", "light") and task in STEADY:
+            if scenario in ("noise", "delay", "late", "light") and task in STEADY:
                 rows.append(_survival_row(f"LQI, {task}, {scenario}", found["survival"], SURVIVAL))
         if task == HOLD:
             rows += _policy_rows(controllers.get("policy", {}))

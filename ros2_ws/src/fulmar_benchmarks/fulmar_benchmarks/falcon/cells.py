@@ -13,10 +13,10 @@ import numpy as np
 from fulmar_benchmarks.falcon.published import BESIDE
 from fulmar_core.controllers.classical import FLIGHT_LAWS, gains_of
 from fulmar_core.controllers.controller import Controller
-from fulmar_core.disturbances.parts import Air, Sensing
+from fulmar_core.disturbances.parts import Actuation, Air, Sensing
 from fulmar_core.disturbances.scenario import Scenario
 from fulmar_core.flight.turbulence import CLASSES
-from fulmar_core.references.flight_paths import PATHS
+from fulmar_core.references.flight_paths import PATHS, Profile
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.rollout import roll_out_in_batch
 from fulmar_core.tasks import load_task
@@ -27,10 +27,11 @@ TASKS = ("hold", *PATHS)
 CONTROLLERS = ("lqi", "lqr", "mppi", "pid", "policy")
 # Controllers that draw: flights with exact state differ by their seeds.
 RANDOM = tuple(name for name, entry in FLIGHT_LAWS.items() if entry.draws)
-LATE_S = 0.02  # delay of measurements in `delay` and `all`
+LATE_S = 0.02  # delay of measurements in `delay` and `all`, of commands in `late`
 NOISY = 2.0  # times the noise of the sensors: the mild row of FALCON-S
 SETTLED_M = 0.1  # a flight has settled once it stays so near to its reference
 WITHOUT_START_S = 10.0  # after which `late_altitude_rmse_m` counts
+PLOTTED_S = 0.2  # between points of a flight that is drawn
 
 
 def _scenario(name: str, **parts: Any) -> Scenario:
@@ -42,6 +43,7 @@ SCENARIOS = {
     "calm": _scenario("calm"),
     "noise": _scenario("noise", sensing=Sensing(noise=NOISY)),
     "delay": _scenario("delay", sensing=Sensing(delay_s=LATE_S, least_delay=1.0)),
+    "late": _scenario("late", actuation=Actuation(delay_s=LATE_S, least_delay=1.0)),
     "light": _scenario("light", air=Air(turbulence=CLASSES["light"])),
     "severe": _scenario("severe", air=Air(turbulence=CLASSES["severe"])),
     "all": _scenario(
@@ -84,8 +86,13 @@ def controller_of(robot: Robot, cell: Cell) -> Controller:
     return law
 
 
-def fly(cell: Cell) -> dict[str, Any]:
-    """Fly a cell; its figures, JSON-ready, see `fulmar benchmark falcon --help`."""
+def reference(task: str) -> tuple[Profile, Profile]:
+    """Place to the left and height [m] over time [s] of what a task follows."""
+    return PATHS.get(task, (lambda t: 0.0 * t, lambda t: 1.0 + 0.0 * t))
+
+
+def fly(cell: Cell) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Fly a cell; its figures, JSON-ready, see `fulmar benchmark falcon --help`, and its `first_flight`."""
     robot, task = load_robot(cell.robot), load_task(f"fly_{cell.task}")
     controller = controller_of(robot, cell)
     begun = time.perf_counter()
@@ -94,7 +101,7 @@ def fly(cell: Cell) -> dict[str, Any]:
     )
     found = figures(run, cell.task, robot) | {"wall_s": time.perf_counter() - begun}
     published = BESIDE.get(cell.controller, {}).get(cell.task)
-    return found | {"thesis": published.as_json() if published else {}}
+    return found | {"thesis": published.as_json() if published else {}}, first_flight(run, robot)
 
 
 def figures(run: Trajectories, task: str, robot: Robot) -> dict[str, Any]:
@@ -105,8 +112,7 @@ def figures(run: Trajectories, task: str, robot: Robot) -> dict[str, Any]:
     """
     error = np.asarray(run.position_error, dtype=float)
     times = run.control_dt * np.arange(1, error.shape[1] + 1)
-    height = np.full_like(times, 1.0) if task == "hold" else PATHS[task][1](times)
-    off = np.asarray(run.z, dtype=float) - height
+    off = np.asarray(run.z, dtype=float) - reference(task)[1](times)
     alive = ~np.any(run.touching, axis=1)
     rmse = np.sqrt(np.mean(error**2, axis=1))
     throttles = np.asarray(run.shares)[..., robot.actuators.positions :]
@@ -130,6 +136,31 @@ def figures(run: Trajectories, task: str, robot: Robot) -> dict[str, Any]:
         "settling_s": median(settled),
         "peak_error_m": median(error.max(axis=1)),
         "energy": median(np.mean(throttles**2, axis=(1, 2))),
+        "energy_per_m": median(np.mean(throttles**2, axis=(1, 2)) / np.mean(run.speed, axis=1)),
         "survival": float(np.mean(alive)),
         "episodes": len(alive),
+    }
+
+
+def first_flight(run: Trajectories, robot: Robot) -> dict[str, Any]:
+    """The first of some flights until it touches the water, every `PLOTTED_S`.
+
+    Returns:
+        `time_s`, `height_m`, `left_m`, `energy` (mean squared throttle, added up over time [s]), and `surfaces_deg` by
+        name; arrays of equal length.
+    """
+    every = max(1, round(PLOTTED_S / run.control_dt))
+    flown = int(np.argmax(run.touching[0])) if run.touching[0].any() else run.touching.shape[1]
+    count, limits = robot.actuators.positions, np.degrees(robot.actuators.scale)
+    shares = run.shares[0, :flown]
+    energy = np.cumsum(np.mean(np.square(shares[:, count:]), axis=1)) * run.control_dt
+    picked = slice(0, flown, every)
+    return {
+        "time_s": run.control_dt * np.arange(1, flown + 1)[picked],
+        "height_m": np.asarray(run.z)[0, picked],
+        "left_m": run.y[0, picked],
+        "energy": energy[picked],
+        "surfaces_deg": {
+            name: shares[picked, i] * limits[i] for i, name in enumerate(robot.actuators.names[:count])
+        },
     }

@@ -1,4 +1,4 @@
-"""Report of the benchmark of FALCON-S: errors by task and scenario, and ground effect over height."""
+"""Report of the benchmark of FALCON-S: errors by task and scenario, flights, and ground effect over height."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from fulmar_benchmarks.falcon.campaign import requirements
+from fulmar_benchmarks.falcon.campaign import Flights, requirements
+from fulmar_benchmarks.falcon.flight_plots import draw_flights
 from fulmar_benchmarks.falcon.tables import lines
 from fulmar_evaluation.report.page import Part, Plot, headline
 from fulmar_evaluation.report.style import house_style, quiet_grid
@@ -18,18 +19,23 @@ from fulmar_evaluation.report.writer import write_benchmark
 _ERRORS = """
 RMSE per axis of each task, median over the flights that survive, by scenario. A cross at the top: none survives. The
 stroke is the thesis' controller of the kind (Tables 5.7 and 5.8)."""
+_FLIGHTS = """
+The first flight of each task, in calm air with sensors, of what flew with exact state alone with that; black: the
+reference. A line ends where the craft is lost. Energy is the mean squared throttle, added up over time."""
 _GROUND = """
 Left: lift and induced drag near the ground over those in free air at the same angle of attack (Phillips and Hunsaker,
 2013), as in thesis Fig. 5.1. Right: mean squared throttle in level flight, and that of thesis Table 5.2, whose motors
 had other constants."""
 
 
-def write_report(document: dict[str, Any], out: Path) -> Path:
-    """Write the page and its plots into a folder; returns the page."""
+def write_report(document: dict[str, Any], flights: Flights, out: Path) -> Path:
+    """Write the page and its plots into a folder; arguments as `run_falcon` returns them. Returns the page."""
     met = requirements(document)
     with house_style():
         parts: list[Part] = [headline(f"{sum(good for *_, good in met)} of {len(met)} requirements are met.")]
         parts.append(Plot("Errors by task", _ERRORS, draw_errors(document), "errors"))
+        if flights:
+            parts.append(Plot("Flights", _FLIGHTS, draw_flights(flights), "flights"))
         parts.append(Plot("Ground effect", _GROUND, draw_ground(document), "ground_effect"))
         parts.append("<h2>All figures</h2><pre>" + escape("\n".join(lines(document))) + "</pre>")
         return write_benchmark(out, f"{document['robot']} over the water", parts)

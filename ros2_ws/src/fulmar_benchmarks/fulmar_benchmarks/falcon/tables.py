@@ -39,6 +39,17 @@ def lines(document: dict[str, Any]) -> list[str]:
             ground["heights_m"], ground["energy"], ground["thesis_energy"], strict=True
         )
     ]
+    found.append(
+        f"mean squared throttle per metre at {ground['heights_m'][0]:g} m: {1e3 * ground['energy_per_m']:.3f}e-3 in "
+        f"trim at the task's speed, at least {1e3 * ground['least_energy_per_m']:.3f}e-3, at "
+        f"{ground['least_energy_speed']:.1f} m/s; flown:"
+    )
+    found += [
+        f"  {by}, {scenario}: {1e3 * each['energy_per_m']:.3f}e-3"
+        for by, scenarios in document["tasks"].get("hold", {}).items()
+        for scenario, each in scenarios.items()
+        if each.get("energy_per_m") is not None
+    ]
     for name, asked, shown, good in requirements(document):
         found.append(f"{'met' if good else 'NOT MET':8} {name}: {shown} ({asked})")
     return found

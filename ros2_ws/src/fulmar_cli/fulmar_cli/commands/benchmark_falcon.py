@@ -28,7 +28,7 @@ def falcon(
     tasks: Annotated[str, option("T,...", "Out of hold and a to f, or all.")] = "all",
     controllers: Annotated[str, option("C,...", "Out of lqi, lqr, mppi, pid and policy, or all.")] = "all",
     scenarios: Annotated[
-        str, option("S,...", "Out of exact, calm, noise, delay, light, severe and all, or `every`.")
+        str, option("S,...", "Out of exact, calm, noise, delay, late, light, severe and all, or `every`.")
     ] = "every",
     episodes: Annotated[
         int, option("N", "Flights of each cell; 1 with exact state on a path, at most 5 of mppi.", min=1)
@@ -46,11 +46,11 @@ def falcon(
 
     Flights of 60 s in the core's dynamics: `hold` one metre over the water, and (a) to (f) of thesis §5.5.2. Scenarios:
     exact (state as it is), calm (sensors of 100 Hz with 0.05 m, 0.05 m/s, 0.01 rad, 0.01 rad/s), calm with twice the
-    noise, a delay of 20 ms, light or severe Dryden turbulence, or noise, delay and light turbulence in `all`.
-    `rmse_per_axis_m` is √(mean e² / 3), as the thesis prints it, `rmse_m` √(mean e²), medians over the flights that
-    survive, and `wall_s` what the flights of a cell took side by side. Where no scenarios are named mppi flies `exact`
-    alone, in 5 flights that differ by the seeds of its noise. A flight survives if the hull touches no water and no
-    angle of attack goes beyond 1.5 times the stall's.
+    noise, measurements (`delay`) or commands (`late`) that are 20 ms late, light or severe Dryden turbulence, or noise,
+    delay and light turbulence in `all`. `rmse_per_axis_m` is √(mean e² / 3), as the thesis prints it, `rmse_m` √(mean
+    e²), medians over the flights that survive, and `wall_s` what the flights of a cell took side by side. Where no
+    scenarios are named mppi flies `exact` alone, in 5 flights that differ by the seeds of its noise. A flight survives
+    if the hull touches no water and no angle of attack goes beyond 1.5 times the stall's.
 
     Try:
 
@@ -81,7 +81,7 @@ def falcon(
         str(policy or ""),
     )
     with work_bar("flights") as progress:
-        document = run_falcon(request, progress)
+        document, flights = run_falcon(request, progress)
     document["command"] = invoked_command()
     out.mkdir(parents=True, exist_ok=True)
     (out / "falcon.json").write_text(json.dumps(document, indent=1), encoding="utf-8")
@@ -89,5 +89,5 @@ def falcon(
         require("matplotlib")
         from fulmar_benchmarks.falcon.report import write_report
 
-        log_line(f"report: {write_report(document, out)}")
+        log_line(f"report: {write_report(document, flights, out)}")
     print_result(document, lambda found: print_tables(found, write_line), as_json=as_json)
