@@ -54,6 +54,9 @@ SCENARIOS = {
 }
 
 
+OUTDOORS = ("exact", "calm", "light", "severe")
+
+
 @dataclass(frozen=True)
 class Cell:
     """What one cell flies."""

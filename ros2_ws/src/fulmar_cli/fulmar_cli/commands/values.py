@@ -12,8 +12,10 @@ from fulmar_core.safety.geofence import check_area
 Area = tuple[float, ...]  # x_min, x_max, y_min, y_max, in space also z_min, z_max [m]
 
 
-def read_names(text: str, family: str, known: Sequence[str], *, as_given: bool = False) -> tuple[str, ...]:
-    """Read names with commas between them, in the order of those known or `as_given`; `all` stands for every one.
+def read_names(
+    text: str, family: str, known: Sequence[str], *, as_given: bool = False, every: str = "all"
+) -> tuple[str, ...]:
+    """Read names with commas between them, in the order of those known or `as_given`; `every` stands for all of them.
 
     Raises:
         UnknownNameError: For the first that is not known.
@@ -21,13 +23,13 @@ def read_names(text: str, family: str, known: Sequence[str], *, as_given: bool =
     """
     names = list(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
     for name in names:
-        if name not in (*known, "all"):
+        if name not in (*known, every):
             raise UnknownNameError(family, name, known)
     if not names:
-        raise ConfigError(f"'{text}' names no {family}; known: {', '.join(known)}, or all.")
-    if as_given and "all" not in names:
+        raise ConfigError(f"'{text}' names no {family}; known: {', '.join(known)}, or {every}.")
+    if as_given and every not in names:
         return tuple(names)
-    return tuple(name for name in known if name in names or "all" in names)
+    return tuple(name for name in known if name in names or every in names)
 
 
 def read_area(text: str | None) -> Area | None:
