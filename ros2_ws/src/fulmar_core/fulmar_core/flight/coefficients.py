@@ -12,6 +12,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
+from array_api_compat import is_numpy_array
+
 from fulmar_core.arrays import clip
 from fulmar_core.errors import did_you_mean
 from fulmar_core.rotation import Array
@@ -22,7 +24,8 @@ ANGLES = ("alpha", "beta", *SURFACES)
 ALPHADOT = "alphadot"
 RATES = ("p", "q", "r", ALPHADOT)
 FACTORS = (*ANGLES, *RATES)
-Term = tuple[float, tuple[tuple[str, int], ...]]  # number, and powers of factors
+Factors = tuple[tuple[str, int], ...]  # with their powers
+Term = tuple[float, Factors]
 Flow = Mapping[str, Array]  # factors by name: angles [rad], rates dimensionless, shapes (...,)
 
 
@@ -80,7 +83,10 @@ class Coefficients:
                 raise ValueError(f"'signs' takes 1 or -1 for {', '.join(SURFACES)}, found {name}: {sign:g}.")
         if self.alpha_range is not None and self.alpha_range[0] >= self.alpha_range[1]:
             raise ValueError("'alpha_range' must be [low, high] with low < high.")
-        object.__setattr__(self, "_parsed", {name: self._terms_of(name) for name in NAMES})
+        parsed = {name: self._terms_of(name) for name in NAMES}
+        object.__setattr__(self, "_parsed", parsed)
+        slopes = {name: tuple((*term, _slopes(*term)) for term in terms) for name, terms in parsed.items()}
+        object.__setattr__(self, "_with_slopes", slopes)
 
     def _terms_of(self, name: str) -> tuple[Term, ...]:
         return tuple((number, _powers(words)) for words, number in self.terms.get(name, {}).items())
@@ -117,19 +123,19 @@ class Coefficients:
             low, high = (end - self.alpha_zero for end in self.alpha_range)
             own["alpha"] = clip(alpha, low, high)
             beyond = alpha - own["alpha"]
+            if is_numpy_array(beyond) and not beyond.any():  # what is traced has no numbers yet
+                beyond = None
         powers = _Powers(own)
         return {name: self._one(name, powers, alpha, beyond) for name in NAMES}
 
     def _one(self, name: str, powers: _Powers, alpha: Array, beyond: Array | None) -> Array:
         found = 0.0 * alpha
-        for number, factors in self.parsed[name]:
+        terms: tuple[tuple[float, Factors, tuple[Term, ...]], ...] = self._with_slopes[name]  # type: ignore[attr-defined]
+        for number, factors, slopes in terms:
             found = found + number * powers.product(factors)
-            if beyond is None:
-                continue
-            for at, (factor, power) in enumerate(factors):
-                if factor == "alpha":
-                    rest = (*factors[:at], *(((factor, power - 1),) if power > 1 else ()), *factors[at + 1 :])
-                    found = found + beyond * (number * power) * powers.product(rest)
+            if beyond is not None:
+                for slope, rest in slopes:
+                    found = found + beyond * slope * powers.product(rest)
         if name in self.tables:
             found = found + self.tables[name].at(alpha + self.alpha_zero)
         return found
@@ -140,9 +146,9 @@ class _Powers:
 
     def __init__(self, own: Mapping[str, Array]) -> None:
         self._own = own
-        self._known: dict[tuple[tuple[str, int], ...], Array] = {}
+        self._known: dict[Factors, Array] = {}
 
-    def product(self, factors: tuple[tuple[str, int], ...]) -> Array | float:
+    def product(self, factors: Factors) -> Array | float:
         if not factors:
             return 1.0
         if factors not in self._known:
@@ -153,7 +159,16 @@ class _Powers:
         return self._known[factors]
 
 
-def _powers(words: str) -> tuple[tuple[str, int], ...]:
+def _slopes(number: float, factors: Factors) -> tuple[Term, ...]:
+    """Derivative of a term by the angle of attack."""
+    return tuple(
+        (number * power, (*factors[:at], *(((factor, power - 1),) if power > 1 else ()), *factors[at + 1 :]))
+        for at, (factor, power) in enumerate(factors)
+        if factor == "alpha"
+    )
+
+
+def _powers(words: str) -> Factors:
     """Factors of a term such as `alpha^2 elevator`; none for `1`.
 
     Raises:
