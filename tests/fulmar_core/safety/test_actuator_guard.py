@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -303,10 +305,29 @@ class TestCommandWriters:
     def test_wheels_slow_down_instead_of_locking(self, base):
         for k in range(6):
             base.offer(BASE.names, [0.45, 0.0], 100 * k * MS, stamp_ns=(100 + 100 * k) * MS)
+            base.output(100 * k * MS)
         base.publishers.see(TWO, 510 * MS)
         assert base.output(510 * MS)[0] == pytest.approx(0.45)
         assert 0.0 < base.output(700 * MS)[0] < 0.4
         assert base.output(1_200 * MS)[0] == 0.0
+
+    def test_the_safe_controller_begins_at_what_was_carried_out_and_not_at_a_strangers_command(self):
+        begun = []
+
+        class Noting:
+            longest_s, doing = math.inf, "notes"
+
+            def command(self, _since_s, last, _state):
+                begun.append(last.tolist())
+                return last
+
+        guard = ActuatorGuard(THRUSTERS, Watchdog(200 * MS), refuge=Noting())
+        guard.offer(NAMES, GOOD, 0)
+        assert guard.output(0).tolist() == GOOD
+        guard.publishers.see(TWO, 1 * MS)
+        guard.offer(NAMES, [1.0] * 8, 2 * MS)
+        guard.output(3 * MS)
+        assert begun == [GOOD]
 
 
 @given(

@@ -75,6 +75,7 @@ class ActuatorGuard:
     def reset(self) -> None:
         """Forget the command: a plant that starts again begins with the safe one, and with the controller."""
         self.command = self._actuators.safe_command
+        self._carried_out = self.command  # the newest that was: one that comes under the e-stop is not
         self.person = False
         self._stamp_ns = 0
         self._stopped_ns: int | None = None
@@ -198,13 +199,14 @@ class ActuatorGuard:
         """The command, or that of the safe controller where the command has ended [ns]."""
         if since_ns is None:
             self._steering_ns = None
+            self._carried_out = self.command
             return self.command
         since_s = max(0, now_ns - since_ns) / 1e9
         if self._steers and plant_ns is not None:
             if self._steering_ns is None:
                 self._steering_ns = plant_ns
             since_s = (plant_ns - self._steering_ns) / 1e9
-        return self.refuge.command(since_s, self.command, state)
+        return self.refuge.command(since_s, self._carried_out, state)
 
     def _handed_over(self, now_ns: int) -> int | None:
         """Since when the e-stop, a second publisher or the controller itself has ended the command [ns]."""
