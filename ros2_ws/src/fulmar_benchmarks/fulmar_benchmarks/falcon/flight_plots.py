@@ -34,12 +34,17 @@ def draw_flights(flights: dict[str, dict[str, dict[str, Any]]]) -> Figure:
         quiet_grid(axes)
     for axes in panels[-1]:
         axes.set_xlabel("time [s]")
+    name_lines(figure, panels[:, 0], ncols=6)
+    return figure
+
+
+def name_lines(figure: Figure, panels: np.ndarray, **how: Any) -> None:
+    """One legend under a figure with every label of some panels once; `how` as of matplotlib's `legend`."""
     handles: dict[str, Any] = {}
-    for axes in panels[:, 0]:
+    for axes in panels:
         drawn, names = axes.get_legend_handles_labels()
         handles |= dict(zip(names, drawn, strict=True))
-    figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=6)
-    return figure
+    figure.legend(handles.values(), handles.keys(), loc="outside lower center", **how)
 
 
 def _draw_one(row: np.ndarray, flight: dict[str, Any], by: str, color: str) -> None:

@@ -10,7 +10,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from fulmar_benchmarks.falcon.campaign import Flights, requirements
-from fulmar_benchmarks.falcon.flight_plots import draw_flights
+from fulmar_benchmarks.falcon.cells import SCENARIOS
+from fulmar_benchmarks.falcon.flight_plots import draw_flights, name_lines
 from fulmar_benchmarks.falcon.tables import lines
 from fulmar_evaluation.report.page import Part, Plot, headline
 from fulmar_evaluation.report.style import house_style, quiet_grid
@@ -50,21 +51,22 @@ def draw_errors(document: dict[str, Any]) -> Figure:
     figure = Figure(figsize=(4.4 * max(1, len(by)), 4.0), layout="constrained")
     panels = figure.subplots(1, max(1, len(by)), sharey=True, squeeze=False)[0]
     for axes, (controller, tasks) in zip(panels, by.items(), strict=False):
-        scenarios = list(dict.fromkeys(name for each in tasks.values() for name in each))
-        for number, scenario in enumerate(scenarios):
-            aside = 0.08 * (number - 0.5 * len(scenarios))
+        for number, scenario in enumerate(SCENARIOS):
+            if not any(scenario in each for each in tasks.values()):
+                continue
+            color, aside = f"C{number}", 0.08 * (number - 0.5 * len(SCENARIOS))
             flown = {
                 place + aside: each[scenario].get("rmse_per_axis_m")
                 for place, each in enumerate(tasks.values())
                 if scenario in each
             }
             alive = {place: rmse for place, rmse in flown.items() if rmse is not None}
-            (dots,) = axes.plot(list(alive), list(alive.values()), "o", markersize=4, label=scenario)
+            axes.plot(list(alive), list(alive.values()), "o", markersize=4, color=color, label=scenario)
             axes.plot(
                 [place for place in flown if place not in alive],
                 [0.98] * (len(flown) - len(alive)),
                 "x",
-                color=dots.get_color(),
+                color=color,
                 transform=axes.get_xaxis_transform(),
             )
         published = [
@@ -81,9 +83,7 @@ def draw_errors(document: dict[str, Any]) -> Figure:
         axes.set_title(controller)
         quiet_grid(axes)
     panels[0].set_ylabel("RMSE per axis [m]")
-    figure.legend(
-        *panels[0].get_legend_handles_labels(), fontsize="small", loc="outside lower center", ncols=5
-    )
+    name_lines(figure, panels, ncols=5, fontsize="small")
     return figure
 
 
