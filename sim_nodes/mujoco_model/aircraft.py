@@ -35,7 +35,6 @@ class Aircraft:
         self._actuation: ActuationState | None = None
         self._gust: Gust | None = None
         self._tick = -1
-        self._low = robot.hull_span[0]
 
     def add(self, spec: mujoco.MjSpec) -> mujoco.MjsBody:
         """Add the body; see `RobotModel.add`."""
@@ -85,13 +84,13 @@ class Aircraft:
     def drive(
         self, model: mujoco.MjModel, data: mujoco.MjData, applied: np.ndarray, gain: np.ndarray, outside: Any
     ) -> None:
-        """Set the forces of the coming step; see `RobotModel.drive`. What touches the water stops there."""
+        """Set the forces of the coming step; see `RobotModel.drive`. What flies no longer stops there."""
         assert self._actuation is not None  # as of `fly_in`
-        if data.qpos[2] + self._low <= 0.0:
+        state, dt = self._state(data), self._robot.timing.physics_dt
+        if not self._dynamics.flies(state)[0]:
             data.qvel[:] = 0.0
             data.xfrc_applied[self._body] = 0.0, 0.0, model.body_mass[self._body] * GRAVITY, 0.0, 0.0, 0.0
             return
-        state, dt = self._state(data), self._robot.timing.physics_dt
         tick = round(data.time / model.opt.timestep) // STEPS
         if tick != self._tick:
             self._tick, self._gust = tick, self._dynamics.gust(state, self._actuation, self._world, dt)

@@ -262,3 +262,16 @@ def test_a_spacecraft_obeys_the_mass_the_inertia_and_the_wrench_of_its_world(bui
     truth = backend.step(np.zeros(16), 25).truth
     np.testing.assert_allclose(truth.velocity_in_world, [0.0, 0.0, 0.05], rtol=0, atol=1e-9)
     np.testing.assert_allclose(truth.angular_velocity_in_body, [0.0, 0.0, 0.1], rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("kind", sorted(BUILDERS))
+def test_an_aircraft_that_tumbles_faster_than_models_of_the_air_hold_for_loses_its_speed(kind):
+    robot = ROBOTS["airship_v7"]
+    backend = BUILDERS[kind](robot)
+    tumbling = [float(part) for part in flying_at(robot, ALOFT).columns()]
+    tumbling[SpatialState.COLUMNS.index("wx")] = 40.0
+    backend.reset(episode_of(robot, start=tumbling), seed=1)
+    for _ in range(5):
+        sample = backend.step(command_of(robot))
+    backend.close()
+    assert np.abs(sample.truth.velocity_in_world).max() < 2.0

@@ -204,35 +204,3 @@ def test_evaluation_works_where_training_is_not_installed(monkeypatch):
     result = CliRunner().invoke(app, arguments.split())
     assert result.exit_code == 0, result.output
     assert json.loads(result.stdout)["episodes"] == 2
-
-
-class Diving:
-    """A controller that presses the nose down at full thrust."""
-
-    name = "diving"
-    estimator = None
-    control_hz = 100.0
-
-    def reset(self):
-        pass
-
-    def act(self, inputs):
-        return np.tile([np.radians(20.0), 0.0, 0.0, 1.0, 1.0], (len(inputs.observation), 1))
-
-
-def test_an_aircraft_that_is_lost_is_simulated_no_further_and_stays_where_it_was_lost():
-    craft = load_robot("airship_v7")
-    task = replace(load_task("fly_hold"), episode_s=4.0)
-    steps = []
-
-    class Watched(MockBackend):
-        def step(self, command, ticks=1):
-            steps.append(ticks)
-            return super().step(command, ticks)
-
-    run = roll_out_in_backends(Diving(), lambda: Watched(craft), task, IDEAL, episodes=1, seed=1)
-    lost = int(np.argmax(run.touching[0]))
-    assert 0 < lost < 200
-    assert run.touching[0, lost:].all()
-    assert np.ptp(run.z[0, lost:]) == 0.0
-    assert len(steps) == lost + 1

@@ -139,7 +139,7 @@ def roll_out_in_backends(
                 for i, (backend, each) in enumerate(zip(backends, numbers, strict=False))
             ]
             worlds = _Backends(
-                backends, samples, robot.timing.substeps(controller.control_hz), task, drawn.goal
+                backends, samples, robot.timing.substeps(controller.control_hz), task.state_type
             )
             runs.append(_roll_out(controller, robot, task, worlds, drawn.goal, further))
     return join(runs)
@@ -193,31 +193,23 @@ def _roll_out(
 
 
 class _Backends:
-    """Simulators that are stepped side by side.
-
-    An aircraft that is lost stays where it was lost: what departs soon leaves what floating-point numbers hold.
-    """
+    """Simulators that are stepped side by side."""
 
     def __init__(
-        self, backends: list[Backend], samples: list[Sample], substeps: int, task: Task, goal: Goal
+        self, backends: list[Backend], samples: list[Sample], substeps: int, form: type[State]
     ) -> None:
-        """Begin with a first sample of each; `substeps` are physics ticks of a control step."""
-        self._backends, self._substeps, self._form = backends[: len(samples)], substeps, task.state_type
-        self._task, self._goal, self._robot = task, goal, backends[0].robot
-        self._lost = np.zeros(len(samples), dtype=bool)
+        self._backends, self._substeps, self._form = backends, substeps, form
         self._take(samples)
 
     def move(self, command: Array) -> None:
         """Apply commands for one control step."""
-        stepped = zip(self._backends, command, self._samples, self._lost, strict=True)
-        self._take([last if lost else one.step(each, self._substeps) for one, each, last, lost in stepped])
+        stepped = zip(self._backends, command, strict=False)
+        self._take([backend.step(each, self._substeps) for backend, each in stepped])
 
     def _take(self, samples: list[Sample]) -> None:
-        self._samples, form = samples, self._form
+        form = self._form
         self.measured = form.stack([form.from_rigid(sample.measured) for sample in samples])
         self.truth = form.stack([form.from_rigid(each.truth) for each in samples if each.truth is not None])
         self.things = {name: np.stack([each.things[name] for each in samples]) for name in samples[0].things}
         speeds = [each.readings["wheels"].value.speeds for each in samples if "wheels" in each.readings]
         self.wheels = np.stack(speeds) if speeds else None
-        if self._robot.flies:
-            self._lost |= np.asarray(self._task.collides(self.truth, self._goal, self._robot), dtype=bool)

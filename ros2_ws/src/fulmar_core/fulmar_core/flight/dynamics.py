@@ -101,15 +101,15 @@ class FlightDynamics(SpatialDynamics):
         return state
 
     def where_it_flies(self, before: SpatialState, after: SpatialState) -> SpatialState:
-        """The state after a step, or, of a craft that is lost, where it was, at rest.
-
-        Lost is one whose hull touches the ground, or that tumbles faster than any model of the air holds for.
-        """
-        xp = array_namespace(after.x)
-        flying = (after.z + self.robot.hull_span[0] > 0.0) & (dot(after.rate, after.rate) < FASTEST_TUMBLE**2)
+        """The state after a step, or, of a craft that flies no longer, where it was, at rest."""
+        xp, flying = array_namespace(after.x), self.flies(after)
         stopped = before.stopped()
         columns = zip(after.columns(), stopped.columns(), strict=True)
         return SpatialState(*(xp.where(flying, new, old) for new, old in columns))
+
+    def flies(self, state: SpatialState) -> Array:
+        """Whether the hull is above the ground, and tumbles no faster than models of the air hold for, shape (...,)."""
+        return (state.z + self.robot.hull_span[0] > 0.0) & (dot(state.rate, state.rate) < FASTEST_TUMBLE**2)
 
     def gust(
         self, state: SpatialState, actuation: ActuationState, world: FlightWorld, dt: float
