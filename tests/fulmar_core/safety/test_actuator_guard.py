@@ -311,6 +311,25 @@ class TestCommandWriters:
         assert 0.0 < base.output(700 * MS)[0] < 0.4
         assert base.output(1_200 * MS)[0] == 0.0
 
+    def test_wheels_that_stand_after_a_silence_stand_under_a_stop_whatever_comes(self, base):
+        for k in range(6):
+            base.offer(BASE.names, [0.45, 0.0], 100 * k * MS, stamp_ns=(100 + 100 * k) * MS)
+            base.output(100 * k * MS)
+        assert base.output(9_000 * MS)[0] == 0.0  # the controller hangs
+        base.publishers.see(TWO, 9_100 * MS)
+        base.offer(BASE.names, [0.45, 0.0], 9_200 * MS, stamp_ns=9_200 * MS)
+        assert not base.output(9_210 * MS).any()
+
+    def test_a_stop_while_wheels_slow_down_lets_them_go_on_slowing_down(self, base):
+        for k in range(6):
+            base.offer(BASE.names, [0.45, 0.0], 100 * k * MS, stamp_ns=(100 + 100 * k) * MS)
+            base.output(100 * k * MS)
+        way = base.output(1_100 * MS)[0]
+        assert 0.0 < way < 0.45
+        base.publishers.see(TWO, 1_110 * MS)
+        base.offer(BASE.names, [0.45, 0.0], 1_120 * MS, stamp_ns=1_120 * MS)
+        assert 0.0 < base.output(1_130 * MS)[0] < way
+
     def test_the_safe_controller_begins_at_what_was_carried_out_and_not_at_a_strangers_command(self):
         begun = []
 

@@ -33,7 +33,7 @@ class Refuge(Protocol):
 
         Args:
             since_s: Time since commands ended, >= 0 [s].
-            last: Last command before that, shape (n,).
+            last: Last command that was applied before that, shape (n,).
             state: Newest measured state; None where nothing measures one. A family that cannot simply stop, such as a
                 wing, steers by it, and needs an answer without it too.
 

@@ -75,7 +75,8 @@ class ActuatorGuard:
     def reset(self) -> None:
         """Forget the command: a plant that starts again begins with the safe one, and with the controller."""
         self.command = self._actuators.safe_command
-        self._carried_out = self.command  # the newest that was: one that comes under the e-stop is not
+        self._applied_last = self.command  # newest command that was applied; what comes under a stop is not
+        self._safe_since_ns: int | None = None  # since when the safe controller has acted
         self.person = False
         self._stamp_ns = 0
         self._stopped_ns: int | None = None
@@ -198,15 +199,17 @@ class ActuatorGuard:
     ) -> np.ndarray:
         """The command, or that of the safe controller where the command has ended [ns]."""
         if since_ns is None:
-            self._steering_ns = None
-            self._carried_out = self.command
+            self._steering_ns = self._safe_since_ns = None
+            self._applied_last = self.command
             return self.command
-        since_s = max(0, now_ns - since_ns) / 1e9
+        # A stop that follows a silence, with commands between them, must not begin the way to rest anew.
+        self._safe_since_ns = min(since_ns, since_ns if self._safe_since_ns is None else self._safe_since_ns)
+        since_s = max(0, now_ns - self._safe_since_ns) / 1e9
         if self._steers and plant_ns is not None:
             if self._steering_ns is None:
                 self._steering_ns = plant_ns
             since_s = (plant_ns - self._steering_ns) / 1e9
-        return self.refuge.command(since_s, self._carried_out, state)
+        return self.refuge.command(since_s, self._applied_last, state)
 
     def _handed_over(self, now_ns: int) -> int | None:
         """Since when the e-stop, a second publisher or the controller itself has ended the command [ns]."""
