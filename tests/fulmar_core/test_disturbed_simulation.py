@@ -84,6 +84,17 @@ def test_late_commands_act_after_their_delay_and_not_before():
     np.testing.assert_allclose(late.truth.yaw_rate, prompt.truth.yaw_rate * share, rtol=1e-9)
 
 
+@pytest.mark.parametrize("control_hz", [5.0, 10.0, 25.0])
+def test_a_delay_is_the_same_at_every_command_rate(control_hz):
+    always = replace(STILL, actuation=Actuation(delay_s=0.14, least_delay=1.0))
+    late = build(always, dtype=np.float64, control_hz=control_hz)
+    prompt = build(STILL, dtype=np.float64, control_hz=control_hz)
+    for _ in range(round(0.4 * control_hz)):
+        for simulation in (late, prompt):
+            simulation.step(np.eye(8)[[0] * 5])
+    np.testing.assert_allclose(late.truth.yaw_rate, prompt.truth.yaw_rate * (0.4 - 0.14) / 0.4, rtol=1e-9)
+
+
 def test_a_command_may_be_late_by_several_control_steps():
     late = build(replace(STILL, actuation=Actuation(delay_s=0.5)), dtype=np.float64)
     prompt = build(STILL, dtype=np.float64)

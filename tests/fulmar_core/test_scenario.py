@@ -46,7 +46,7 @@ ALL = Scenario(
     "everything happens", sensor_noise=True, body="uncertain",
     push=Push(0.2, 0.1), wave=Wave(0.1, 0.05), kick=Kick(0.3),
     tether=Tether((0.02, 0.05), 1.5, 0.1), slope=Slope((1.0, 3.0), 30.0),
-    actuation=Actuation(0.05, 0.0, (0.8, 1.1), 0.04, (0.01, 0.05), 2, 0.5),
+    actuation=Actuation(0.05, 0.0, (0.8, 1.1), 0.04, 0.0, (0.01, 0.05), 2, 0.5),
     sensing=Sensing(2.0, 2.0, 0.1, 0.2, (0.01, 0.03), (0.0, 0.02)),
 )  # fmt: skip
 

@@ -16,7 +16,7 @@ from fulmar_core.actuators.reaction_wheels import ReactionWheels
 from fulmar_core.actuators.rolling import Rolling
 from fulmar_core.actuators.wheel_actuation import WheelActuation
 from fulmar_core.arrays import array_namespace
-from fulmar_core.disturbances.scenario import Scenario
+from fulmar_core.disturbances.scenario import Scenario, longest_opening
 from fulmar_core.disturbances.world import World, outside_wrench
 from fulmar_core.dynamics.free_body import Wrench, free_body_step
 from fulmar_core.dynamics.rolling import rolling_step
@@ -28,7 +28,7 @@ from fulmar_core.sensors.wheels import WheelSpeeds
 
 
 def actuation_of(
-    robot: Robot, safe: Array, *, opens_late: bool = True, latest_s: float = 0.0
+    robot: Robot, safe: Array, *, opens_late: bool = True, latest_s: float = 0.0, step_s: float = math.inf
 ) -> ActuationState:
     """The actuators of a robot in their safe state.
 
@@ -37,12 +37,13 @@ def actuation_of(
         safe: Its safe command in every world, shape (n, worlds).
         opens_late: As of `may_open_late`.
         latest_s: As of `longest_delay` [s].
+        step_s: Least time between two commands [s].
     """
     response = robot.actuators.response
     if isinstance(robot.actuators, Rolling):
         response = dataclasses.replace(response, lag_s=0.0)  # the wheels' own servos bring it in
-    timing = robot.timing
-    delay_ticks = math.ceil(latest_s / timing.physics_dt) if timing.is_over_within(latest_s) else 0
+    lines = latest_s > step_s + 1e-9 and not opens_late
+    delay_ticks = math.ceil(latest_s / robot.timing.physics_dt - 1e-9) if lines else 0
     usual: dict[str, Any] = {
         "binary": robot.actuators.binary,
         "scale": robot.actuators.scale,
@@ -74,7 +75,7 @@ def surface_positions_of(robot: Robot, actuation: ActuationState) -> SurfacePosi
 
 def may_open_late(robot: Robot, scenario: Scenario) -> bool:
     """Whether closed valves open later than open ones close in any world."""
-    return max(robot.actuators.response.opening_delay_s, scenario.actuation.opening_delay_s[1]) > 0.0
+    return longest_opening(robot, scenario) > 0.0
 
 
 def may_be_off_centre(robot: Robot, scenario: Scenario) -> bool:

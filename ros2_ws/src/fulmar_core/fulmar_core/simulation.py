@@ -107,7 +107,11 @@ class BatchSimulation(MutableState, Generic[S]):
         safe = np.tile(robot.actuators.safe_command[:, None], (1, worlds))
         self._safe = self._real(safe)
         self._actuation = actuation_of(
-            robot, self._safe, opens_late=may_open_late(robot, scenario), latest_s=self._latest_s
+            robot,
+            self._safe,
+            opens_late=may_open_late(robot, scenario),
+            latest_s=self._latest_s,
+            step_s=self.control_dt,
         )
         self.command: Array = self._safe.T
         self._upcoming = UpcomingEpisodes(self._draw, worlds)

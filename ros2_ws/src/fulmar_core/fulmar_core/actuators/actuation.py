@@ -46,8 +46,8 @@ class ActuationState(MutableState):
             scale: Largest command of each actuator, shape (n,).
             safe: Safe command of every world, shape (n, worlds), of the floating type to compute in.
             opens_late: Whether closed valves may open later than open ones close; saves the work where none does.
-            delay_ticks: Physics ticks by which the latest command may act late, where these are longer than a control
-                step; 0 otherwise, which costs less. Valves that open late need 0.
+            delay_ticks: Physics ticks by which the latest command may act late, where another command may come
+                meanwhile; 0 otherwise, which costs less. Valves that open late need 0.
         """
         self._response, self._binary, self._opens_late = response, binary, opens_late
         self._scale = array_namespace(safe).asarray(scale, dtype=safe.dtype, device=device(safe))[:, None]

@@ -107,10 +107,10 @@ def bearing_late_s(scenario: Scenario, *, seed: int, number: int) -> float:
 
 def longest_delay(robot: Robot, scenario: Scenario) -> float:
     """Until the latest command of any world acts; only valves open late [s]."""
-    return robot.actuators.response.delay_s + scenario.actuation.delay_s + _longest_opening(robot, scenario)
+    return robot.actuators.response.delay_s + scenario.actuation.delay_s + longest_opening(robot, scenario)
 
 
-def _longest_opening(robot: Robot, scenario: Scenario) -> float:
+def longest_opening(robot: Robot, scenario: Scenario) -> float:
     """By which closed valves of any world open later than others close [s]."""
     drawn_s = scenario.actuation.opening_delay_s[1] if robot.actuators.opens_late else 0.0
     return robot.actuators.response.opening_delay_s + drawn_s
@@ -123,7 +123,7 @@ def check_delays(robot: Robot, scenario: Scenario) -> None:
         ConfigError: They would.
     """
     late_s = longest_delay(robot, scenario)
-    if _longest_opening(robot, scenario) > 0.0 and robot.timing.is_over_within(late_s):
+    if longest_opening(robot, scenario) > 0.0 and robot.timing.is_over_within(late_s):
         raise ConfigError(
             f"scenario '{scenario.title}': valves would open up to {late_s:g} s late ('delay_s' and 'opening_delay_s' "
             f"of 'actuation', with the robot's own); at most one control step, {robot.timing.control_s:g} s of "

@@ -100,7 +100,7 @@ class World(Drawn):
     gain: Array  # (n, ...) factor on what each actuator does [-]
     alive: Array  # (n, ...) 1, or 0 for an actuator that stays closed or still [-]
     action_noise: Array  # largest error of an actuator, of full command, anew at each control step [-]
-    action_delay: Array  # until a command acts, beyond the actuators' own, at most one control step [s]
+    action_delay: Array  # until a command acts, beyond the actuators' own [s]
     opening_delay: Array  # until a valve that was closed is open, beyond that; it closes without it [s]
     force_x: Array  # constant, in the world [N]
     force_y: Array  # [N]
