@@ -111,7 +111,7 @@ def test_a_drawn_flight_ends_where_the_craft_is_lost():
     drawn = first_flight(run, ROBOT)
     assert drawn["time_s"].tolist() == [1.0, 2.0, 3.0]
     assert drawn["height_m"].tolist() == [1.0, 0.9, 0.8]
-    assert drawn["energy"] == pytest.approx([0.16, 0.32, 0.48])
+    assert drawn["energy_s"] == pytest.approx([0.16, 0.32, 0.48])
     assert drawn["surfaces_deg"]["elevator"] == pytest.approx([8.0] * 3)
     assert len(first_flight(flown([[1.0] * 40], control_dt=0.1), ROBOT)["time_s"]) == 20
 

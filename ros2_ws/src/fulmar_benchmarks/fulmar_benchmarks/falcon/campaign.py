@@ -23,7 +23,7 @@ THESIS_ENERGY = (0.303, 0.590, 0.689, 0.723, 0.743)  # same
 HALF = 0.5  # of the thesis' RMSE, which exact state must stay below
 WITH_SENSORS = {"a": 0.03, "d": 0.03, "e": 0.03}  # limits with sensors; elsewhere the thesis' own [m]
 MPPI_LIMIT = {"a": 0.03, "d": 0.03, "e": 0.03}  # of MPPI with exact state [m]
-# Scenarios that controllers fly where none are named; all of those that are left out. The whole takes half an hour.
+# Scenarios that controllers fly where none are named; all of those that are left out.
 USUAL = {"lqr": OUTDOORS, "pid": OUTDOORS, "mppi": ("exact",)}
 DRAWN = "calm"  # scenario whose flights the report draws, where it is flown
 SEEDS = 5  # of a controller that draws, with exact state
@@ -52,7 +52,7 @@ Flights = dict[str, dict[str, dict[str, Any]]]  # by task and controller, as of 
 
 
 def run_falcon(request: Request, progress: Progress) -> tuple[dict[str, Any], Flights]:
-    """Fly every cell; all figures, JSON-ready, and a flight of each task by each controller, in calm air if flown."""
+    """Fly every cell; all figures, JSON-ready, and a flight of each task by each controller, in calm if flown."""
     cells = cells_of(request)
     flown = mapped(_fly, [(cell,) for cell in cells], jobs=request.jobs, progress=progress)
     tasks: dict[str, Any] = {}
@@ -60,7 +60,7 @@ def run_falcon(request: Request, progress: Progress) -> tuple[dict[str, Any], Fl
     for cell, (figures, flight) in zip(cells, flown, strict=True):
         tasks.setdefault(cell.task, {}).setdefault(cell.controller, {})[cell.scenario] = figures
         if flight and (cell.scenario == DRAWN or cell.controller not in flights.get(cell.task, {})):
-            flights.setdefault(cell.task, {})[cell.controller] = flight
+            flights.setdefault(cell.task, {})[cell.controller] = flight | {"scenario": cell.scenario}
     document = {
         "robot": request.robot,
         "seed": request.seed,
@@ -129,7 +129,7 @@ def ground_effect(name: str) -> dict[str, Any]:
 
 
 def _least_energy(robot: Robot, speed: float) -> Trim:
-    """Trim at the first of `HEIGHTS_M` that takes the least mean squared throttle per metre, near a speed [m/s]."""
+    """Trim at the first of `HEIGHTS_M`, near a speed [m/s], whose squared throttle over the speed is least."""
     trims = []
     for share in np.linspace(0.8, 1.2, 41):
         with contextlib.suppress(ConfigError):  # there is no level flight as slow as that

@@ -110,7 +110,8 @@ def fly(cell: Cell) -> tuple[dict[str, Any], dict[str, Any]]:
 def figures(run: Trajectories, task: str, robot: Robot) -> dict[str, Any]:
     """Figures of some flights: medians over those that survive, and the share that does.
 
-    Altitude RMSE is over all flights that survive together.
+    Altitude RMSE is over all flights that survive together. Energy is the mean squared throttle [-]; added up over
+    time, per metre, it is `energy_per_m` [s/m].
     Per axis and over all: √(mean ‖e‖² / 3) and √(mean ‖e‖²) of the way to the reference, of which that ahead is 0.
     """
     error = np.asarray(run.position_error, dtype=float)
@@ -148,10 +149,10 @@ def figures(run: Trajectories, task: str, robot: Robot) -> dict[str, Any]:
 
 
 def first_flight(run: Trajectories, robot: Robot) -> dict[str, Any]:
-    """The first of some flights until it touches the water, every `PLOTTED_S`.
+    """The first of some flights until it is lost, every `PLOTTED_S`.
 
     Returns:
-        `time_s`, `height_m`, `left_m`, `energy` (mean squared throttle, added up over time [s]), and `surfaces_deg` by
+        `time_s`, `height_m`, `left_m`, `energy_s` (mean squared throttle, added up over time), and `surfaces_deg` by
         name; arrays of equal length.
     """
     every = max(1, round(PLOTTED_S / run.control_dt))
@@ -164,7 +165,7 @@ def first_flight(run: Trajectories, robot: Robot) -> dict[str, Any]:
         "time_s": run.control_dt * np.arange(1, flown + 1)[picked],
         "height_m": np.asarray(run.z)[0, picked],
         "left_m": run.y[0, picked],
-        "energy": energy[picked],
+        "energy_s": energy[picked],
         "surfaces_deg": {
             name: shares[picked, i] * limits[i] for i, name in enumerate(robot.actuators.names[:count])
         },

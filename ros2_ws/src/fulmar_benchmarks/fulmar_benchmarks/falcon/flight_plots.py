@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from fulmar_benchmarks.falcon.cells import reference
 from fulmar_evaluation.report.style import quiet_grid
 
-COLUMNS = ("height [m]", "to the left [m]", "elevator [deg]", "aileron, rudder (dashed) [deg]", "energy used")
+COLUMNS = ("height [m]", "to the left [m]", "elevator [deg]", "aileron, rudder (dashed) [deg]", "energy [s]")
 
 
 def draw_flights(flights: dict[str, dict[str, dict[str, Any]]]) -> Figure:
@@ -53,11 +53,11 @@ def _draw_one(row: np.ndarray, flight: dict[str, Any], by: str, color: str) -> N
 
     def draw(axes: Axes, values: np.ndarray | None, line: str = "-") -> None:
         if values is not None:
-            axes.plot(times, values, line, color=color, linewidth=0.8, label=by)
+            axes.plot(times, values, line, color=color, linewidth=0.8, label=f"{by}, {flight['scenario']}")
 
     draw(height, flight["height_m"])
     draw(left, flight["left_m"])
     draw(elevator, surfaces.get("elevator"))
     draw(lateral, surfaces.get("aileron"))
     draw(lateral, surfaces.get("rudder"), "--")
-    draw(energy, flight["energy"])
+    draw(energy, flight["energy_s"])

@@ -21,8 +21,8 @@ _ERRORS = """
 RMSE per axis of each task, median over the flights that survive, by scenario. A cross at the top: none survives. The
 stroke is the thesis' controller of the kind (Tables 5.7 and 5.8)."""
 _FLIGHTS = """
-The first flight of each task, in calm air with sensors, of what flew with exact state alone with that; black: the
-reference. A line ends where the craft is lost. Energy is the mean squared throttle, added up over time."""
+The first flight of each task, in `calm` where that was flown; black: the reference. A line ends where the craft is
+lost. Energy is the mean squared throttle, added up over time."""
 _GROUND = """
 Left: lift and induced drag near the ground over those in free air at the same angle of attack (Phillips and Hunsaker,
 2013), as in thesis Fig. 5.1. Right: mean squared throttle in level flight, and that of thesis Table 5.2, whose motors

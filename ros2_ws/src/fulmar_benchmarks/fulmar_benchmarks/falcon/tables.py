@@ -40,9 +40,9 @@ def lines(document: dict[str, Any]) -> list[str]:
         )
     ]
     found.append(
-        f"mean squared throttle per metre at {ground['heights_m'][0]:g} m: {1e3 * ground['energy_per_m']:.3f}e-3 in "
-        f"trim at the task's speed, at least {1e3 * ground['least_energy_per_m']:.3f}e-3, at "
-        f"{ground['least_energy_speed']:.1f} m/s; flown:"
+        f"energy, the mean squared throttle added up over time, per metre at {ground['heights_m'][0]:g} m [s/m]: "
+        f"{1e3 * ground['energy_per_m']:.3f}e-3 in trim at the task's speed, at least "
+        f"{1e3 * ground['least_energy_per_m']:.3f}e-3, at {ground['least_energy_speed']:.1f} m/s; flown:"
     )
     found += [
         f"  {by}, {scenario}: {1e3 * each['energy_per_m']:.3f}e-3"

@@ -28,7 +28,8 @@ def falcon(
     tasks: Annotated[str, option("T,...", "Out of hold and a to f, or all.")] = "all",
     controllers: Annotated[str, option("C,...", "Out of lqi, lqr, mppi, pid and policy, or all.")] = "all",
     scenarios: Annotated[
-        str, option("S,...", "Out of exact, calm, noise, delay, late, light, severe and all, or every.")
+        str,
+        option("S,...", "Out of exact, calm, noise, delay, late, light, severe and all, or every, or usual."),
     ] = "usual",
     episodes: Annotated[
         int, option("N", "Flights of each cell; 1 with exact state on a path, at most 5 of mppi.", min=1)
@@ -48,11 +49,11 @@ def falcon(
     exact (state as it is), calm (sensors of 100 Hz with 0.05 m, 0.05 m/s, 0.01 rad, 0.01 rad/s), calm with twice the
     noise, measurements (`delay`) or commands (`late`) that are 20 ms late, light or severe Dryden turbulence, or noise,
     delay and light turbulence in `all`. `rmse_per_axis_m` is √(mean e² / 3), as the thesis prints it, `rmse_m` √(mean
-    e²), `peak_error_m` the largest distance (`overshoot_m` in the thesis), medians over the flights that survive, and
-    `wall_s` what the flights of a cell took side by side. The `usual` scenarios are exact, calm, light and severe of
-    lqr and pid, exact of mppi, in 5 flights that differ by the seeds of its noise, and all of them of lqi and policy. A
-    flight survives if the hull touches no water and no angle of attack goes beyond 1.5 times the stall's. All of it
-    takes 26 minutes on two cores.
+    e²), `peak_error_m` the largest distance (`overshoot_m` in the thesis), `energy` the mean squared throttle,
+    `energy_per_m` [s/m] that over the speed, medians over the flights that survive, and `wall_s` what the flights of a
+    cell took side by side. The `usual` scenarios are exact, calm, light and severe of lqr and pid, exact of mppi, in 5
+    flights that differ by the seeds of its noise, and all of them of lqi and policy. A flight survives if the hull
+    touches no water and no angle of attack goes beyond 1.5 times the stall's.
 
     Try:
 
