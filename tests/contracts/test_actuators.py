@@ -193,6 +193,7 @@ class TestRefuge:
         actuators = ROBOTS["kingfisher"].actuators
         guard = ActuatorGuard(actuators, Watchdog(SECOND_NS), refuge=Glide())
         guard.offer(actuators.names, [0.4, 0.4], 0)
+        assert guard.output(0).tolist() == [0.4, 0.4]
         measured = object()
         assert guard.output(3 * SECOND_NS, measured).tolist() == [0.2, 0.2]
         since_s, state = seen[-1]

@@ -93,7 +93,11 @@ def test_the_help_states_what_every_figure_means():
 
 
 @pytest.mark.parametrize(
-    ("pair", "way"), [("airship_v7 fly_hold", "jsbsim"), ("navion fly_attitude", "jsbsim:L17")]
+    ("pair", "way"),
+    [
+        pytest.param("airship_v7 fly_hold", "jsbsim", marks=pytest.mark.slow),
+        ("navion fly_attitude", "jsbsim:L17"),
+    ],
 )
 def test_aircraft_are_evaluated_in_jsbsim_which_prints_nothing_of_its_own(pair, way, capfd):
     words = f"evaluate {pair} --controller lqi --through {way} --scenario ideal --episodes 1"

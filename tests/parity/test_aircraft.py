@@ -17,7 +17,7 @@ from sim_nodes.mock_backend import MockBackend
 from sim_nodes.mujoco_backend import MujocoBackend
 
 CRAFT = load_robot("airship_v7")
-TASK = replace(load_task("fly_a"), episode_s=4.0)
+TASK = replace(load_task("fly_a"), episode_s=2.0)
 EXACT = Scenario("exact", sensor_noise=False, body="nominal")
 
 
