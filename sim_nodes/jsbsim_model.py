@@ -141,14 +141,12 @@ def _factor(name: str) -> Node:
 
 def _coefficient(model: Coefficients, name: str) -> Node:
     parts = [_value(0.0)]
-    for number, factors in model.parsed[name]:
+    for number, factors, slopes in model.with_slopes[name]:
         each = [_factor(factor) for factor, power in factors for _ in range(power)]
         parts.append(_times(_value(number), *each) if each else _value(number))
-        for at, (factor, power) in enumerate(factors):
-            if factor == "alpha" and model.alpha_range is not None:
-                rest = (*factors[:at], (factor, power - 1), *factors[at + 1 :])
-                slope = [_factor(other) for other, times in rest for _ in range(times)]
-                parts.append(_times(_value(number * power), _get("fulmar/alpha-beyond"), *slope))
+        for slope, rest in slopes if model.alpha_range is not None else ():
+            each = [_factor(factor) for factor, power in rest for _ in range(power)]
+            parts.append(_times(_value(slope), _get("fulmar/alpha-beyond"), *each))
     if name in model.tables:
         parts.append(_curve(model.tables[name], model.alpha_zero))
     return _plus(*parts)

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from fulmar_benchmarks.falcon.campaign import Request, cells_of, ground_effect, requirements
-from fulmar_benchmarks.falcon.cells import figures, first_flight
+from fulmar_benchmarks.falcon.cells import SCENARIOS, figures, first_flight
+from fulmar_cli.commands.values import read_names
 from fulmar_core.robot import load_robot
 
 ROBOT = load_robot("airship_v7")
@@ -26,6 +27,12 @@ def test_a_controller_that_draws_flies_five_seeds_with_exact_state_and_others_on
     assert flown == {("mppi", "exact"): 5, ("pid", "exact"): 1, **steady}
     few = cells_of(request("mppi", scenarios=("exact", "calm"), episodes=2))
     assert [cell.episodes for cell in few] == [2, 2]
+
+
+def test_the_scenario_all_is_one_and_every_stands_for_all_of_them():
+    known = tuple(SCENARIOS)
+    assert read_names("all", "scenario", known, every="every") == ("all",)
+    assert read_names("every", "scenario", known, every="every") == known
 
 
 def test_flights_that_hold_a_height_begin_apart_so_exact_state_takes_as_many():

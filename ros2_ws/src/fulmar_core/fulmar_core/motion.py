@@ -42,8 +42,8 @@ def actuation_of(
     response = robot.actuators.response
     if isinstance(robot.actuators, Rolling):
         response = dataclasses.replace(response, lag_s=0.0)  # the wheels' own servos bring it in
-    lines = latest_s > step_s + 1e-9 and not opens_late
-    delay_ticks = math.ceil(latest_s / robot.timing.physics_dt - 1e-9) if lines else 0
+    outlasts_step = latest_s > step_s + 1e-9 and not opens_late
+    delay_ticks = math.ceil(latest_s / robot.timing.physics_dt - 1e-9) if outlasts_step else 0
     usual: dict[str, Any] = {
         "binary": robot.actuators.binary,
         "scale": robot.actuators.scale,

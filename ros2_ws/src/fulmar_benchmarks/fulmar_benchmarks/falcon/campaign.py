@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_benchmarks.falcon.cells import OUTDOORS, RANDOM, SCENARIOS, Cell, fly
+from fulmar_benchmarks.falcon.cells import RANDOM, SCENARIOS, Cell, fly
 from fulmar_benchmarks.workers import mapped
 from fulmar_core.errors import ConfigError, FulmarError
 from fulmar_core.flight.ground_effect import induced_drag_ratio, lift_ratio
@@ -23,8 +23,8 @@ THESIS_ENERGY = (0.303, 0.590, 0.689, 0.723, 0.743)  # same
 HALF = 0.5  # of the thesis' RMSE, which exact state must stay below
 WITH_SENSORS = {"a": 0.03, "d": 0.03, "e": 0.03}  # limits with sensors; elsewhere the thesis' own [m]
 MPPI_LIMIT = {"a": 0.03, "d": 0.03, "e": 0.03}  # of MPPI with exact state [m]
-# Scenarios that controllers fly where none are named; all of those that are left out.
-USUAL = {"lqr": OUTDOORS, "pid": OUTDOORS, "mppi": ("exact",)}
+# Scenarios that controllers fly where none are named; one that is left out flies them all.
+USUAL = {**dict.fromkeys(("lqr", "pid"), ("exact", "calm", "light", "severe")), "mppi": ("exact",)}
 DRAWN = "calm"  # scenario whose flights the report draws, where it is flown
 SEEDS = 5  # of a controller that draws, with exact state
 HOLD = "hold"  # the task whose flights begin at different heights

@@ -54,9 +54,6 @@ SCENARIOS = {
 }
 
 
-OUTDOORS = ("exact", "calm", "light", "severe")
-
-
 @dataclass(frozen=True)
 class Cell:
     """What one cell flies."""

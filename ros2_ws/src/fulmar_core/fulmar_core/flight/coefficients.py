@@ -12,9 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-from array_api_compat import is_numpy_array
-
-from fulmar_core.arrays import clip
+from fulmar_core.arrays import clip, is_numpy
 from fulmar_core.errors import did_you_mean
 from fulmar_core.rotation import Array
 
@@ -96,6 +94,11 @@ class Coefficients:
         """Terms of each coefficient, angles in the file's unit and the source's signs."""
         return self._parsed  # type: ignore[attr-defined, no-any-return]
 
+    @property
+    def with_slopes(self) -> dict[str, tuple[tuple[float, Factors, tuple[Term, ...]], ...]]:
+        """Terms as `parsed`, each with the terms of its derivative by the angle of attack."""
+        return self._with_slopes  # type: ignore[attr-defined, no-any-return]
+
     def scaled_flow(self, flow: Flow) -> dict[str, Array]:
         """Factors in the file's unit, signs and origin; those that are missing count as 0."""
         per = math.degrees(1.0) if self.unit == "deg" else 1.0
@@ -123,15 +126,14 @@ class Coefficients:
             low, high = (end - self.alpha_zero for end in self.alpha_range)
             own["alpha"] = clip(alpha, low, high)
             beyond = alpha - own["alpha"]
-            if is_numpy_array(beyond) and not beyond.any():  # what is traced has no numbers yet
+            if is_numpy(beyond) and not beyond.any():  # what is traced has no numbers yet
                 beyond = None
         powers = _Powers(own)
         return {name: self._one(name, powers, alpha, beyond) for name in NAMES}
 
     def _one(self, name: str, powers: _Powers, alpha: Array, beyond: Array | None) -> Array:
         found = 0.0 * alpha
-        terms: tuple[tuple[float, Factors, tuple[Term, ...]], ...] = self._with_slopes[name]  # type: ignore[attr-defined]
-        for number, factors, slopes in terms:
+        for number, factors, slopes in self.with_slopes[name]:
             found = found + number * powers.product(factors)
             if beyond is not None:
                 for slope, rest in slopes:
@@ -160,7 +162,7 @@ class _Powers:
 
 
 def _slopes(number: float, factors: Factors) -> tuple[Term, ...]:
-    """Derivative of a term by the angle of attack."""
+    """Derivative of a term by the angle of attack, as terms; none where it does not depend on it."""
     return tuple(
         (number * power, (*factors[:at], *(((factor, power - 1),) if power > 1 else ()), *factors[at + 1 :]))
         for at, (factor, power) in enumerate(factors)

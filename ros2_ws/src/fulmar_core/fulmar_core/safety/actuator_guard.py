@@ -75,7 +75,7 @@ class ActuatorGuard:
     def reset(self) -> None:
         """Forget the command: a plant that starts again begins with the safe one, and with the controller."""
         self.command = self._actuators.safe_command
-        self._applied_last = self.command  # newest command that was applied; what comes under a stop is not
+        self._applied_last = self.command  # newest command that was; what comes under a stop is not
         self._safe_since_ns: int | None = None  # since when the safe controller has acted
         self.person = False
         self._stamp_ns = 0
@@ -203,7 +203,8 @@ class ActuatorGuard:
             self._applied_last = self.command
             return self.command
         # A stop that follows a silence, with commands between them, must not begin the way to rest anew.
-        self._safe_since_ns = min(since_ns, since_ns if self._safe_since_ns is None else self._safe_since_ns)
+        if self._safe_since_ns is None or since_ns < self._safe_since_ns:
+            self._safe_since_ns = since_ns
         since_s = max(0, now_ns - self._safe_since_ns) / 1e9
         if self._steers and plant_ns is not None:
             if self._steering_ns is None:
