@@ -14,7 +14,7 @@ from fulmar_bringup import run_executor
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.supervisor import Report
 from fulmar_core.errors import RunFailed
-from fulmar_core.wire_check import BETWEEN, WIRE_WARNINGS
+from fulmar_core.wire_check import BETWEEN, WARNINGS, WIRE_WARNINGS
 from fulmar_evaluation.run_summary import summarise, summary_text
 
 PLAN = RunPlan("floating_platform", "go_to_pose", "lqr", "mock", 5.0)
@@ -82,3 +82,12 @@ def test_a_press_after_the_plant_has_finished_is_none_of_the_run(reached):
     record = read_run(reached)
     after = HealthSample(9e9, "floating_platform: plant", 1, PRESSED, {"mode": "finished"})
     assert summarise(replace(record, health=(*record.health, after)))["estop_pressed"] is False
+
+
+def test_the_result_lists_the_warnings_of_every_node_once(reached):
+    record = read_run(reached)
+    samples = (
+        HealthSample(1.0, "floating_platform: estimator", 1, "one", {WARNINGS: "one"}),
+        HealthSample(2.0, "floating_platform: estimator", 1, "one", {WARNINGS: f"one{BETWEEN}two"}),
+    )
+    assert summarise(replace(record, health=record.health + samples))["warnings"] == ["one", "two"]

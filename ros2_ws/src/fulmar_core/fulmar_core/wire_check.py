@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from fulmar_core.topics import Wire
 
 WIRE_WARNINGS = "wire_warnings"  # key of a health status under which a node reports them
+WARNINGS = "warnings"  # key under which any node reports what else endangers its robot, one sentence each
 BETWEEN = " | "  # what separates several of them there
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from fulmar_bags.run_record import HealthSample, RunRecord
 from fulmar_core.safety.estop import HOLDS
-from fulmar_core.wire_check import BETWEEN, WIRE_WARNINGS
+from fulmar_core.wire_check import BETWEEN, WARNINGS, WIRE_WARNINGS
 from fulmar_evaluation.run_evaluation import RunResult, evaluate_run
 from policy_server.controllers import EXTERNAL, controller_entry
 
@@ -74,11 +74,12 @@ def estop_pressed(record: RunRecord) -> bool:
 
 
 def warnings_of(record: RunRecord) -> list[str]:
-    """What a reader of the result should know, each once: a press of the e-stop, and wires that do not fit."""
+    """What a reader of the result should know, each once: a press of the e-stop, and the warnings of every node."""
     found = dict.fromkeys(
         warning
         for sample in record.health
-        for warning in sample.values.get(WIRE_WARNINGS, "").split(BETWEEN)
+        for key in (WIRE_WARNINGS, WARNINGS)
+        for warning in sample.values.get(key, "").split(BETWEEN)
         if warning
     )
     pressed = ["the e-stop was pressed and held the robot until a reset"] if estop_pressed(record) else []

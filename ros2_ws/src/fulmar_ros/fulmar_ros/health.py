@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 
 from fulmar_core.topics import DIAGNOSTICS
+from fulmar_core.wire_check import BETWEEN, WARNINGS
 from fulmar_ros.convert import stamp_of
 from fulmar_ros.qos import publisher_qos
 
@@ -28,16 +29,21 @@ class Health:
         """How many subscribers are matched: one that comes between two beats need not wait for the next."""
         return int(self.publishers[-1].get_subscription_count())
 
-    def publish(self, level: str, message: str, values: Mapping[str, str]) -> None:
+    def publish(
+        self, level: str, message: str, values: Mapping[str, str], *, warnings: Sequence[str] = ()
+    ) -> None:
         """Publish one status.
 
         Args:
             level: `ok`, `warn` or `error`.
             message: For people.
             values: For programs.
+            warnings: What endangers the robot, one sentence each; the result and the report of a run list them.
         """
         status = DiagnosticStatus(level=LEVELS[level], name=self._name, message=message, hardware_id="")
         status.values = [KeyValue(key=key, value=value) for key, value in values.items()]
+        if warnings:
+            status.values.append(KeyValue(key=WARNINGS, value=BETWEEN.join(warnings)))
         array = DiagnosticArray(status=[status])
         array.header.stamp = stamp_of(time.time_ns())
         for publisher in self.publishers:

@@ -89,7 +89,8 @@ def _parts(runs: Sequence[View]) -> list[Part]:
         *faint(_subtitle(runs)),
         f'<div class="results">{"".join(map(_result, runs))}</div>',
         *faint(rule(runs)),
-        *(_warning(run) for run in runs if run.record.warnings),
+        *(_unread(run) for run in runs if run.record.warnings),
+        *(_warnings(run) for run in runs if run.summary["warnings"]),
         *(_beliefs(run) for run in runs if run.summary["beliefs"]),
         "<h2>In figures</h2>",
         _table(runs),
@@ -124,7 +125,12 @@ def _result(run: View) -> str:
     return f'<div class="result" {_run_colour(run)}>{text}</div>'
 
 
-def _warning(run: View) -> str:
+def _warnings(run: View) -> str:
+    lines = "".join(f"<li>{escape(warning)}</li>" for warning in run.summary["warnings"])
+    return f"<p>{_name(run)}: warnings</p><ul>{lines}</ul>"
+
+
+def _unread(run: View) -> str:
     lines = "; ".join(run.record.warnings[:5])
     return faint(f"{run.label}: part of the bag could not be read. {lines}")[0]
 
