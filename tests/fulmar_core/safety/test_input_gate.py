@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from fulmar_core.robot import Limits
-from fulmar_core.safety.input_gate import FROZEN_AFTER, InputGate, Measurement
+from fulmar_core.safety.input_gate import InputGate, Measurement
+from fulmar_core.sensors.repetition import FROZEN_AFTER
 from fulmar_core.state import RigidBodyState
 from tests.states import planar_state
 

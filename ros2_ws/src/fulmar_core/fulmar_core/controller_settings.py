@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from fulmar_core.robot import Robot
 from fulmar_core.safety.arbiter import Flags
 from fulmar_core.safety.geofence import NO_AREA, check_area
-from fulmar_core.safety.input_gate import FROZEN_AFTER, JUMP_M, InputGate
+from fulmar_core.safety.input_gate import JUMP_M, InputGate
 from fulmar_core.safety.watchdog import default_timeout
+from fulmar_core.sensors.repetition import FROZEN_AFTER, is_noisy
 from fulmar_core.spatial import SpatialState
 
 MOST_COPIES = 3
@@ -101,7 +102,7 @@ class ControllerSettings:
         if self.lockstep:
             return InputGate(robot.limits, frozen_after=0, turns_freely=robot.state_type is SpatialState)
         odometry = robot.sensors.odometry
-        repeats = self.odometry_may_repeat or odometry.position.std == odometry.heading.std == 0.0
+        repeats = self.odometry_may_repeat or not is_noisy(odometry.position, odometry.heading)
         return InputGate(
             robot.limits,
             frozen_after=0 if repeats else FROZEN_AFTER,

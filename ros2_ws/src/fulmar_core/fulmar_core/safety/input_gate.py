@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from fulmar_core.robot import Limits
+from fulmar_core.sensors.repetition import FROZEN_AFTER, RepetitionCheck
 from fulmar_core.state import RigidBodyState
 
-FROZEN_AFTER = 10  # repeats of one measurement that no noisy sensor gives
 BACK_NS = 1_000_000_000  # further back than this is no reordering: whoever measures has begun again
 JUMP_M = 1.0  # beyond what speed explains: a correction of a fix or of a filter is less
 FORWARD_NS = 10_000_000_000  # further ahead than this is no gap: it is another clock, or one wrong stamp
@@ -52,9 +52,9 @@ class InputGate:
             turns_freely: Whether the robot turns about any axis; the limit then counts for the length of its turn rate.
         """
         self._turns_freely = turns_freely
-        self._limits, self._frozen_after, self._jump_m = limits, frozen_after, jump_m
+        self._limits, self._jump_m = limits, jump_m
+        self._repetition = RepetitionCheck(after=frozen_after)
         self._last: Measurement | None = None
-        self._equal = 0
         self.epoch = 0
 
     def problem(self, measurement: Measurement) -> str | None:
@@ -69,7 +69,8 @@ class InputGate:
 
     def forget(self) -> None:
         """Begin anew, as after a time jump that is known."""
-        self._last, self._equal = None, 0
+        self._last = None
+        self._repetition.forget()
 
     def _frame_problem(self, measurement: Measurement) -> str | None:
         if measurement.frame != "odom" or measurement.child_frame != "base_link":
@@ -116,22 +117,16 @@ class InputGate:
 
     def _new_epoch(self, measurement: Measurement, reason: str) -> str:
         self.epoch += 1
-        self._last, self._equal = measurement, 0
+        self._last = measurement
+        self._repetition.forget()
+        self._is_frozen(measurement)
         return f"{reason}: a new epoch begins"
 
     def _frozen_problem(self, measurement: Measurement) -> str | None:
-        if not self._frozen_after:
+        if not self._is_frozen(measurement):
             return None
-        if self._last is not None and _same(self._last.state, measurement.state):
-            self._equal += 1
-        else:
-            self._equal = 0
-        if self._equal >= self._frozen_after:
-            return f"odom has not changed for {self._equal} messages: the sensor is stuck"
-        return None
+        return f"odom has not changed for {self._repetition.repeats} messages: the sensor is stuck"
 
-
-def _same(a: RigidBodyState, b: RigidBodyState) -> bool:
-    return np.array_equal(a.position_in_world, b.position_in_world) and np.array_equal(
-        a.quat_xyzw, b.quat_xyzw
-    )
+    def _is_frozen(self, measurement: Measurement) -> bool:
+        pose = np.concatenate((measurement.state.position_in_world, measurement.state.quat_xyzw))
+        return self._repetition.see(pose, measurement.stamp_ns)

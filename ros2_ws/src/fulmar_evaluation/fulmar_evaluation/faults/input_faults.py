@@ -12,7 +12,7 @@ from typing import Any
 from nav_msgs.msg import Odometry
 
 from fulmar_bags.message_reader import stamp_ns
-from fulmar_core.safety.input_gate import FROZEN_AFTER
+from fulmar_core.sensors.repetition import FROZEN_AFTER
 from fulmar_evaluation.faults.fault import STAYS_S, Fault, Outcome, stopped
 from fulmar_evaluation.faults.fault_environment import FaultEnvironment, Injection, delayed, lost
 from fulmar_evaluation.faults.live_system import LiveSystem

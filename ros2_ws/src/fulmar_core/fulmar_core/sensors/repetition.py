@@ -1,0 +1,68 @@
+"""Values that do not change: a sensor that measures anew never repeats a noisy value to the last bit.
+
+A stuck source goes on sending its last value with new stamps. Sensors without noise repeat themselves while the robot
+stands: encoders, simulated sensors of a scenario without noise, channels whose quantum is greater than their noise.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from fulmar_core.sensors.odometer import Channel
+
+FROZEN_AFTER = 10  # repeats of one value in a row that no noisy sensor gives
+FEWEST = (
+    3  # repeats that count as frozen after a time, however slow the source: fewer are messages that got lost
+)
+
+
+class RepetitionCheck:
+    """Counts equal values in a row of one source.
+
+    Attributes:
+        repeats: How often the newest value has been repeated so far.
+        frozen: Whether the source is stuck.
+    """
+
+    def __init__(self, *, after: int = FROZEN_AFTER, after_s: float = math.inf) -> None:
+        """Begin without a value.
+
+        Args:
+            after: Repeats after which the source is frozen; 0: it never is, as for sources without noise.
+            after_s: Time that `FEWEST` or more repeats may last; for sources whose `after` repeats take too long [s].
+        """
+        self._after, self._after_ns = after, 1e9 * after_s
+        self.forget()
+
+    def forget(self) -> None:
+        """Begin anew, as after a jump of time."""
+        self._last: np.ndarray | None = None
+        self._since_ns = 0
+        self.repeats, self.frozen = 0, False
+
+    def see(self, value: np.ndarray, stamp_ns: int) -> bool:
+        """Note the next value.
+
+        Args:
+            value: What was measured, of any shape; it must not be changed later.
+            stamp_ns: When [ns].
+
+        Returns:
+            Whether the source is frozen, as `frozen`. The first value that differs ends it.
+        """
+        if not self._after:
+            return False
+        if self._last is not None and np.array_equal(self._last, value):
+            self.repeats += 1
+        else:
+            self._last, self._since_ns, self.repeats = value, stamp_ns, 0
+        lasting = self.repeats >= FEWEST and stamp_ns - self._since_ns > self._after_ns
+        self.frozen = self.repeats >= self._after or lasting
+        return self.frozen
+
+
+def is_noisy(*channels: Channel) -> bool:
+    """Whether two measurements of one state differ: one channel at least has noise that its quantum does not hide."""
+    return any(channel.std > channel.quantum for channel in channels)
