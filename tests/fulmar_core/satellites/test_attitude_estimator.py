@@ -70,7 +70,7 @@ def test_it_knows_attitude_and_rate_better_than_the_star_tracker_alone():
     assert off(estimate, now) < 1.5 * TRACKER_STD  # of three axes together
     np.testing.assert_allclose(estimate.value.angular_velocity_in_body, RATE, atol=2e-6)
     assert np.sqrt(np.diag(estimate.covariance)[3:6]).max() < TRACKER_STD
-    assert estimator.status() == {"rate_from": "gyroscope"}
+    assert estimator.status() == {"rate_from": "gyroscope", "lacks": "nothing"}
 
 
 @pytest.mark.parametrize("rate", [True, False])
@@ -134,6 +134,7 @@ def test_a_late_attitude_counts_at_its_own_time():
     [
         ("imu", imu([np.nan, 0.0, 0.0]), "not finite"),
         ("imu", imu([50.0, 0.0, 0.0]), "beyond what is possible"),
+        ("imu", imu([np.nan, np.nan, np.nan]), "no gyroscope"),
         ("star_tracker", np.array([0.0, 0.0, 0.0, 0.5]), "no unit quaternion"),
         ("star_tracker", np.array([np.nan, 0.0, 0.0, 1.0]), "no unit quaternion"),
         ("wheels", WheelSpeeds(NAMES[:2], np.zeros(2)), "wheel_z are missing"),

@@ -19,7 +19,7 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 
 from fulmar_bags.message_reader import stamp_ns
-from fulmar_core.estimation.estimator import Estimate
+from fulmar_core.estimation.estimator import LACKS_NOTHING, Estimate
 from fulmar_core.estimation.kinds import estimator_kind, load_estimator, make_estimator
 from fulmar_core.process import CONTROL_PRIORITY, take_priority_with_helpers
 from fulmar_core.robot import load_robot
@@ -195,7 +195,9 @@ class EstimatorNode(Node):
             **self._computation_ms.percentiles("computation_ms"),
         }
         values |= self._estimator.status()
-        self._health.publish("warn" if problem else "ok", problem or "estimating", values)
+        lacks = values.get("lacks", LACKS_NOTHING)
+        estimating = "estimating" if lacks == LACKS_NOTHING else f"estimating without {lacks}"
+        self._health.publish("warn" if problem else "ok", problem or estimating, values)
 
     def stop(self) -> None:
         """Wait for the last estimate to arrive; nodes that receive none stop by themselves."""

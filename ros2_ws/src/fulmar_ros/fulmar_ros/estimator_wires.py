@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from geometry_msgs.msg import InertiaStamped, PoseStamped, TwistWithCovarianceStamped
 from nav_msgs.msg import Odometry
-from sensor_msgs.msg import Imu, PointCloud2
+from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension, MultiArrayLayout
 
 from fulmar_bags.event_packets import events_of_cloud
@@ -17,11 +17,10 @@ from fulmar_core.errors import shortened
 from fulmar_core.estimation.estimator import Estimate
 from fulmar_core.robot_name import Frames
 from fulmar_core.rotation import rotate_inverse
-from fulmar_core.sensors.imu import UNKNOWN
 from fulmar_core.sensors.kind import SensorKind
 from fulmar_core.sensors.reading import Reading
 from fulmar_core.sensors.table import SENSORS
-from fulmar_core.topics import EVENTS, EVENTS_2, IMU, INERTIA, INERTIA_COVARIANCE, MOCAP, ODOMETRY, RATE, Wire
+from fulmar_core.topics import EVENTS, EVENTS_2, INERTIA, INERTIA_COVARIANCE, MOCAP, ODOMETRY, RATE, Wire
 from fulmar_ros.convert import OdometryWriter, stamp_of
 from fulmar_ros.message_class import message_class
 
@@ -40,12 +39,6 @@ def _pose(message: PoseStamped, frames: Frames) -> Reading | str:
 
 def _sensor(kind: SensorKind) -> Read:
     return lambda message, _frames: reading_of(message, kind)
-
-
-def _imu(message: Imu, _frames: Frames) -> Reading | None:
-    if UNKNOWN in (message.linear_acceleration_covariance[0], message.angular_velocity_covariance[0]):
-        return None  # REP-145: marks fields that are absent
-    return reading_of(message, SENSORS["imu"])
 
 
 def _rate(message: TwistWithCovarianceStamped, _frames: Frames) -> Reading | str:
@@ -132,7 +125,6 @@ READERS: dict[Wire, tuple[type, Read]] = {
         if kind.message is not None
     },
     MOCAP: (PoseStamped, _pose),
-    IMU: (Imu, _imu),
     RATE: (TwistWithCovarianceStamped, _rate),
     EVENTS: (PointCloud2, _events),
     EVENTS_2: (PointCloud2, _events),

@@ -21,11 +21,12 @@ import numpy as np
 
 from fulmar_core.actuators.reaction_wheels import ReactionWheels
 from fulmar_core.attitude import exponential, normalised, product, rotation_error
-from fulmar_core.estimation.estimator import Estimate
+from fulmar_core.estimation.estimator import LACKS_NOTHING, Estimate
 from fulmar_core.estimation.reading_times import ReadingTimes
 from fulmar_core.estimation.settings import AttitudeSettings
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import rotate
+from fulmar_core.sensors.imu import NO_GYROSCOPE
 from fulmar_core.sensors.reading import Reading
 from fulmar_core.state import RigidBodyState
 
@@ -64,6 +65,7 @@ class AttitudeEstimator:
         self._begun = False
         self._stamp_ns = 0
         self._times = ReadingTimes(self._begin_epoch)
+        self._lacks = ""  # whether the inertial unit says that it has no gyroscope
         self._momentum: np.ndarray | None = None  # of the wheels, in the body [N·m·s]
         self._held: list[
             tuple[int, Callable[[int], str]]
@@ -119,7 +121,7 @@ class AttitudeEstimator:
 
     def status(self) -> dict[str, str]:
         """See `Estimator.status`."""
-        return {"rate_from": self.rate_source}
+        return {"rate_from": self.rate_source, "lacks": self._lacks or LACKS_NOTHING}
 
     def _staleness(self, now_ns: int) -> str:
         std = np.degrees(np.sqrt(np.diag(self._P)[:6].reshape(2, 3).max(axis=1)))
@@ -166,6 +168,9 @@ class AttitudeEstimator:
         self._past.clear()
 
     def _gyroscope(self, reading: Reading, stamp_ns: int) -> str:
+        self._lacks = "" if reading.value.has_rate else "gyroscope"
+        if self._lacks:
+            return NO_GYROSCOPE
         rate = np.asarray(reading.value.angular_velocity, dtype=float)
         if not np.isfinite(rate).all():
             return "the gyroscope reports a value that is not finite"

@@ -9,6 +9,10 @@ import numpy as np
 
 from fulmar_core.sensors.reading import Reading
 
+LACKS_NOTHING = (
+    "nothing"  # under the key `lacks` of a status: every sensor reports what the estimator takes of it
+)
+
 
 @dataclass(frozen=True, slots=True)
 class Estimate:

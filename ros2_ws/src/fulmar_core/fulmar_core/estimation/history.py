@@ -15,11 +15,10 @@ from typing import Any, ClassVar, Generic, TypeVar
 
 import numpy as np
 
-from fulmar_core.estimation.estimator import Estimate
+from fulmar_core.estimation.estimator import LACKS_NOTHING, Estimate
 from fulmar_core.estimation.reading_times import ReadingTimes
 from fulmar_core.estimation.settings import MotionSettings
 from fulmar_core.robot import Limits
-from fulmar_core.sensors.imu import ImuSample
 from fulmar_core.sensors.reading import Reading
 
 S = TypeVar("S", bound=MotionSettings)
@@ -167,6 +166,7 @@ class HistoryEstimator(ABC, Generic[S]):
             return time_problem
         if kind == IMU:
             self._saturated = saturated
+            self._lacks = reading.value.lacks
         if problem or saturated:
             return problem or saturated
         return self._see(Event(stamp_ns, kind, None), value_of, reading) or None
@@ -195,9 +195,11 @@ class HistoryEstimator(ABC, Generic[S]):
     def _problem_of(self, kind: int, reading: Reading) -> str:
         value = reading.value
         if kind == IMU:
-            if not _is_finite(value):
+            if not value.is_finite:
                 return "inertial reading holds a value that is not finite"
-            rate = self._turn_rate(reading)
+            if not (value.has_force or value.has_rate):
+                return "inertial reading has neither a specific force nor a turn rate"
+            rate = self._turn_rate(reading) if value.has_rate else 0.0
             if abs(rate) > 2.0 * self._limits.yaw_rate:
                 return f"turn rate {rate:.1f} rad/s is beyond the possible {self._limits.yaw_rate:g} rad/s"
             return ""
@@ -211,17 +213,19 @@ class HistoryEstimator(ABC, Generic[S]):
         )
 
     def _saturation(self, reading: Reading) -> str:
-        """Why the turn rate of an inertial reading is unknown; empty if it lies within the range or is not finite."""
+        """Why the turn rate of an inertial reading is saturated; empty if it is not, or there is none."""
+        if not reading.value.is_finite or not reading.value.has_rate:
+            return ""
         largest = float(np.max(np.abs(reading.value.angular_velocity)))
-        if largest < self._gyroscope_range or not _is_finite(reading.value):
+        if largest < self._gyroscope_range:
             return ""
         return (
             f"the gyroscope reads {largest:.2f} rad/s, the end of its range: the body tumbles too fast for it"
         )
 
     def status(self) -> dict[str, str]:
-        """Nothing; see `Estimator`."""
-        return {}
+        """What the newest inertial reading lacks; see `Estimator`."""
+        return {"lacks": self._lacks or LACKS_NOTHING}
 
     def estimate(self, stamp_ns: int | None = None) -> Estimate | None:
         """See `Estimator`."""
@@ -252,6 +256,7 @@ class HistoryEstimator(ABC, Generic[S]):
     def _forget(self) -> None:
         self._filter: Filter | None = None
         self._saturated = ""  # why the newest inertial reading has no turn rate
+        self._lacks = ""  # of accelerometer and gyroscope, in the newest inertial reading
         self._history: list[Event] = []
         self._times: ReadingTimes = ReadingTimes(self._begin_epoch)
         self._believed_ns = 0
@@ -338,7 +343,3 @@ class HistoryEstimator(ABC, Generic[S]):
             if abs(event.stamp_ns - stamp_ns) <= READING_LASTS_NS:
                 return event.value
         return None
-
-
-def _is_finite(sample: ImuSample) -> bool:
-    return bool(np.isfinite(sample.specific_force).all() and np.isfinite(sample.angular_velocity).all())

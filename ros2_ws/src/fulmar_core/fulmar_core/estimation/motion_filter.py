@@ -24,7 +24,8 @@ SPREAD_AT_START = (1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.05, 0.05, 0.02)  # m, rad, m/
 _POSE_ROWS, _GYRO_ROW = np.eye(STATES)[POSE], np.eye(STATES)[[RATE]] + np.eye(STATES)[[BIAS_RATE]]
 
 Snapshot = tuple[np.ndarray, np.ndarray]
-Inertial = tuple[np.ndarray, float]
+# Specific force along the body's level axes, shape (2,) [m/s²], and turn rate [rad/s]; None: not measured.
+Inertial = tuple[np.ndarray | None, float | None]
 
 
 class MotionFilter(ExtendedKalmanFilter, Filter):  # type: ignore[misc]
@@ -32,8 +33,7 @@ class MotionFilter(ExtendedKalmanFilter, Filter):  # type: ignore[misc]
 
     `x` holds (x, y) [m], yaw [rad], (v_x, v_y) in the world [m/s], turn rate [rad/s], then the biases of the
     accelerometer along the body's axes [m/s²] and of the gyroscope [rad/s]. Events: a pose (x, y, yaw), shape (3,); an
-    inertial reading as specific force along the body's level x and y, shape (2,) [m/s²], and turn rate [rad/s]; of an
-    attitude its yaw with its standard deviation [rad].
+    inertial reading, see `Inertial`; of an attitude its yaw with its standard deviation [rad].
     """
 
     def __init__(self, settings: PlanarMotionSettings, pose: np.ndarray) -> None:
@@ -73,6 +73,8 @@ class MotionFilter(ExtendedKalmanFilter, Filter):  # type: ignore[misc]
                 value, lambda _x: _POSE_ROWS, lambda x: x[POSE], R=self._pose_noise, residual=self._pose_error
             )
         elif kind == events.IMU:
+            if value[1] is None:
+                return
             self.update(
                 np.array([value[1]]),
                 lambda _x: _GYRO_ROW,

@@ -44,8 +44,11 @@ class PlanarMotionEstimator(HistoryEstimator[PlanarMotionSettings]):
 
     def _inertial(self, reading: Reading) -> Inertial:
         """Specific force along the level axes, without gravity, and turn rate."""
+        rate = self._turn_rate(reading) if reading.value.has_rate else None
+        if not reading.value.has_force:
+            return None, rate
         level = rotate(self._tilt, reading.value.specific_force) - np.array([0.0, 0.0, GRAVITY])
-        return level[:2], self._turn_rate(reading)
+        return level[:2], rate
 
     def _attitude(self, reading: Reading) -> tuple[float, float]:
         """Heading and its standard deviation [rad]."""

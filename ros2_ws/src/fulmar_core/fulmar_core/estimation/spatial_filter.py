@@ -70,25 +70,28 @@ class SpatialFilter(ExtendedKalmanFilter, Filter):  # type: ignore[misc]
         """Predict by a reading of the inertial unit; see `Filter.move_on`."""
         if seconds <= 0.0:
             return
-        if inertial is not None:
+        has_rate = inertial is not None and inertial.has_rate
+        has_force = inertial is not None and inertial.has_force
+        if has_rate:
             self._begin_to_measure()
         t, s, now = seconds, self._settings, self.belief
         rate, force, noise = now.rate, np.zeros(3), s.manoeuvre
-        if inertial is not None:
-            rate, force = inertial.angular_velocity - now.rate_bias, inertial.specific_force - now.force_bias
-            noise = s.acceleration_noise
+        if inertial is not None and has_rate:
+            rate = inertial.angular_velocity - now.rate_bias
+        if inertial is not None and has_force:
+            force, noise = inertial.specific_force - now.force_bias, s.acceleration_noise
         axes = rotate(now.quat_xyzw, np.eye(3)).T  # body to world
         push = axes @ force
         turned = exponential(tuple(t * rate))
         F = np.eye(ERRORS)
         F[PLACE, VELOCITY] = t * np.eye(3)
-        if inertial is not None:
+        if has_force:
             lever = -axes @ _skew(force)
             F[PLACE, TURN], F[VELOCITY, TURN] = 0.5 * t * t * lever, t * lever
             F[PLACE, FORCE_BIAS], F[VELOCITY, FORCE_BIAS] = -0.5 * t * t * axes, -t * axes
         F[TURN, RATE_BIAS] = -t * np.eye(3)
         F[TURN, TURN] = rotate(np.asarray(turned), np.eye(3))  # of the inverse rotation: rows are turned axes
-        self.F, self.Q = F, self._noise(t, noise, measured=inertial is not None)
+        self.F, self.Q = F, self._noise(t, noise, measured=has_rate)
         self.belief = Belief(
             now.position + t * now.velocity + 0.5 * t * t * push,
             now.velocity + t * push,
@@ -96,7 +99,7 @@ class SpatialFilter(ExtendedKalmanFilter, Filter):  # type: ignore[misc]
             now.force_bias,
             now.rate_bias,
             rate,
-            measured=inertial is not None,
+            measured=has_rate,
         )
         self.predict()
 
@@ -105,6 +108,8 @@ class SpatialFilter(ExtendedKalmanFilter, Filter):  # type: ignore[misc]
 
     def correct(self, kind: int, value: Any) -> None:
         """Correct by an event; an inertial reading has moved the filter to its time already."""
+        if kind == events.IMU and not value.has_rate:
+            return
         if kind == events.IMU:
             self._begin_to_measure()
         now = self.belief

@@ -20,6 +20,7 @@ from fulmar_core.inertia_estimation.ekf import EkfSettings, InertiaFilter
 from fulmar_core.inertia_estimation.momentum_balance import FULL, is_body, numbers_of, tensor_of
 from fulmar_core.inertia_estimation.recursive import RecursiveFit
 from fulmar_core.robot import Robot
+from fulmar_core.sensors.imu import NO_GYROSCOPE
 from fulmar_core.sensors.reading import Reading
 
 AXES = "xyz"
@@ -51,6 +52,7 @@ class InertiaEstimator:
         s = self._settings
         self.problem = NOT_BEGUN
         self.saturated: tuple[str, ...] = ()
+        self._lacking = ""  # what the newest reading of the inertial unit does not have, in words
         self._times = ReadingTimes(self._begin_epoch)
         self._waiting: dict[str, deque[tuple[int, np.ndarray]]] = {"imu": deque(), "wheels": deque()}
         self._samples: deque[tuple[float, np.ndarray, np.ndarray]] = deque(maxlen=MOST_SAMPLES)
@@ -81,6 +83,9 @@ class InertiaEstimator:
         return None
 
     def _rate_of(self, reading: Reading) -> tuple[np.ndarray, str]:
+        self._lacking = "" if reading.value.has_rate else NO_GYROSCOPE
+        if self._lacking:
+            return np.zeros(3), self._lacking
         rate = np.asarray(reading.value.angular_velocity, dtype=float)
         if not np.isfinite(rate).all():
             return rate, "the gyroscope reports a value that is not finite"
@@ -123,7 +128,7 @@ class InertiaEstimator:
     def estimate(self, stamp_ns: int | None = None) -> Estimate | None:
         """See `Estimator.estimate`; the stamp is that of the newest readings."""
         if self._last_ns < 0:
-            self.problem = NOT_BEGUN
+            self.problem = self._lacking or NOT_BEGUN
             return None
         numbers, covariance = self._believed()
         self.problem = self._problem_of(numbers, covariance)

@@ -19,6 +19,7 @@ from fulmar_core.wire import Wire
 
 INERTIAL = 4  # stream of the unit's random numbers, beside that of the odometry
 UNKNOWN = -1.0  # REP-145: first covariance entry of a field that is absent
+NO_GYROSCOPE = "the inertial unit reports no turn rate: it has no gyroscope"
 
 
 @dataclass(frozen=True)
@@ -62,8 +63,30 @@ class ImuSpec:
 class ImuSample:
     """One reading, in the frame of the unit."""
 
-    specific_force: np.ndarray  # (3,) acceleration minus gravity; NaN: not measured [m/s²]
-    angular_velocity: np.ndarray  # (3,) [rad/s]
+    specific_force: np.ndarray  # (3,) acceleration minus gravity; all NaN: not measured [m/s²]
+    angular_velocity: np.ndarray  # (3,); all NaN: not measured [rad/s]
+
+    @property
+    def has_force(self) -> bool:
+        """Whether an accelerometer reports."""
+        return not np.isnan(self.specific_force).all()
+
+    @property
+    def has_rate(self) -> bool:
+        """Whether a gyroscope reports."""
+        return not np.isnan(self.angular_velocity).all()
+
+    @property
+    def is_finite(self) -> bool:
+        """Whether everything that is reported is finite."""
+        force = np.isfinite(self.specific_force).all() or not self.has_force
+        return bool(force and (np.isfinite(self.angular_velocity).all() or not self.has_rate))
+
+    @property
+    def lacks(self) -> str:
+        """What does not report, for people; empty if both do."""
+        absent = (("accelerometer", self.has_force), ("gyroscope", self.has_rate))
+        return " and ".join(name for name, there in absent if not there)
 
 
 class InertialUnit:
@@ -149,32 +172,34 @@ PATHS = (
 
 
 @functools.cache
-def _covariances(spec: ImuSpec, force_is_known: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _covariances(spec: ImuSpec, has_force: bool, has_rate: bool) -> tuple[np.ndarray, ...]:
     """Of orientation, specific force and turn rate, shapes (9,); absent ones are marked as REP-145 says."""
     force = np.eye(3).ravel() * spec.accelerometer.std**2
     turn = np.eye(3).ravel() * spec.gyroscope.std**2
     absent = np.zeros(9)
     absent[0] = UNKNOWN
-    if not force_is_known:
+    if not has_force:
         force[0] = UNKNOWN
+    if not has_rate:
+        turn[0] = UNKNOWN
     return absent, force, turn
 
 
 def _write(reading: Reading, spec: ImuSpec) -> Sequence[Any]:
     sample: ImuSample = reading.value
-    force = sample.specific_force.tolist()
-    known = not math.isnan(force[0])
+    absent = (0.0, 0.0, 0.0)
     return (
-        *(force if known else (0.0, 0.0, 0.0)),
-        *sample.angular_velocity.tolist(),
-        *_covariances(spec, known),
+        *(sample.specific_force.tolist() if sample.has_force else absent),
+        *(sample.angular_velocity.tolist() if sample.has_rate else absent),
+        *_covariances(spec, sample.has_force, sample.has_rate),
     )
 
 
 def _read(values: Sequence[Any]) -> Reading:
     force, turn = np.array(values[:3], dtype=float), np.array(values[3:6], dtype=float)
-    if values[PATHS.index("linear_acceleration_covariance")][0] == UNKNOWN:
-        force[:] = np.nan
+    for vector, name in ((force, "linear_acceleration_covariance"), (turn, "angular_velocity_covariance")):
+        if values[PATHS.index(name)][0] == UNKNOWN:
+            vector[:] = np.nan
     return Reading(ImuSample(force, turn))
 
 
