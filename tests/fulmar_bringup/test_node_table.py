@@ -8,6 +8,7 @@ from importlib.util import find_spec
 
 import pytest
 
+from fulmar_bringup.estimator_rows import estimator_specs
 from fulmar_bringup.launched_system import list_nodes
 from fulmar_bringup.node_table import controller_spec, plant_spec, recorder_spec
 from fulmar_bringup.run_plan import RunPlan
@@ -313,3 +314,5 @@ def test_a_launched_system_takes_a_name_from_its_file_and_from_its_argument(tmp_
 def test_measurements_without_noise_may_repeat_while_a_robot_stands(changes, repeats):
     parameters = controller_spec(replace(PLAN, **changes)).parameters
     assert parameters.get("odometry_may_repeat", False) is repeats
+    estimating = replace(PLAN, guards=Guards(estimator="mocap_imu"), **changes)
+    assert estimator_specs(estimating)[0].parameters.get("exact_sensors", False) is repeats

@@ -7,7 +7,7 @@ import pytest
 
 from fulmar_core.robot import load_robot
 from fulmar_core.sensors.odometer import Channel
-from fulmar_core.sensors.repetition import FEWEST, FROZEN_AFTER, RepetitionCheck, is_noisy
+from fulmar_core.sensors.repetition import FEWEST, FROZEN_AFTER, RepetitionCheck, is_noisy, without_noise
 
 MS = 1_000_000
 HERE = np.array([1.0, 2.0])
@@ -63,5 +63,16 @@ def test_noise_that_a_quantum_hides_is_none(channels, noisy):
 
 
 def test_shipped_robots_have_noise_in_what_they_measure():
-    sensors = load_robot("floating_platform").sensors
-    assert is_noisy(sensors.odometry.position) and is_noisy(sensors.imu.accelerometer)
+    sensors = load_robot("cubesat_wheels").sensors
+    for spec in (sensors.odometry.heading, sensors.imu.gyroscope, sensors.star_tracker, sensors.wheels):
+        assert is_noisy(spec)
+
+
+def test_sensors_of_a_simulation_without_noise_have_none_and_keep_their_range():
+    sensors = load_robot("cubesat_wheels").sensors
+    exact = without_noise(sensors)
+    assert not any(
+        is_noisy(spec)
+        for spec in (exact.odometry.heading, exact.imu.gyroscope, exact.star_tracker, exact.wheels)
+    )
+    assert exact.imu.gyroscope_range == sensors.imu.gyroscope_range

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from fulmar_bringup.run_plan import NodeSpec, Parameter, RunPlan, node_row
+from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.estimation.kinds import estimator_kind
 from fulmar_core.robot import load_robot
 from fulmar_core.topics import ANSWER, EVENTS, EVENTS_2, PERIOD, TRUTH, Wire
@@ -18,6 +19,13 @@ def robot_row(
 ) -> NodeSpec:
     """A row of a plan's robot, with its topics renamed; `more` as of `NodeSpec`."""
     return node_row(plan.namespace, name, module, parameters, remappings=dict(plan.remappings), **more)
+
+
+def simulates_without_noise(plan: RunPlan) -> bool:
+    """Whether what the sensors of a plan measure is exact, so that it repeats itself while the robot stands."""
+    if plan.backend == "hardware":
+        return False
+    return plan.backend == "mock" or not load_scenario(plan.scenario).sensor_noise
 
 
 def estimator_specs(plan: RunPlan) -> tuple[NodeSpec, ...]:
@@ -44,6 +52,8 @@ def _estimator_spec(plan: RunPlan, file: str, others: Sequence[NodeSpec]) -> Nod
     """The node that estimates, by a file of `configs/estimators`."""
     kind = estimator_kind(file)
     parameters: dict[str, Parameter] = {"robot": plan.robot, "estimator": file}
+    if simulates_without_noise(plan):
+        parameters["exact_sensors"] = True
     inputs, observed = tuple(kind.takes.values()), tuple(kind.takes_if_there.values())
     outputs = (*kind.publishes, *((kind.status,) if kind.status else ()))
     module = "fulmar_ros.estimator_node"

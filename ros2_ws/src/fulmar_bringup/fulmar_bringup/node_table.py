@@ -6,9 +6,8 @@ from dataclasses import asdict
 from pathlib import Path
 
 from fulmar_bringup.emulation import Emulation
-from fulmar_bringup.estimator_rows import estimator_specs, robot_row
+from fulmar_bringup.estimator_rows import estimator_specs, robot_row, simulates_without_noise
 from fulmar_bringup.run_plan import NodeSpec, Parameter, RunPlan
-from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.estimation.kinds import estimator_kind, load_estimator
 from fulmar_core.recording import Recording
 from fulmar_core.robot import load_robot
@@ -86,8 +85,8 @@ def controller_spec(plan: RunPlan) -> NodeSpec:
             parameters["air_bearing"] = True
         # Encoders of a base at rest repeat; motion capture never does.
         repeats = not estimates_odometry(plan) and not hardware.seen_from_outside
-    else:  # a simulation without noise repeats, too
-        repeats = plan.backend == "mock" or not load_scenario(plan.scenario).sensor_noise
+    else:
+        repeats = simulates_without_noise(plan)
     if repeats:
         parameters["odometry_may_repeat"] = True
     if plan.copies > 1:

@@ -48,6 +48,7 @@ class EstimatorNodeSettings:
     estimator: str = "mocap_imu"  # name of a file in configs/estimators, or a path that ends in .yaml
     lockstep: bool = False  # answer the periods of a plant in lock step
     upstream: tuple[str, ...] = ("",)  # in lock step: other nodes whose outputs are inputs of this one
+    exact_sensors: bool = False  # they measure without noise, as in some simulations: they may repeat a value
     wait_for_subscribers: int = 0  # in lock step: of each output, before the first answer
     transforms: bool = True  # publish /tf, where tf2_msgs is installed; off where another node does
 
@@ -67,7 +68,7 @@ class EstimatorNode(Node):
         super().__init__("estimator", cli_args=cli_args)
         settings = read_parameters(self, EstimatorNodeSettings)
         robot, kind = load_robot(settings.robot), estimator_kind(settings.estimator)
-        self._estimator = make_estimator(settings.estimator, robot)
+        self._estimator = make_estimator(settings.estimator, robot, exact_sensors=settings.exact_sensors)
         self._bridge_s = load_estimator(settings.estimator).bridge_s
         self._frames = own_frames(self, robot)
         self._published_ns = -1
@@ -181,7 +182,8 @@ class EstimatorNode(Node):
         silent_s = time.monotonic() - self._received_s
         stale = f"nothing usable comes for {silent_s:.1f} s" if silent_s > self._bridge_s else ""
         problem = self._problem or stale
-        key = (problem[:16], self._estimator.epoch, self._refused > 0)
+        warnings = self._estimator.warnings()
+        key = (problem[:16], warnings, self._estimator.epoch, self._refused > 0)
         if key == self._said and time.monotonic() - self._said_s < STATUS_PERIOD_S:
             return
         self._said, self._said_s = key, time.monotonic()
@@ -197,7 +199,9 @@ class EstimatorNode(Node):
         values |= self._estimator.status()
         lacks = values.get("lacks", LACKS_NOTHING)
         estimating = "estimating" if lacks == LACKS_NOTHING else f"estimating without {lacks}"
-        self._health.publish("warn" if problem else "ok", problem or estimating, values)
+        level = "warn" if problem or warnings else "ok"
+        message = problem or "; ".join(warnings) or estimating
+        self._health.publish(level, message, values, warnings=warnings)
 
     def stop(self) -> None:
         """Wait for the last estimate to arrive; nodes that receive none stop by themselves."""

@@ -119,6 +119,10 @@ class AttitudeEstimator:
                 return name
         return "wheels"
 
+    def warnings(self) -> tuple[str, ...]:
+        """None; see `Estimator.warnings`."""
+        return ()
+
     def status(self) -> dict[str, str]:
         """See `Estimator.status`."""
         return {"rate_from": self.rate_source, "lacks": self._lacks or LACKS_NOTHING}

@@ -56,6 +56,13 @@ class Estimator(Protocol):
         """What else there is to say of the estimate, by name, for people."""
         ...
 
+    def warnings(self) -> tuple[str, ...]:
+        """What endangers the robot now, a sentence each, for its status, diagnostics and report.
+
+        A sentence stays the same while its cause does: it holds no figure that changes.
+        """
+        ...
+
     def estimate(self, stamp_ns: int | None = None) -> Estimate | None:
         """What is believed; None, with `problem`, without a usable estimate.
 

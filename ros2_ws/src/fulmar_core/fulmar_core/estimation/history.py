@@ -223,6 +223,10 @@ class HistoryEstimator(ABC, Generic[S]):
             f"the gyroscope reads {largest:.2f} rad/s, the end of its range: the body tumbles too fast for it"
         )
 
+    def warnings(self) -> tuple[str, ...]:
+        """None; see `Estimator.warnings`."""
+        return ()
+
     def status(self) -> dict[str, str]:
         """What the newest inertial reading lacks; see `Estimator`."""
         return {"lacks": self._lacks or LACKS_NOTHING}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +21,7 @@ from fulmar_core.estimation.settings import (
 from fulmar_core.paths import config_path
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
+from fulmar_core.sensors.repetition import without_noise
 from fulmar_core.spatial import SpatialState
 from fulmar_core.state import State
 from fulmar_core.topics import (
@@ -211,7 +212,18 @@ def check_estimator(name: str, robot: Robot) -> None:
         )
 
 
-def make_estimator(name: str, robot: Robot) -> Estimator:
-    """A new estimator of a robot with the settings of a file; errors as of `check_estimator`."""
+def make_estimator(name: str, robot: Robot, *, exact_sensors: bool = False) -> Estimator:
+    """A new estimator of a robot with the settings of a file.
+
+    Args:
+        name: See `load_estimator`.
+        robot: The robot; its file says which sensors have noise, so that a value that they repeat is no measurement.
+        exact_sensors: Whether none has any, as in a simulation without noise.
+
+    Raises:
+        ConfigError: See `check_estimator`.
+    """
     check_estimator(name, robot)
+    if exact_sensors:
+        robot = replace(robot, sensors=without_noise(robot.sensors))
     return estimator_kind(name).make(load_estimator(name), robot)

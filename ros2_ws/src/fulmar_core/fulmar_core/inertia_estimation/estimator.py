@@ -153,6 +153,10 @@ class InertiaEstimator:
             np.sqrt(np.maximum(np.diag(covariance)[:3], 0.0)) / np.maximum(np.abs(numbers[:3]), 1e-12)
         )
 
+    def warnings(self) -> tuple[str, ...]:
+        """None; see `Estimator.warnings`."""
+        return ()
+
     def status(self) -> dict[str, str]:
         """Excitation and what cannot be observed, for people: a value for each axis and the wheels."""
         found = {}

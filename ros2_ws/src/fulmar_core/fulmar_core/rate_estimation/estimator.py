@@ -107,6 +107,10 @@ class EventRateEstimator:
                 self.problem = self.problem or f"no rate for {age_s:.1f} s"
         return self._estimate
 
+    def warnings(self) -> tuple[str, ...]:
+        """None; see `Estimator.warnings`."""
+        return ()
+
     def status(self) -> dict[str, str]:
         """See `Estimator.status`."""
         found = {"noise_hz_per_pixel": f"{self._noise_hz:.3g}", "events_per_s": f"{self._events_hz:.0f}"}

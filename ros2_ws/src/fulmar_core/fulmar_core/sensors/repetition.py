@@ -7,10 +7,12 @@ stands: encoders, simulated sensors of a scenario without noise, channels whose 
 from __future__ import annotations
 
 import math
+from dataclasses import fields, is_dataclass, replace
+from typing import Any, TypeVar
 
 import numpy as np
 
-from fulmar_core.sensors.odometer import Channel
+Spec = TypeVar("Spec")
 
 FROZEN_AFTER = 10  # repeats of one value in a row that no noisy sensor gives
 FEWEST = (
@@ -63,6 +65,18 @@ class RepetitionCheck:
         return self.frozen
 
 
-def is_noisy(*channels: Channel) -> bool:
-    """Whether two measurements of one state differ: one channel at least has noise that its quantum does not hide."""
-    return any(channel.std > channel.quantum for channel in channels)
+def is_noisy(*specs: Any) -> bool:
+    """Whether two measurements of one state differ: one sensor or channel has noise that its quantum does not hide."""
+    return any(spec.std > getattr(spec, "quantum", 0.0) for spec in specs)
+
+
+def without_noise(spec: Spec) -> Spec:
+    """Specs of the same sensors without noise, as in some simulations; of one sensor or of all of a robot."""
+    changes: dict[str, Any] = {}
+    for field in fields(spec):  # type: ignore[arg-type]
+        value = getattr(spec, field.name)
+        if field.name == "std":
+            changes[field.name] = 0.0
+        elif is_dataclass(value):
+            changes[field.name] = without_noise(value)
+    return replace(spec, **changes)  # type: ignore[type-var]
