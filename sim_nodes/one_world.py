@@ -51,6 +51,7 @@ class OneWorld:
             opens_late=opening_s > 0.0,
             latest_s=self.latest_s,
             step_s=self._robot.timing.physics_dt,  # in real time a command may come at every tick
+            changes=bool(self.world.stuck_part[0] >= 0.0 or self.world.supply_left[0] < 1.0),
         )
         self.outside: Any = None  # before the first command
         self._constant_push = self.dynamics.push_is_constant(self.world)

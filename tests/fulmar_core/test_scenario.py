@@ -18,6 +18,8 @@ from fulmar_core.disturbances.parts import (
     Sensing,
     Slope,
     Solar,
+    Stuck,
+    Supply,
     Tether,
     Wave,
 )
@@ -108,6 +110,16 @@ ENTRIES = {
         replace(STILL, actuation=Actuation(failures=2, failure_chance=0.1)),
         {"actuation": Actuation(failures=2, failure_chance=1.0, **UNCONTROLLABLE)},
         {"alive"},
+    ),
+    "actuation.stuck": (
+        STILL,
+        {"actuation": Actuation(stuck=Stuck(("*",), 0.5, (1.0, 2.0)))},
+        {"stuck_part", "stuck_at", "stuck_from"},
+    ),
+    "actuation.supply": (
+        STILL,
+        {"actuation": Actuation(supply=Supply(0.1, 2.0, 3.0))},
+        {"supply_left", "supply_from", "supply_over"},
     ),
     "sensing.noise": (SEEING, {"sensing": Sensing(noise=2.0)}, {"noise"}),
     "sensing.bias": (SEEING, {"sensing": Sensing(bias=2.0)}, {"sensor_bias", "sensor_scale"}),

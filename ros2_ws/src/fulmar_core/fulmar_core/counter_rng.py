@@ -120,6 +120,14 @@ class Draws:
         """The numbers of one episode, as a batch of one."""
         return cls(seed, np.asarray([number]), np.asarray([repeat]), stream)
 
+    def branch(self, number: int) -> Draws:
+        """Other numbers for the same worlds, which leave these as they are; `number` >= 1 tells branches apart."""
+        other = object.__new__(type(self))
+        first, second = words(self._keys, MASK - number, 2)
+        other._keys, other.worlds = (first, second), self.worlds
+        other._blocks, other._used, other._pool = 0, BLOCK, None
+        return other
+
     def uniform(self, low: Any, high: Any, *shape: int) -> Array:
         """Numbers between two bounds, which may broadcast, shape (worlds, *shape), float64."""
         return low + (high - low) * self._unit(shape)

@@ -28,7 +28,13 @@ from fulmar_core.sensors.wheels import WheelSpeeds
 
 
 def actuation_of(
-    robot: Robot, safe: Array, *, opens_late: bool = True, latest_s: float = 0.0, step_s: float = math.inf
+    robot: Robot,
+    safe: Array,
+    *,
+    opens_late: bool = True,
+    latest_s: float = 0.0,
+    step_s: float = math.inf,
+    changes: bool = False,
 ) -> ActuationState:
     """The actuators of a robot in their safe state.
 
@@ -38,21 +44,24 @@ def actuation_of(
         opens_late: As of `may_open_late`.
         latest_s: As of `longest_delay` [s].
         step_s: Least time between two commands [s].
+        changes: Whether a part may stick or the supply may fall within an episode.
     """
     response = robot.actuators.response
     if isinstance(robot.actuators, Rolling):
         response = dataclasses.replace(response, lag_s=0.0)  # the wheels' own servos bring it in
     outlasts_step = latest_s > step_s + 1e-9 and not opens_late
     delay_ticks = math.ceil(latest_s / robot.timing.physics_dt - 1e-9) if outlasts_step else 0
+    parts = robot.actuators.parts if changes else None
     usual: dict[str, Any] = {
         "binary": robot.actuators.binary,
         "scale": robot.actuators.scale,
         "safe": safe,
         "opens_late": opens_late,
         "delay_ticks": delay_ticks,
+        "parts": parts,
     }
     if isinstance(robot.actuators, ControlSurfaces):
-        return FlightActuation(robot.actuators, safe, delay_ticks=delay_ticks)
+        return FlightActuation(robot.actuators, safe, delay_ticks=delay_ticks, parts=parts)
     if isinstance(robot.actuators, ReactionWheels):
         return WheelActuation(response, count=robot.actuators.count, **usual)
     return ActuationState(response, **usual)

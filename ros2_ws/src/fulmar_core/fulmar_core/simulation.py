@@ -112,6 +112,7 @@ class BatchSimulation(MutableState, Generic[S]):
             opens_late=may_open_late(robot, scenario),
             latest_s=self._latest_s,
             step_s=self.control_dt,
+            changes=scenario.actuation.changes,
         )
         self.command: Array = self._safe.T
         self._upcoming = UpcomingEpisodes(self._draw, worlds)

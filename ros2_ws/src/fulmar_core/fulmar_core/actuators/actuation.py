@@ -1,4 +1,4 @@
-"""Between a command and what the actuators do: failures, noise, delay, slew and lag."""
+"""Between a command and what the actuators do: failures, noise, delay, parts that stick, slew and lag."""
 
 from __future__ import annotations
 
@@ -7,7 +7,9 @@ from typing import ClassVar
 import numpy as np
 from array_api_compat import device
 
+from fulmar_core.actuators.parts import MovingParts
 from fulmar_core.actuators.response import Response
+from fulmar_core.actuators.sticking import Sticking, supplied
 from fulmar_core.arrays import array_namespace, clip
 from fulmar_core.disturbances.world import World
 from fulmar_core.mutable_state import MutableState
@@ -26,6 +28,7 @@ class ActuationState(MutableState):
         "_late",
         "_open_late",
         "_line",
+        "_time_s",
     )
 
     def __init__(
@@ -37,6 +40,7 @@ class ActuationState(MutableState):
         safe: Array,
         opens_late: bool = True,
         delay_ticks: int = 0,
+        parts: MovingParts | None = None,
     ) -> None:
         """Begin in the safe state.
 
@@ -48,6 +52,8 @@ class ActuationState(MutableState):
             opens_late: Whether closed valves may open later than open ones close; saves the work where none does.
             delay_ticks: Physics ticks by which the latest command may act late, where another command may come
                 meanwhile; 0 otherwise, which costs less. Valves that open late need 0.
+            parts: What may stick within an episode, in worlds whose supply may fall; None saves the work where
+                nothing changes.
         """
         self._response, self._binary, self._opens_late = response, binary, opens_late
         self._scale = array_namespace(safe).asarray(scale, dtype=safe.dtype, device=device(safe))[:, None]
@@ -60,6 +66,9 @@ class ActuationState(MutableState):
         self._line = (
             array_namespace(safe).zeros((delay_ticks, 1, 1), dtype=safe.dtype, device=device(safe)) + safe
         )
+        self._time_s = array_namespace(safe).zeros_like(safe[0])  # since each episode began [s]
+        self._sticking = None if parts is None else Sticking(parts, safe)
+        self._world: World
         self._slew: Array | None = None
         if response.slew:
             xp = array_namespace(safe)
@@ -76,6 +85,9 @@ class ActuationState(MutableState):
             values = array_namespace(safe).asarray(getattr(self, name), copy=True)
             values[..., which] = safe
             setattr(self, name, values)
+        if self._sticking is not None:
+            self._time_s = array_namespace(safe).asarray(self._time_s, copy=True)
+            self._time_s[which] = 0.0
 
     def hold(self, command: Array) -> None:
         """Let every actuator apply a command, as if it had been held for long.
@@ -103,6 +115,9 @@ class ActuationState(MutableState):
             self.gain = world.gain * (1.0 + world.action_noise * noise)
         else:
             self._wanted = (command + world.action_noise * self._scale * noise) * world.alive
+        if self._sticking is not None:
+            self._world = world
+            self.gain = self.gain * supplied(world, self._time_s)
         self._since_s = 0.0
         self._late = self._response.delay_s + world.action_delay
         self._open_late = self._late + self._response.opening_delay_s + world.opening_delay
@@ -127,6 +142,15 @@ class ActuationState(MutableState):
         return target
 
     def _target(self, dt: float, *, latest_s: float) -> Array:
+        """What actuators move to while time passes, shape (n, worlds); arguments as of `advance`."""
+        commanded = self._commanded(dt, latest_s=latest_s)
+        if self._sticking is None:
+            return commanded
+        reached = self._sticking.reached(commanded, self._world, self._time_s + 0.5 * dt)
+        self._time_s = self._time_s + dt
+        return reached
+
+    def _commanded(self, dt: float, *, latest_s: float) -> Array:
         """The command that acts while time passes, shape (n, worlds); arguments as of `advance`."""
         if self._line.shape[0]:
             return self._from_line(dt)

@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 from array_api_compat import device
 
+from fulmar_core.actuators.parts import MovingParts
 from fulmar_core.actuators.response import Response
 from fulmar_core.actuators.rolling import Rolling
 from fulmar_core.arrays import array_namespace, clip
@@ -65,6 +66,13 @@ class DifferentialDrive(Rolling):
     def scale(self) -> np.ndarray:
         """Largest command [m/s, rad/s]."""
         return np.array([self.max_speed, self.max_yaw_rate])
+
+    @property
+    def parts(self) -> MovingParts:
+        """The wheels, which turn by the speed and the turn rate of the body; see `Actuators.parts`."""
+        half, most = 0.5 * self.track, np.full(2, self.max_wheel_speed)
+        matrix = np.array([[1.0, -half], [1.0, half]]) / self.wheel_radius
+        return MovingParts(tuple(self.wheels), -most, most, matrix)
 
     def limited(self, command: Array) -> Array:
         """Nearest command that the wheels can carry out, shape (..., 2).

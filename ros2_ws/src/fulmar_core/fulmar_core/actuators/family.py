@@ -14,6 +14,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from fulmar_core.actuators.excitation import Excitation
+from fulmar_core.actuators.parts import MovingParts
 from fulmar_core.actuators.refuge import Refuge, StopAtOnce
 from fulmar_core.actuators.response import Response
 from fulmar_core.plausible_ranges import Plausible
@@ -82,6 +83,11 @@ class Actuators(ABC):
     def lowest(self) -> np.ndarray:
         """Smallest command of each, shape (n,)."""
         return 0.0 * self.scale if self.one_way else -self.scale
+
+    @property
+    def parts(self) -> MovingParts:
+        """What of it can stick, one by one: what its commands name."""
+        return MovingParts(self.names, self.lowest, self.scale)
 
     @property
     def safe_command(self) -> np.ndarray:

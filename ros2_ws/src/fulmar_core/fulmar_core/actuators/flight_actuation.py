@@ -9,6 +9,7 @@ from array_api_compat import device
 
 from fulmar_core.actuators.actuation import ActuationState
 from fulmar_core.actuators.control_surfaces import ControlSurfaces
+from fulmar_core.actuators.parts import MovingParts
 from fulmar_core.arrays import array_namespace, clip
 from fulmar_core.flight.turbulence import FILTERS, Gust, gust_step
 from fulmar_core.rotation import Array
@@ -27,8 +28,10 @@ class FlightActuation(ActuationState):
 
     MUTABLE = (*ActuationState.MUTABLE, "servo_rates", "gusts", "gust_steps")
 
-    def __init__(self, actuators: ControlSurfaces, safe: Array, *, delay_ticks: int) -> None:
-        """Begin in the safe state, in still air; `safe` and `delay_ticks` as of `ActuationState`."""
+    def __init__(
+        self, actuators: ControlSurfaces, safe: Array, *, delay_ticks: int, parts: MovingParts | None
+    ) -> None:
+        """Begin in the safe state, in still air; arguments as of `ActuationState`."""
         super().__init__(
             actuators.response,
             binary=False,
@@ -36,6 +39,7 @@ class FlightActuation(ActuationState):
             safe=safe,
             opens_late=False,
             delay_ticks=delay_ticks,
+            parts=parts,
         )
         self._actuators, self._count = actuators, actuators.positions
         xp, worlds = array_namespace(safe), safe.shape[1]

@@ -133,6 +133,37 @@ class InertiaChange:
 
 
 @dataclass(frozen=True)
+class Stuck:
+    """One part that stands at a value from a time on, whatever it is commanded; which one is drawn."""
+
+    # Names, or patterns as in file names, of the parts of which one sticks: thruster_*, elevator. Empty: none.
+    actuators: tuple[str, ...] = ()
+    at: float = 0.0  # share of its largest value: 0 closed, dead or neutral, 1 open, 0.5 half travel [-]
+    from_s: Range = (0.0, 0.0)  # from when on in an episode [s]
+
+    def __post_init__(self) -> None:
+        if not -1.0 <= self.at <= 1.0:
+            raise ValueError(f"'at' = {self.at:g} must lie in [-1, 1], a share of the part's largest value.")
+        if not 0.0 <= self.from_s[0] <= self.from_s[1]:
+            raise ValueError("'from_s' must be [low, high] with 0 <= low <= high.")
+
+
+@dataclass(frozen=True)
+class Supply:
+    """What drives all actuators, as pressure or voltage, and how it falls within an episode."""
+
+    left: float = 1.0  # share that is left in the end; what actuators do falls by it [-]
+    from_s: float = 0.0  # when it begins to fall [s]
+    over_s: float = 1.0  # how long it falls [s]
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.left <= 1.0:
+            raise ValueError(f"'left' = {self.left:g} must lie in [0, 1], a share of the full supply.")
+        if self.from_s < 0.0 or self.over_s <= 0.0:
+            raise ValueError("'from_s' must not be negative, and 'over_s' must be greater than 0.")
+
+
+@dataclass(frozen=True)
 class Actuation:
     """What may be wrong with the actuators."""
 
@@ -146,6 +177,13 @@ class Actuation:
     failure_chance: float = 0.0  # of each of these [-]
     # Only failures, all at once, after which no pose can be held, where a robot has thrusters that can fail so.
     stranding: bool = False  # word: key of scenario files
+    stuck: Stuck = Stuck()
+    supply: Supply = Supply()
+
+    @property
+    def changes(self) -> bool:
+        """Whether actuators change within an episode."""
+        return bool(self.stuck.actuators) or self.supply.left < 1.0
 
     def __post_init__(self) -> None:
         if min(self.noise, self.delay_s, self.failures, self.gain[0], self.failure_chance) < 0.0:

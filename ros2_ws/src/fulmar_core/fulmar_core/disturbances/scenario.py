@@ -26,6 +26,7 @@ from fulmar_core.disturbances.parts import (
     Tether,
     Wave,
 )
+from fulmar_core.disturbances.stuck import draw_changes
 from fulmar_core.disturbances.world import World
 from fulmar_core.dynamics.hydrodynamics import GRAVITY
 from fulmar_core.errors import ConfigError
@@ -251,6 +252,7 @@ def draw_world(robot: Robot, scenario: Scenario, draws: Draws) -> World:
         sensor_scale=(own * (1.0 + (sensing.bias - 1.0)) * scale).T,
         sensor_delay=sensing.delay_s * sensor_delay,
         dropout=sensing.dropout * dropout,
+        **draw_changes(robot, faults, draws),
     )
 
 

@@ -12,6 +12,7 @@ from fulmar_core.arrays import array_namespace
 from fulmar_core.attitude import Vector, cross, length, scaled, turn_back, uniform_direction
 from fulmar_core.counter_rng import Draws
 from fulmar_core.disturbances.scenario import Scenario, around, check_delays, survivors
+from fulmar_core.disturbances.stuck import draw_changes
 from fulmar_core.disturbances.world import Drawn
 from fulmar_core.dynamics.rigid_body import gravity_gradient_torque
 from fulmar_core.robot import Robot
@@ -56,6 +57,12 @@ class SpatialWorld(Drawn):
     sensor_scale: Array  # (12, ...) in the sensors' own standard deviations of scale [-]
     sensor_delay: Array  # beyond the sensors' own [s]
     dropout: Array  # chance that a measurement is lost [-]
+    stuck_part: Array  # number of the part that sticks within the episode; -1: none
+    stuck_at: Array  # where it sticks, as a share of its largest value [-]
+    stuck_from: Array  # from when on; out of reach where none sticks [s]
+    supply_left: Array  # share of the supply that is left in the end; 1: it does not fall [-]
+    supply_from: Array  # when it begins to fall [s]
+    supply_over: Array  # how long it falls [s]
 
 
 def push_in_world(world: SpatialWorld, time_s: Array, control_dt: float) -> Vector:
@@ -195,6 +202,7 @@ def draw_spatial_world(robot: Robot, scenario: Scenario, draws: Draws) -> Spatia
         sensor_scale=(own * sensing.bias * scale).T,
         sensor_delay=sensing.delay_s * sensor_delay,
         dropout=sensing.dropout * dropout,
+        **draw_changes(robot, faults, draws),
     )
 
 

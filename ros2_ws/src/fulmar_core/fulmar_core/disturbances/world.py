@@ -125,6 +125,12 @@ class World(Drawn):
     sensor_scale: Array  # (6, ...) in the sensors' own standard deviations of scale [-]
     sensor_delay: Array  # beyond the sensors' own [s]
     dropout: Array  # chance that a measurement is lost [-]
+    stuck_part: Array  # number of the part that sticks within the episode; -1: none
+    stuck_at: Array  # where it sticks, as a share of its largest value [-]
+    stuck_from: Array  # from when on; out of reach where none sticks [s]
+    supply_left: Array  # share of the supply that is left in the end; 1: it does not fall [-]
+    supply_from: Array  # when it begins to fall [s]
+    supply_over: Array  # how long it falls [s]
 
 
 FIELDS = World.names()
