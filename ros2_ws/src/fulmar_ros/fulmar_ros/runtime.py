@@ -76,13 +76,19 @@ def run_node(make_node: Callable[[RequestExit], Node], argv: Sequence[str] | Non
         sys.stderr.write(f"the ROS arguments on the command line are wrong: {str(error).splitlines()[0]}\n")
         return BAD_USAGE
     try:
-        node = make_node(exit_codes.put)
-        return _spin(node, exit_codes)
+        return _spin(make_node(exit_codes.put), exit_codes)
     except FulmarError as error:
         sys.stderr.write(f"{error}\n")
-        return BAD_USAGE
     finally:
         rclpy.try_shutdown()
+    _collect_refused_node()
+    return BAD_USAGE
+
+
+def _collect_refused_node() -> None:
+    """Free a node whose constructor raised: nobody holds it, and it keeps its DDS participant alive; see `_destroy`."""
+    gc.unfreeze()
+    gc.collect()
 
 
 def end_with_parent() -> None:
@@ -146,7 +152,20 @@ def spinning(node: Node, on_error: Callable[[Exception], None]) -> Iterator[None
         over.set_result(None)
         thread.join(timeout=2.0)
         executor.shutdown()
-        node.destroy_node()
+        _destroy(node)
+
+
+def _destroy(node: Node) -> None:
+    """Destroy a node with everything that keeps its DDS participant alive.
+
+    `LifecycleNode.destroy_node` leaves the state machine, with its services, to the garbage collector, which
+    `settle_memory` has exempted it from. The participant would live on, and its threads would run while the process
+    tears down what they use: heap corruption, on a busy computer.
+    """
+    node.destroy_node()
+    state_machine = getattr(node, "_state_machine", None)
+    if state_machine is not None:
+        state_machine.destroy_when_not_in_use()
 
 
 def _spin_for_a_while(executor: Executor, over: Future) -> None:
