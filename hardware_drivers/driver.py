@@ -98,4 +98,17 @@ class Halting(Protocol):
         ...
 
 
+@runtime_checkable
+class Answering(Protocol):
+    """What a driver also has whose device says whether it does what it is commanded."""
+
+    def refusal(self) -> str:
+        """Why the device does not carry out commands now, in words that stay the same meanwhile; empty while it does.
+
+        Called at every tick, after `write`. The plant then holds the safe command, also after the device obeys again,
+        until a person gives control back: `fulmar teleop ROBOT --give-back`.
+        """
+        ...
+
+
 MEMBERS = ("begin", "write", "read", "health", "close")  # that a class must have

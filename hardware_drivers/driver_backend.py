@@ -13,7 +13,7 @@ from fulmar_core.episode import Episode
 from fulmar_core.errors import DeviceError
 from fulmar_core.planar import PlanarState
 from fulmar_core.robot import Robot
-from hardware_drivers.driver import DeviceDriver, Halting
+from hardware_drivers.driver import Answering, DeviceDriver, Halting
 
 STOPS = 5  # the safe command goes out this often: one may be lost
 # Between them, and after the last: publishers keep one message, and the process may end right after.
@@ -26,6 +26,7 @@ class DriverBackend:
 
     def __init__(self, robot: Robot, driver: DeviceDriver) -> None:
         self.robot, self._driver = robot, driver
+        self._answering = driver if isinstance(driver, Answering) else None
         self._sent = robot.actuators.safe_command
         self._writing = threading.Lock()
         self._closed = False
@@ -41,10 +42,11 @@ class DriverBackend:
     def step(self, command: np.ndarray, ticks: int = 1, *, begins: int | None = None) -> Sample:
         """Send a command and take the newest measurement; see `Backend.step`."""
         applied = self._write(np.asarray(command, dtype=float))
+        refusal = self._answering.refusal() if self._answering is not None else ""
         report = self._driver.read()
         if report is None:
-            return Sample({}, None, applied=applied)
-        return Sample(report.readings, None, stamp_ns=report.stamp_ns, applied=applied)
+            return Sample({}, None, applied=applied, refusal=refusal)
+        return Sample(report.readings, None, stamp_ns=report.stamp_ns, applied=applied, refusal=refusal)
 
     def make_safe(self) -> None:
         """Slow wheels down, then send the safe command several times, with time for each to arrive.

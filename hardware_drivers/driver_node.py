@@ -19,6 +19,7 @@ from fulmar_ros.runtime import RequestExit, run_node
 from hardware_drivers.devices import make_device
 from hardware_drivers.driver_backend import DriverBackend, backend_of
 from hardware_drivers.hardware import Hardware, load_hardware
+from hardware_drivers.mavlink_address import place_of
 from hardware_drivers.settings import UNARMED, MavlinkBoat, OwnDriver, ThrustTopic, ValveTopic, VelocityTopic
 from hardware_drivers.topic_driver import TopicDriver, ValveTopicDriver
 from hardware_drivers.valves import to_message
@@ -109,6 +110,11 @@ class DriverNode(PlantNode):
         if not isinstance(driver, MavlinkBoat):
             return hardware
         driver = replace(driver, arm=settings.may_arm(driver.arm))
+        if place_of(settings.port or driver.port).is_open and not driver.signing_key:
+            self.get_logger().warning(
+                f"autopilot at {settings.port or driver.port}: the first of any host that speaks there counts as the "
+                "autopilot. Name an address that only it reaches, or a 'signing_key' (docs/security.md)."
+            )
         self.get_logger().warning(
             f"autopilot at {settings.port or driver.port}: this driver will set MANUAL, ARM THE BOAT, and override RC "
             f"channels {driver.steering_channel} (steering) and {driver.throttle_channel} (throttle)."

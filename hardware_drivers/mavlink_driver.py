@@ -3,33 +3,39 @@
 from __future__ import annotations
 
 import contextlib
-import os
 import threading
 import time
-from functools import partial
-from typing import Any
-
-# MAVLink 2 carries the messages that ArduPilot speaks today; pymavlink reads this when it is imported.
-os.environ.setdefault("MAVLINK20", "1")
+from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
-from pymavlink import mavutil
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from fulmar_core.errors import DeviceError
 from fulmar_core.robot import Robot
+from fulmar_core.state import RigidBodyState
+from hardware_drivers.believable_motion import unbelievable
 from hardware_drivers.driver import DeviceDriver
 from hardware_drivers.feedback import Feedback, Report
+from hardware_drivers.mavlink_autopilot import ERROR, MANUAL, Autopilot
+from hardware_drivers.mavlink_commands import Commands
+from hardware_drivers.mavlink_link import Address, heartbeat, open_link, wait_for_autopilot
+from hardware_drivers.mavlink_signing import read_key
 from hardware_drivers.mavlink_telemetry import Telemetry
-from hardware_drivers.ports import patiently, write_at_once
 from hardware_drivers.settings import UNARMED, MavlinkBoat
 from hardware_drivers.wiring import bounded
 from hardware_drivers.wiring import channels as wired
 
-Address = tuple[int, int]  # system and component
-HOST_SYSTEM, HOST_COMPONENT = 255, 190  # a ground station, which is whose overrides ArduPilot takes
 HEARTBEAT_S = 1.0
+OBEYS_S = 3.0  # for a mode or the arming to show in a heartbeat, of which there is one a second
 NO_CHANGE = 65535  # of a channel in an override
-RATES_HZ = {"ATTITUDE": 50.0, "LOCAL_POSITION_NED": 50.0, "RAW_IMU": 25.0}
+RATES_HZ = {
+    "ATTITUDE": 50.0,
+    "LOCAL_POSITION_NED": 50.0,
+    "RAW_IMU": 25.0,
+    "RC_CHANNELS": 5.0,
+    "HEARTBEAT": 4.0,
+}
 
 
 class MavlinkDriver(DeviceDriver):
@@ -41,43 +47,59 @@ class MavlinkDriver(DeviceDriver):
     """
 
     def __init__(self, robot: Robot, settings: MavlinkBoat, *, patience_s: float) -> None:
-        """Open the link, wait for the autopilot, and ask for what is needed.
+        """Open the link, wait for the autopilot, ask for what is needed, and set MANUAL where it may be armed.
 
         Raises:
-            DeviceError: No autopilot answers.
+            ConfigError: The file with the key of its signatures cannot be used.
+            DeviceError: No autopilot answers, or it does not go to MANUAL.
         """
-        self._safe, self._settings = robot.actuators.safe_command, settings
-        self._feedback = Feedback(f"autopilot at {settings.port}", settings.silent_s)
-        self._telemetry = Telemetry()
-        self._sending = threading.Lock()
+        self._safe, self._limits, self._settings = robot.actuators.safe_command, robot.limits, settings
+        self._name = f"autopilot at {settings.port}"
+        self._feedback, self._telemetry = Feedback(self._name, settings.silent_s), Telemetry()
+        self._state = Autopilot(settings.steering_channel, settings.throttle_channel)
+        self._placing = threading.Lock()  # no report is placed by a shift that has just changed
+        self._shift = np.zeros(3)  # from where the autopilot's frame begins to where `odom` does [m]
+        self._believed: tuple[RigidBodyState, int, Report] | None = None  # and when by the steady clock [ns]
+        self._jumps, self._has_begun = 0, False
         self._over = threading.Event()
-        self._link = _opened(settings, patience_s)
-        try:
-            self._autopilot = _wait_for_autopilot(self._link, settings.port, patience_s)
-            self._prepare()
-        except OSError as error:
-            self._link.close()
-            raise DeviceError(f"autopilot at {settings.port}: the link is gone ({error}).") from error
-        except DeviceError:
-            self._link.close()
-            raise
+        key = read_key(settings.signing_key) if settings.signing_key else b""
+        self._link = open_link(settings.port, settings.baud, key, patience_s)
+        self._commands: Commands | None = None
         self._thread = threading.Thread(target=self._run, name="mavlink reader", daemon=True)
         self._thread.start()
         try:
+            self._autopilot: Address = wait_for_autopilot(self._link, settings.port, patience_s)
+            self._prepare()
             self._feedback.wait(patience_s)
-        except Exception:
+        except OSError as error:
+            self._end()
+            raise DeviceError(f"{self._name}: the link is gone ({error}).") from error
+        except BaseException:
             with contextlib.suppress(OSError):
-                self.write(self._safe)
-            self.close()
+                self._release()
+            self._end()
             raise
 
     def begin(self, x: float, y: float, heading: float) -> None:
-        """Set the boat's position in `odom`, and arm if allowed; see `DeviceDriver`."""
-        here = self._feedback.measured.position_in_world - self._telemetry.shift
-        self._telemetry.shift = np.array([x, y, 0.0]) - here
-        if self._settings.arm:
-            self._drive(0.0, 0.0)
-            self._command(mavutil.mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
+        """Set the boat's position in `odom`, and arm if allowed; see `DeviceDriver`.
+
+        Raises:
+            DeviceError: It left MANUAL, or refuses to arm.
+        """
+        with self._placing:
+            assert self._believed is not None  # as of the first report
+            state, _, report = self._believed
+            self._shift = np.array([x, y, 0.0]) - state.position_in_world
+            self._feedback.put(self._placed(report))
+        if not self._settings.arm:
+            return
+        if self._state.mode != MANUAL:
+            raise DeviceError(
+                f"{self._name}: it is in mode {self._state.mode_name}, not MANUAL. Nothing is armed."
+            )
+        self._drive(0.0, 0.0)
+        self._demand(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0, what="arming", done=lambda: self._state.armed)
+        self._has_begun = True
 
     def write(self, command: np.ndarray) -> np.ndarray:
         """Send a command; sends nothing if the boat must not be armed. See `DeviceDriver`."""
@@ -91,114 +113,136 @@ class MavlinkDriver(DeviceDriver):
         """See `DeviceDriver`."""
         return self._feedback.read()
 
+    def refusal(self) -> str:
+        """Why overrides do nothing; see `Answering`."""
+        return self._state.refusal(time.monotonic()) if self._has_begun else ""
+
     def close(self) -> None:
         """Disarm, and close the link; see `DeviceDriver`."""
         try:
-            if self._settings.arm:
-                self._command(mavutil.mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
+            self._release()
         except OSError:
             pass  # it is gone; the autopilot stops by its own failsafe
         finally:
-            self._over.set()
-            self._thread.join(0.5)
-            self._link.close()
+            self._end()
 
     def health(self) -> dict[str, str]:
-        """Battery and arming; see `DeviceDriver`."""
-        telemetry = self._telemetry
-        warning = "" if telemetry.armed else "the autopilot is not armed: its propellers stand"
-        if not self._settings.arm:
-            warning = UNARMED
-        return {"battery_v": telemetry.voltage, "armed": str(telemetry.armed).lower(), "warning": warning}
+        """Battery, mode, arming and words of the autopilot; see `DeviceDriver`."""
+        now_s, state = time.monotonic(), self._state
+        said = state.words(now_s, worst=ERROR)
+        unarmed = UNARMED if not self._settings.arm else state.refusal(now_s)
+        warning = (
+            self._feedback.refusal
+            or unarmed
+            or ("a failsafe of the autopilot acts" if state.failsafe else "")
+            or (f"the autopilot says {said}" if said else "")
+        )
+        return {
+            "battery_v": self._telemetry.voltage,
+            "armed": str(state.armed).lower(),
+            "autopilot_mode": state.mode_name,
+            "autopilot_says": state.words(now_s),
+            "refused_commands": self._commands.refused if self._commands else "",
+            "refused_messages": str(self._link.refused),
+            "refused_positions": str(self._jumps),
+            "warning": warning,
+        }
 
     def _prepare(self) -> None:
-        mavlink = mavutil.mavlink
+        """Ask for telemetry, and set MANUAL where the boat may be armed."""
+        self._commands = commands = Commands(self._link.send, self._autopilot)
         for name, rate in RATES_HZ.items():
             kind = getattr(mavlink, f"MAVLINK_MSG_ID_{name}")
-            self._command(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, float(kind), 1e6 / rate)
+            commands.tell(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, float(kind), 1e6 / rate)
         if not self._settings.arm:
             return
-        manual = 0  # of ArduPilot's rover and boat modes
-        self._command(
-            mavlink.MAV_CMD_DO_SET_MODE, float(mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED), float(manual)
+        self._demand(
+            mavlink.MAV_CMD_DO_SET_MODE,
+            float(mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED),
+            float(MANUAL),
+            what="mode MANUAL",
+            done=lambda: self._state.mode == MANUAL,
         )
 
-    def _command(self, number: int, first: float, second: float = 0.0) -> None:
-        link = self._link
-        with self._sending:
-            link.mav.command_long_send(*self._autopilot, number, 0, first, second, 0.0, 0.0, 0.0, 0.0, 0.0)
+    def _demand(
+        self, number: int, first: float, second: float = 0.0, *, what: str, done: Callable[[], bool]
+    ) -> None:
+        """Command the autopilot until a heartbeat from now on shows the effect.
+
+        Raises:
+            DeviceError: It does not, with the autopilot's own words.
+        """
+        assert self._commands is not None
+        beats = self._state.beats
+        reason = self._commands.ask(
+            number, first, second, done=lambda: self._state.beats > beats and done(), within_s=OBEYS_S
+        )
+        if reason:
+            words = self._state.words(time.monotonic())
+            says = f" It says {words}." if words else ""
+            raise DeviceError(
+                f"{self._name} refuses {what}: {reason}; it is in mode {self._state.mode_name}.{says}"
+            )
+
+    def _release(self) -> None:
+        """Stop and disarm, where the boat may be armed; raises OSError."""
+        if self._settings.arm and self._commands is not None:
+            self._drive(0.0, 0.0)
+            self._commands.tell(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
+
+    def _end(self) -> None:
+        self._over.set()
+        self._thread.join(0.5)
+        self._link.close()
 
     def _drive(self, left: float, right: float) -> None:
-        link, channels = self._link, override_of(self._settings, left, right)
-        with self._sending:
-            link.mav.rc_channels_override_send(*self._autopilot, *channels)
+        settings = self._settings
+        channels = override_of(settings, left, right)
+        pulses = channels[settings.steering_channel - 1], channels[settings.throttle_channel - 1]
+        self._state.note_sent(*pulses, time.monotonic())
+        self._link.send(mavlink.MAVLink_rc_channels_override_message(*self._autopilot, *channels))
 
     def _run(self) -> None:
-        beaten = 0.0
+        beaten, known = 0.0, False
         while not self._over.is_set():
             now = time.monotonic()
             try:
-                if now - beaten >= HEARTBEAT_S:
-                    beaten = now
-                    self._beat()
-                message = self._link.recv_match(blocking=True, timeout=0.05)
-                if message is not None and _sender(message) == self._autopilot:
-                    report = self._telemetry.take(message, time.time_ns())
-                    if report is not None:
-                        self._feedback.put(report)
+                # At once to an autopilot that has just spoken: what was sent before may not have reached it.
+                if now - beaten >= HEARTBEAT_S or known is not (self._link.autopilot is not None):
+                    beaten, known = now, self._link.autopilot is not None
+                    self._link.send(heartbeat())
+                for message in self._link.receive():
+                    self._take(message)
             except Exception as error:  # noqa: BLE001 - a thread that died in silence would look like a silent boat
                 if not self._over.is_set():
                     self._feedback.fail(f"the link is gone ({type(error).__name__}: {error})")
                 return
 
-    def _beat(self) -> None:
-        mavlink = mavutil.mavlink
-        with self._sending:
-            self._link.mav.heartbeat_send(
-                mavlink.MAV_TYPE_ONBOARD_CONTROLLER, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, 0
-            )
+    def _take(self, message: object) -> None:
+        """Take a message of the autopilot."""
+        steady_ns = time.monotonic_ns()
+        self._state.take(message, steady_ns / 1e9)
+        if self._commands is not None:
+            self._commands.take(message)
+        report = self._telemetry.take(message, time.time_ns())
+        if report is None:
+            return
+        assert report.odometry is not None
+        with self._placing:
+            last = None if self._believed is None else self._believed[:2]
+            reason = unbelievable(report.odometry, steady_ns, last, self._limits)
+            if reason:
+                self._jumps += 1
+                self._feedback.refuse(reason)
+                return
+            self._believed = report.odometry, steady_ns, report
+            self._feedback.put(self._placed(report))
 
-
-def _opened(settings: MavlinkBoat, patience_s: float) -> Any:
-    """The link, as soon as it can be opened; raises DeviceError."""
-    try:
-        link = patiently(
-            lambda: mavutil.mavlink_connection(
-                settings.port,
-                baud=settings.baud,
-                source_system=HOST_SYSTEM,
-                source_component=HOST_COMPONENT,
-                autoreconnect=False,
-                robust_parsing=True,
-                retries=1,
-            ),
-            settings.port,
-            patience_s,
-        )
-    except ValueError as error:
-        raise DeviceError(f"{settings.port} cannot be opened: {error}.") from error
-    if isinstance(link, (mavutil.mavserial, mavutil.mavtcp)):
-        # pymavlink's own write waits forever on a serial port, and hides every failure.
-        link.write = partial(write_at_once, link.fd)
-    return link
-
-
-def _wait_for_autopilot(link: Any, port: str, patience_s: float) -> Address:
-    """Address of the first autopilot that sends a heartbeat; gimbals and ground stations send some, too.
-
-    Raises:
-        DeviceError: None in time.
-    """
-    until = time.monotonic() + patience_s
-    while (left_s := until - time.monotonic()) > 0.0:
-        heartbeat = link.recv_match(type="HEARTBEAT", blocking=True, timeout=left_s)
-        if heartbeat is not None and heartbeat.autopilot != mavutil.mavlink.MAV_AUTOPILOT_INVALID:
-            return _sender(heartbeat)
-    raise DeviceError(f"autopilot at {port}: no heartbeat for {patience_s:g} s. Is it on?")
-
-
-def _sender(message: Any) -> Address:
-    return message.get_srcSystem(), message.get_srcComponent()
+    def _placed(self, report: Report) -> Report:
+        """A report of the autopilot's frame in `odom`."""
+        assert report.odometry is not None
+        place = report.odometry.position_in_world + self._shift
+        return replace(report, odometry=replace(report.odometry, position_in_world=place))
 
 
 def override_of(settings: MavlinkBoat, left: float, right: float) -> list[int]:

@@ -13,21 +13,18 @@ from hardware_drivers.feedback import DeviceTime, Report
 
 MILLI_G = 9.80665e-3  # [m/s²]
 FRESH_MS = 200.0  # an attitude and a position further apart in time make no report
-ARMED = 128  # MAV_MODE_FLAG_SAFETY_ARMED
+UNKNOWN_MV = 65535  # of a battery that is not measured
 
 
 class Telemetry:
     """Assembles reports from an autopilot's messages.
 
     Attributes:
-        shift: From where the autopilot's frame begins to where `odom` does, shape (3,) [m].
         voltage: Of the battery, as text [V]; empty as long as it is not known.
-        armed: Whether the propellers may turn.
     """
 
     def __init__(self) -> None:
-        self.shift = np.zeros(3)
-        self.voltage, self.armed = "", False
+        self.voltage = ""
         self._time = DeviceTime()
         self._attitude: Any = None
         self._imu: ImuSample | None = None
@@ -40,7 +37,8 @@ class Telemetry:
             now_ns: When it came, since the epoch [ns].
 
         Returns:
-            A report, with a position that belongs to a known attitude; most messages give none.
+            A report in the autopilot's own frame, with a position that belongs to a known attitude; most messages give
+            none.
         """
         kind = message.get_type()
         if kind == "ATTITUDE":
@@ -50,23 +48,21 @@ class Telemetry:
             turn = 1e-3 * np.array([message.xgyro, -message.ygyro, -message.zgyro])
             self._imu = ImuSample(MILLI_G * np.array([ahead, -right, -down]), turn)
         elif kind == "SYS_STATUS":
-            self.voltage = f"{1e-3 * message.voltage_battery:.1f}"
-        elif kind == "HEARTBEAT":
-            self.armed = bool(message.base_mode & ARMED)
+            millivolts = message.voltage_battery
+            self.voltage = "" if millivolts == UNKNOWN_MV else f"{1e-3 * millivolts:.1f}"
         elif kind == "LOCAL_POSITION_NED" and self._attitude is not None:
-            state = state_of(message, self._attitude, self.shift)
+            state = state_of(message, self._attitude)
             if state is not None:
                 return Report(state, self._imu, self._time.stamp_ns(float(message.time_boot_ms), now_ns))
         return None
 
 
-def state_of(position: Any, attitude_of: Any, shift: np.ndarray) -> RigidBodyState | None:
+def state_of(position: Any, attitude_of: Any) -> RigidBodyState | None:
     """State in ROS' frames: from north-east-down and starboard to east-north-up and port.
 
     Args:
         position: LOCAL_POSITION_NED.
         attitude_of: ATTITUDE.
-        shift: To add to the place, shape (3,) [m].
 
     Returns:
         The state; None where the two are of different times, or not finite.
@@ -84,7 +80,7 @@ def state_of(position: Any, attitude_of: Any, shift: np.ndarray) -> RigidBodySta
         return None
     north, east, down, vn, ve, vd, roll, pitch, yaw, p, q, r = values.tolist()
     return RigidBodyState(
-        np.array([east, north, -down]) + shift,
+        np.array([east, north, -down]),
         attitude(roll, pitch, yaw),
         np.array([ve, vn, -vd]),
         np.array([p, -q, -r]),

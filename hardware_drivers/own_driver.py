@@ -13,7 +13,7 @@ from fulmar_core.own_class import construct, load_class, one_line
 from fulmar_core.robot import Robot
 from fulmar_core.sensors.reading import Reading
 from fulmar_core.sensors.table import SENSORS
-from hardware_drivers.driver import MEMBERS, DeviceDriver
+from hardware_drivers.driver import MEMBERS, Answering, DeviceDriver
 from hardware_drivers.driver_backend import DriverBackend, backend_of
 from hardware_drivers.feedback import Report
 from hardware_drivers.settings import UNARMED, Driver, OwnDriver
@@ -113,6 +113,11 @@ class _WiredDriver(DeviceDriver):
             return {str(name): str(value) for name, value in found.items()} | unarmed
         except FulmarError as error:
             return {"warning": str(error)}
+
+    def refusal(self) -> str:
+        if self._unarmed or not isinstance(self._driver, Answering):
+            return ""
+        return " ".join(str(self._call("refusal", self._driver.refusal) or "").split())
 
     def close(self) -> None:
         self._call("close", self._driver.close)

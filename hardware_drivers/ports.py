@@ -77,7 +77,7 @@ class TcpPort:
 
     def write(self, data: bytes) -> None:
         """See `Port`."""
-        self._socket.sendall(data)
+        write_at_once(self._socket.fileno(), data)
 
     def close(self) -> None:
         """See `Port`."""
@@ -107,7 +107,53 @@ class UdpPort:
     def write(self, data: bytes) -> None:
         """See `Port`."""
         with contextlib.suppress(ConnectionRefusedError):
-            self._socket.send(data)
+            write_at_once(self._socket.fileno(), data)
+
+    def close(self) -> None:
+        """See `Port`."""
+        self._socket.close()
+
+
+class UdpListener:
+    """A UDP port at which a device calls: anyone's datagrams are read until `accept`, and its own alone after it."""
+
+    def __init__(self, host: str, port: int) -> None:
+        """Listen at an address of this computer; raises OSError."""
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.settimeout(READ_S)
+        self._caller: tuple[str, int] | None = None  # whose datagram was read last
+        self._device: tuple[str, int] | None = None
+        try:
+            self._socket.bind((host, port))
+        except OSError:
+            self._socket.close()
+            raise
+
+    def read(self) -> bytes:
+        """See `Port`."""
+        try:
+            data, self._caller = self._socket.recvfrom(CHUNK)
+        except (TimeoutError, ConnectionRefusedError):
+            return b""
+        # Those that came before `accept` wait in the queue still.
+        return data if self._device in (None, self._caller) else b""
+
+    def accept(self) -> None:
+        """Take the sender of the last datagram for the device: the kernel drops what others send."""
+        assert self._caller is not None  # called with what was read
+        self._socket.connect(self._caller)
+        self._device = self._caller
+
+    def answer(self, data: bytes) -> None:
+        """Send to the sender of the last datagram, before `accept`; raises OSError."""
+        if self._caller is not None:
+            self._socket.sendto(data, self._caller)
+
+    def write(self, data: bytes) -> None:
+        """See `Port`; dropped before `accept`."""
+        if self._device is not None:
+            with contextlib.suppress(ConnectionRefusedError):
+                write_at_once(self._socket.fileno(), data)
 
     def close(self) -> None:
         """See `Port`."""

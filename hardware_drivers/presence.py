@@ -22,7 +22,7 @@ from hardware_drivers.settings import (
 
 CONNECT_S = 0.7  # a host that has not accepted a connection by then is reported as absent [s]
 TCP = ("tcp://", "tcp:")
-UDP = ("udpin:", "udpout:", "udp:", "udpbcast:")
+UDP = ("udpin:", "udpout:", "udp:")
 
 
 def check_presence(driver: Driver, port: str = "") -> None:

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 from fulmar_core.config import Named
 from fulmar_core.errors import ConfigError
 from fulmar_core.own_class import check_class_path
+from hardware_drivers.mavlink_address import place_of
 from hardware_drivers.valves import VALVE_ORDERS
 from hardware_drivers.wiring import AS_NAMED, check_wiring
 
@@ -173,7 +174,7 @@ class MavlinkBoat:
     """A boat with ArduPilot and skid steering, by MAVLink."""
 
     kind: Literal["mavlink_boat"]
-    port: str  # as pymavlink names it: udpin:0.0.0.0:14550, tcp:host:5760, /dev/ttyACM0
+    port: str  # udpin:host:port (listens there), udpout:host:port, tcp:host:port, /dev/ttyACM0
     thrust: Thrust
     baud: int = 115200
     steering_channel: int = 1  # RC channels that its mixer takes steering and throttle from
@@ -183,9 +184,13 @@ class MavlinkBoat:
     silent_s: float = 1.0
     wiring: tuple[str, ...] = AS_NAMED  # propeller that each side of its mixer turns, `-left` where backwards
     arm: bool = False  # whether the driver sets MANUAL, arms and overrides RC; else it only receives
+    signing_key: str = ""  # file with the key of MAVLink 2's signatures; empty: nothing is signed
 
     def __post_init__(self) -> None:
         check_wiring(self.wiring)
+        place_of(self.port)
+        if self.signing_key and not self.signing_key.startswith(("/", "~/")):
+            raise ValueError(f"signing_key = '{self.signing_key}' must be a whole path, from / or ~/.")
         channels = {self.steering_channel, self.throttle_channel}
         if len(channels) != 2 or not channels <= set(range(1, 9)):
             raise ValueError("steering_channel and throttle_channel must be two of 1 to 8.")

@@ -14,6 +14,7 @@ from fulmar_core.robot import Robot
 from fulmar_core.sensors.air_data import NAME as AIR_DATA
 from fulmar_core.sensors.air_data import AirData
 from fulmar_core.sensors.reading import Reading
+from hardware_drivers.believable_motion import unbelievable
 from hardware_drivers.driver import DeviceDriver
 from hardware_drivers.earth_frame import LocalFrame
 from hardware_drivers.feedback import Feedback, Report
@@ -33,7 +34,7 @@ from hardware_drivers.xplane_messages import (
 )
 from hardware_drivers.xplane_pause import AGAIN_S, Pause
 from hardware_drivers.xplane_protocol import MalformedError, decode, encode
-from hardware_drivers.xplane_state import ASKED, Flight, Placed, check_place, flight_of, unbelievable
+from hardware_drivers.xplane_state import ASKED, Flight, Placed, check_place, flight_of
 
 THROTTLES = "sim/flightmodel/engine/ENGN_thro"  # of each engine, from the left, 0 to 1
 # A positive elevator lowers the nose and a positive rudder turns it left; stick and pedals do the opposite.
@@ -188,7 +189,7 @@ class XPlaneDriver(DeviceDriver):
                 self._feedback.refuse("X-Plane's time stands still")
             return
         before = None if last is None else (last[0].state, last[1])
-        reason = unbelievable(flight.state, steady_ns, before, self._robot.limits)
+        reason = unbelievable(flight.state, steady_ns, before, self._robot.limits, turns_freely=True)
         if reason:
             self._refuse(reason)
             return

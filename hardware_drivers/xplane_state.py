@@ -12,9 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fulmar_core.robot import Limits
 from fulmar_core.rotation import from_yaw, multiply, rotate, rotate_inverse
-from fulmar_core.safety.input_gate import JUMP_M, InputGate, Measurement
 from fulmar_core.sensors.air_data import AirData, AirDataSpec
 from fulmar_core.sensors.imu import ImuSample
 from fulmar_core.state import RigidBodyState
@@ -125,21 +123,3 @@ def shown_at(state: RigidBodyState, frame: LocalFrame, elevation: float) -> Posi
     east, north, up = (float(part) for part in state.position_in_world)
     roll, pitch, heading = (math.degrees(angle) for angle in sailed_angles(state.quat_xyzw))
     return Position(*frame.degrees(east, north), up + elevation, pitch, roll, heading)
-
-
-def unbelievable(
-    state: RigidBodyState, now_ns: int, last: tuple[RigidBodyState, int] | None, limits: Limits
-) -> str:
-    """Why no aircraft of these limits flies so; empty where one may.
-
-    Args:
-        state: What was received.
-        now_ns: When [ns].
-        last: What was believed before, and when [ns].
-        limits: Of the robot.
-    """
-    gate = InputGate(limits, frozen_after=0, jump_m=JUMP_M, turns_freely=True)
-    if last is not None:
-        gate.problem(Measurement(last[1], "odom", "base_link", last[0]))
-    reason = gate.problem(Measurement(now_ns, "odom", "base_link", state)) or ""
-    return reason.partition(": a new epoch")[0].replace("odom ", "its ")

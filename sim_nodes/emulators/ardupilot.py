@@ -28,15 +28,23 @@ class ArdupilotEmulator:
 
     Attributes:
         mute: Report nothing, as a boat whose radio is off.
+        denied: Numbers of commands that it refuses, and what it says then.
+        deaf: Take no override, as from a host whose system id is not that of SYSID_MYGCS.
+        mode: Of ArduPilot's boats; an operator may change it.
+        armed: Whether the propellers may turn; an operator may change it.
     """
 
-    def __init__(self, port: int) -> None:
-        """Switch it on; it speaks first, to a UDP port of this host."""
+    def __init__(self, port: int, key: bytes = b"") -> None:
+        """Switch it on; it speaks first, to a UDP port of this host, signed where it has a key."""
         self._link: Any = mavutil.mavlink_connection(
             f"udpout:127.0.0.1:{port}", source_system=1, source_component=1, robust_parsing=True
         )
         self.address = f"udpin:127.0.0.1:{port}"
-        self._armed, self._mode = False, MANUAL
+        if key:
+            self._link.setup_signing(key, sign_outgoing=True)
+        self.armed, self._mode = False, MANUAL
+        self.denied: dict[int, str] = {}
+        self.deaf = False
         self._shares = np.zeros(2)
         self._override_s = self._ground_s = self._beaten_s = -math.inf
         self._began_s: float | None = None
@@ -44,12 +52,21 @@ class ArdupilotEmulator:
         self._due_s: dict[int, float] = {}
         self.mute = False
 
+    @property
+    def mode(self) -> int:
+        """Number of the mode."""
+        return self._mode
+
+    @mode.setter
+    def mode(self, number: int) -> None:
+        self._mode, self._beaten_s = number, -math.inf  # a heartbeat says so at once
+
     def command(self, now_s: float) -> np.ndarray:
         """See `EmulatedDevice`."""
         while (message := self._link.recv_match(blocking=False)) is not None:
             self._take(message, now_s)
         fresh = now_s - self._override_s <= OVERRIDE_S and now_s - self._ground_s <= GROUND_S
-        return self._shares if fresh and self._armed and self._mode == MANUAL else np.zeros(2)
+        return self._shares if fresh and self.armed and self._mode == MANUAL else np.zeros(2)
 
     def report(self, sample: Sample, now_s: float) -> None:
         """See `EmulatedDevice`."""
@@ -58,9 +75,9 @@ class ArdupilotEmulator:
         if self.mute:
             return
         mav, mavlink = self._link.mav, mavutil.mavlink
-        if now_s - self._beaten_s >= HEARTBEAT_S:
+        if now_s - self._beaten_s >= self._period_s.get(mavlink.MAVLINK_MSG_ID_HEARTBEAT, HEARTBEAT_S):
             self._beaten_s = now_s
-            armed = mavlink.MAV_MODE_FLAG_SAFETY_ARMED if self._armed else 0
+            armed = mavlink.MAV_MODE_FLAG_SAFETY_ARMED if self.armed else 0
             mode = armed | mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
             mav.heartbeat_send(
                 mavlink.MAV_TYPE_SURFACE_BOAT, mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA, mode, self._mode, 4
@@ -84,6 +101,13 @@ class ArdupilotEmulator:
         if self._is_due(mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED, now_s):
             (x, y, z), (vx, vy, vz) = state.position_in_world.tolist(), state.velocity_in_world.tolist()
             mav.local_position_ned_send(boot_ms, y, x, -z, vy, vx, -vz)
+        if self._is_due(mavlink.MAVLINK_MSG_ID_RC_CHANNELS, now_s):
+            left, right = self._shares if now_s - self._override_s <= OVERRIDE_S else (0.0, 0.0)
+            steering, throttle = (
+                round(TRIM + SPAN * value) for value in (0.5 * (left - right), 0.5 * (left + right))
+            )
+            others = [0] * 13
+            mav.rc_channels_send(boot_ms, 16, steering, TRIM, throttle, TRIM, TRIM, *others, 255)
         if self._is_due(mavlink.MAVLINK_MSG_ID_RAW_IMU, now_s) and sample.imu is not None:
             force = np.round(1e3 / G * sample.imu.specific_force * (1.0, -1.0, -1.0)).astype(int).tolist()
             turn = np.round(1e3 * sample.imu.angular_velocity * (1.0, -1.0, -1.0)).astype(int).tolist()
@@ -100,7 +124,7 @@ class ArdupilotEmulator:
         kind = message.get_type()
         if kind == "HEARTBEAT":
             self._ground_s = now_s
-        elif kind == "RC_CHANNELS_OVERRIDE":
+        elif kind == "RC_CHANNELS_OVERRIDE" and not self.deaf:
             steering, throttle = ((getattr(message, name) - TRIM) / SPAN for name in (STEERING, THROTTLE))
             self._shares = np.clip((throttle + steering, throttle - steering), -1.0, 1.0)
             self._override_s = now_s
@@ -110,8 +134,13 @@ class ArdupilotEmulator:
     def _obey(self, message: Any, now_s: float) -> None:
         mavlink = mavutil.mavlink
         result = mavlink.MAV_RESULT_ACCEPTED
-        if message.command == mavlink.MAV_CMD_COMPONENT_ARM_DISARM:
-            self._armed = message.param1 == 1.0
+        if message.command in self.denied:
+            result = mavlink.MAV_RESULT_DENIED
+            self._link.mav.statustext_send(
+                mavlink.MAV_SEVERITY_CRITICAL, self.denied[message.command].encode()
+            )
+        elif message.command == mavlink.MAV_CMD_COMPONENT_ARM_DISARM:
+            self.armed = message.param1 == 1.0
         elif message.command == mavlink.MAV_CMD_DO_SET_MODE:
             self._mode = int(message.param2)
         elif message.command == mavlink.MAV_CMD_SET_MESSAGE_INTERVAL:

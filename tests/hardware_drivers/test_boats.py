@@ -21,6 +21,7 @@ from fulmar_core.planar import PlanarState
 from fulmar_core.robot import load_robot
 from hardware_drivers.driver_backend import backend_of
 from hardware_drivers.kingfisher_driver import KingfisherDriver
+from hardware_drivers.mavlink_autopilot import ARMED
 from hardware_drivers.mavlink_driver import NO_CHANGE, MavlinkDriver, override_of
 from hardware_drivers.mavlink_telemetry import state_of
 from hardware_drivers.ports import open_port
@@ -174,7 +175,7 @@ def cable(tmp_path) -> Iterator[Callable[[], None]]:
     over = threading.Event()
     mav = mavutil.mavlink.MAVLink(None, srcSystem=1, srcComponent=1)
     said = (
-        mav.heartbeat_encode(11, mavutil.mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA, 0, 0, 4),
+        mav.heartbeat_encode(11, mavutil.mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA, ARMED, 0, 4),
         mav.attitude_encode(1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
         mav.local_position_ned_encode(1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
     )
@@ -294,7 +295,7 @@ class Said:
 
 
 def test_north_east_down_becomes_east_north_up():
-    state = state_of(Said(), Said(), np.zeros(3))
+    state = state_of(Said(), Said())
     assert state.position_in_world.tolist() == [2.0, 1.0, -0.5]
     assert float(state.yaw) == pytest.approx(np.pi / 2)  # bow to the north
     assert state.angular_velocity_in_body[2] == pytest.approx(-0.1)
@@ -302,7 +303,7 @@ def test_north_east_down_becomes_east_north_up():
 
 @pytest.mark.parametrize("spoilt", [{"x": float("nan")}, {"vy": float("inf")}, {"time_boot_ms": 5000}])
 def test_an_estimate_that_is_not_finite_or_not_of_one_time_is_none(spoilt):
-    assert state_of(Said(**spoilt), Said(), np.zeros(3)) is None
+    assert state_of(Said(**spoilt), Said()) is None
 
 
 @pytest.mark.parametrize("kind", ["mavlink"], indirect=True)

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import os
-
-os.environ.setdefault("MAVLINK20", "1")
-
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from hardware_drivers.mavlink_telemetry import ARMED, Telemetry
+from hardware_drivers.mavlink_telemetry import UNKNOWN_MV, Telemetry
 
 MESSAGES = ("HEARTBEAT", "SYS_STATUS", "ATTITUDE", "RAW_IMU", "LOCAL_POSITION_NED")
 NOW_NS = 10**18
@@ -83,8 +79,15 @@ def test_spoilt_bytes_are_survived_and_the_next_message_is_found(chunks):
             if found.get_type() != "BAD_DATA":
                 check(telemetry, found)
     parser.parse_buffer(bytes(600))  # whatever was begun has its end
-    beat = sender.heartbeat_encode(11, mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA, ARMED, 0, 4)
-    for found in parser.parse_buffer(beat.pack(sender)) or []:
-        if found.get_type() == "HEARTBEAT":
+    status = sender.sys_status_encode(0, 0, 0, 100, 15800, -1, 80, 0, 0, 0, 0, 0, 0)
+    for found in parser.parse_buffer(status.pack(sender)) or []:
+        if found.get_type() == "SYS_STATUS":
             telemetry.take(found, NOW_NS)
-    assert telemetry.armed
+    assert telemetry.voltage == "15.8"
+
+
+def test_a_voltage_that_is_not_measured_is_not_known():
+    telemetry, sender = Telemetry(), decoder()
+    telemetry.take(sender.sys_status_encode(0, 0, 0, 100, 15800, -1, 80, 0, 0, 0, 0, 0, 0), NOW_NS)
+    telemetry.take(sender.sys_status_encode(0, 0, 0, 100, UNKNOWN_MV, -1, 80, 0, 0, 0, 0, 0, 0), NOW_NS)
+    assert telemetry.voltage == ""

@@ -13,10 +13,11 @@ from hypothesis import strategies as st
 from fulmar_core.robot import Limits
 from fulmar_core.rotation import rotate
 from fulmar_core.state import RigidBodyState
+from hardware_drivers.believable_motion import unbelievable
 from hardware_drivers.earth_frame import LocalFrame
 from hardware_drivers.xplane_messages import KEEP, Position, Values
 from hardware_drivers.xplane_protocol import MalformedError
-from hardware_drivers.xplane_state import ASKED, flight_of, shown_at, unbelievable
+from hardware_drivers.xplane_state import ASKED, flight_of, shown_at
 
 FRAME = LocalFrame(49.5, -3.0)
 LIMITS = Limits(geofence=1e4, speed=56.0, yaw_rate=8.0)
@@ -159,6 +160,7 @@ def test_jumps_and_motion_that_no_aircraft_has_are_not_believed(change, after_s,
         np.array([0.0, 0.0, 1.0]), np.array([0.0, 0.0, 0.0, 1.0]), np.array([28.0, 0.0, 0.0]), np.zeros(3)
     )
     now_ns = 10_000_000_000
-    found = unbelievable(replace(last, **change), now_ns + round(after_s * 1e9), (last, now_ns), LIMITS)
+    later_ns = now_ns + round(after_s * 1e9)
+    found = unbelievable(replace(last, **change), later_ns, (last, now_ns), LIMITS, turns_freely=True)
     assert found.startswith(says)
     assert bool(found) is bool(says)

@@ -260,6 +260,40 @@ class TestHand:
         assert guard.give_back(0)
 
 
+class TestRefusingDevice:
+    """A device that says that it does not do what it is commanded."""
+
+    def test_it_is_held_safe_also_after_it_obeys_again(self, guard):
+        guard.offer(NAMES, GOOD, 0)
+        guard.see_refusal("mode HOLD")
+        assert not guard.output(1 * MS).any()
+        guard.see_refusal("")
+        guard.offer(NAMES, GOOD, 10 * MS)
+        assert not guard.output(11 * MS).any()
+        assert guard.held == "mode HOLD"
+
+    def test_a_person_gives_control_back_once_it_obeys(self, guard):
+        guard.see_refusal("mode HOLD")
+        assert guard.give_back(0) == "refused: mode HOLD"
+        guard.see_refusal("")
+        assert guard.give_back(1) == ""
+        assert guard.offer(NAMES, GOOD, 2)
+        assert guard.output(3).tolist() == GOOD
+
+    def test_a_hand_does_not_move_it_either(self, guard):
+        guard.see_refusal("mode HOLD")
+        guard.offer_by_hand(NAMES, GOOD, 0)
+        assert not guard.output(1).any()
+
+    def test_its_wheels_slow_down_instead_of_locking(self, base):
+        for k in range(6):
+            base.offer(BASE.names, [0.45, 0.0], 100 * k * MS, stamp_ns=(100 + 100 * k) * MS)
+            base.output(100 * k * MS)
+        base.see_refusal("a wheel hangs in the air")
+        assert base.output(510 * MS)[0] == pytest.approx(0.45)
+        assert 0.0 < base.output(700 * MS)[0] < 0.4
+
+
 TWO = ["/floating_platform/controller", "/floating_platform/stranger"]
 
 

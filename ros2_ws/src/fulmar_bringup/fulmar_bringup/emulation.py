@@ -36,7 +36,11 @@ class Emulation:
 
 
 def check_emulated(driver: Driver) -> None:
-    """Raise ConfigError for a driver of the user's own, whose device has no emulator."""
+    """Raise ConfigError for a driver of the user's own, whose device has no emulator, and for a boat that signs."""
+    if isinstance(driver, MavlinkBoat) and driver.signing_key:
+        raise ConfigError(
+            "the emulated boat has no key: leave 'signing_key' out of the hardware file, or --emulate."
+        )
     if isinstance(driver, OwnDriver):
         raise ConfigError(
             f"no emulator exists for the device of your own driver '{driver.kind}'. Leave --emulate out, and let "

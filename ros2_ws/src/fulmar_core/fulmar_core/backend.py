@@ -28,6 +28,7 @@ class Sample:
     things: Poses = field(default_factory=dict)  # where the task's things are, each (3,)
     stamp_ns: int | None = None  # when it was captured; None: just now, by the clock of who asked [ns]
     applied: np.ndarray | None = None  # (n,) commands of the actuators; None: the very command
+    refusal: str = ""  # why a device does not carry out commands now; empty while it does
 
     @property
     def odometry(self) -> RigidBodyState | None:

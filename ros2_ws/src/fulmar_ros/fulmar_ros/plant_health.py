@@ -19,6 +19,7 @@ from fulmar_ros.plant_wires import PlantWires
 LOOK_S = 0.1  # between two looks for a change
 AT_LEAST_S = 1.0  # between two reports without a change
 NAMES_LOOKS = 10  # in which discovery reports the name of a node whose publisher is known
+GIVE_BACK_BY = "fulmar teleop ROBOT --give-back"  # ends what a device's refusal began
 SAFE_CONTROLLER = "safe controller"  # commands what cannot stop when its controller fails
 HANGS_S = 0.5  # a step that takes longer than this, and than ten ticks, will not come back
 
@@ -86,12 +87,17 @@ class PlantHealth:
         if changed == self._said and now - self._said_at < AT_LEAST_S:
             return
         self._said, self._said_at = changed, now
-        self._health.publish(level, message, self._values() | {WIRE_WARNINGS: unfit} | more)
+        held = self._held()
+        values = self._values() | {WIRE_WARNINGS: unfit} | more
+        self._health.publish(level, message, values, warnings=[held] if held else [])
 
     def _status(self) -> tuple[str, str, str]:
         """Level, message, and the part of the message whose change counts."""
         if self.mode == "fault":
             return "error", self.reason, "fault"
+        held = self._held()
+        if held:
+            return "error", f"{held}: {self._refuge()} until `{GIVE_BACK_BY}`", held
         contested = self._contested()
         if contested:
             self._unnamed_looks = self._unnamed_looks + 1 if UNNAMED in contested else 0
@@ -128,6 +134,12 @@ class PlantHealth:
         with self._wires.lock:
             contested = self._guard.publishers.reason(time.monotonic_ns())
         return "" if self._guard.person or self.mode == "finished" else contested
+
+    def _held(self) -> str:
+        """Why the device's refusal holds the robot; empty where none does, and after the end."""
+        with self._wires.lock:
+            held = self._guard.held
+        return held if self.mode == "running" else ""
 
     def _estop(self) -> tuple[str, str, str] | None:
         """Status while the e-stop holds: a warning before it was ever released, an error once it stops a run."""

@@ -14,7 +14,6 @@ from fulmar_core.flight.refuge import refuge_of
 from fulmar_core.process import PLANT_PRIORITY, take_priority
 from fulmar_core.robot import Robot
 from fulmar_core.safety.actuator_guard import ActuatorGuard
-from fulmar_core.state import RigidBodyState
 from fulmar_ros.deadline import Deadlines
 from fulmar_ros.plant_clock import SimulatedTime, WallTime
 from fulmar_ros.plant_wires import PlantWires
@@ -231,7 +230,7 @@ class RealtimeLoop:
         self._ticked_ns = time.monotonic_ns()
         self._wires.publish_sample(sample, self._clock.now_ns)
         while (ticks is None or self.ticks < ticks) and self.deadlines.wait(stop):
-            command, begun_ns = self._command(sample.odometry), self._clock.now_ns
+            command, begun_ns = self._command(sample), self._clock.now_ns
             sample = self._backend.step(command)
             applied = command if sample.applied is None else sample.applied
             self._wires.publish_applied(applied, begun_ns)
@@ -244,6 +243,7 @@ class RealtimeLoop:
         """Time since the last finished step, 0 before the first [s]; `now_ns` by the monotonic clock."""
         return 0.0 if self._ticked_ns is None else (now_ns - self._ticked_ns) / 1e9
 
-    def _command(self, measured: RigidBodyState | None) -> np.ndarray:
+    def _command(self, sample: Sample) -> np.ndarray:
         with self._wires.lock:
-            return self._guard.output(time.monotonic_ns(), measured, plant_ns=self._clock.steady_ns)
+            self._guard.see_refusal(sample.refusal)
+            return self._guard.output(time.monotonic_ns(), sample.odometry, plant_ns=self._clock.steady_ns)

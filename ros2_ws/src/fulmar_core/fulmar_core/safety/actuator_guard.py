@@ -35,6 +35,7 @@ class ActuatorGuard:
         publishers: Which nodes publish the controller's commands; of two none is obeyed.
         refuge: Safe controller.
         doing: What a safe controller that steers does now, in words; empty while it does not act.
+        held: Why a device that did not carry out commands is held safe; empty while it is not.
     """
 
     def __init__(
@@ -78,6 +79,7 @@ class ActuatorGuard:
         self._applied_last = self.command  # newest command that was; what comes under a stop is not
         self._safe_since_ns: int | None = None  # since when the safe controller has acted
         self.person = False
+        self.held = self._refusal = ""
         self._stamp_ns = 0
         self._stopped_ns: int | None = None
         self._taken_ns: int | None = None
@@ -149,6 +151,15 @@ class ActuatorGuard:
         self._take(values, now_ns, plant_ns, None)
         return True
 
+    def see_refusal(self, refusal: str) -> None:
+        """Take what a device says of the last command: why it did not carry it out, empty where it did.
+
+        One that refused is in other hands, or has a fault: it is held safe until a person gives control back, since a
+        robot must not start by itself when it obeys again.
+        """
+        self._refusal = refusal
+        self.held = refusal or self.held
+
     def give_back(self, now_ns: int) -> str:
         """Give the actuators back to the controller.
 
@@ -158,7 +169,9 @@ class ActuatorGuard:
         Returns:
             Why the person keeps them; empty if they are given back.
         """
-        if not self.person:
+        if self._refusal:
+            return f"refused: {self._refusal}"
+        if not self.person and not self.held:
             return "nobody has taken the actuators"
         if np.any(self.output(now_ns) != self._actuators.safe_command):
             return "refused: the last command by hand still moves the robot. Let go first."
@@ -227,9 +240,9 @@ class ActuatorGuard:
         return min((end for end in ends if end is not None), default=None)
 
     def _stopped(self, now_ns: int) -> int | None:
-        """Since when the e-stop, or a second publisher of commands, holds the robot; None if neither does."""
+        """Since when the e-stop, a second publisher or the device's refusal holds the robot; None if none does."""
         contested = not self.person and self.publishers.reason(now_ns)
-        if not self.estop.reason(now_ns) and not contested:
+        if not self.estop.reason(now_ns) and not contested and not self.held:
             self._stopped_ns = None
         elif self._stopped_ns is None:
             self._stopped_ns = now_ns
