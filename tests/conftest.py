@@ -16,6 +16,7 @@ import pytest
 
 from fulmar_bringup.domains import reserved_domains
 from fulmar_cli import main as command_line
+from fulmar_ros.middleware import LOOPBACK, PROFILES
 from tests.fulmar_cli.bag_commands import POLICY
 from tests.synthetic_run import CALM, Plan, write_run
 
@@ -111,6 +112,7 @@ def ros_domain(monkeypatch: pytest.MonkeyPatch) -> Iterator[RosDomain]:
     gc.collect()
     with reserved_domains(1) as (number,):
         own = {"ROS_DOMAIN_ID": str(number), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+        own |= dict.fromkeys(PROFILES, str(LOOPBACK))  # the middleware reads it once in a process
         for name, value in own.items():
             monkeypatch.setenv(name, value)
         yield RosDomain(number, {**os.environ, **own})

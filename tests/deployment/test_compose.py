@@ -130,12 +130,12 @@ def test_a_command_that_fulmar_does_not_know_is_rejected():
         parsed(["up", "mujoco_lqr", "--onyl", "plant"])
 
 
-def test_every_standing_service_speaks_udp_and_finds_containers_of_other_users(compose):
+def test_every_standing_service_speaks_udp_on_the_loopback_of_its_host_alone(compose):
     for name in STANDING:
         service = compose["services"][name]
         assert service["network_mode"] == "host"
         assert service["environment"]["FASTDDS_BUILTIN_TRANSPORTS"] == "UDPv4"
-        assert service["environment"]["ROS_AUTOMATIC_DISCOVERY_RANGE"] == "SUBNET"
+        assert service["environment"]["ROS_AUTOMATIC_DISCOVERY_RANGE"] == "LOCALHOST"
 
 
 def test_plant_and_controller_are_of_one_system_and_robot_with_an_e_stop(compose):

@@ -10,6 +10,8 @@ import zipfile
 
 import pytest
 
+from fulmar_ros.middleware import LOOPBACK, LOOPBACK_UDP, NETWORK
+
 SOURCES = "ros2_ws/src/"
 IN_SOURCES = ("core", "bags", "ros", "bringup", "evaluation", "benchmarks", "cli")
 # Folders of the repository, and where the wheel has what is in them.
@@ -50,7 +52,8 @@ def test_it_has_every_file_of_every_package_and_nothing_else(repository, content
         for source, target in PLACES.items()
         if path.startswith(source) and (repository / path).is_file()
     }
-    assert {"sim_nodes/sim_node.py", "fulmar_ros/fast_dds.xml", "fulmar_core/configs/policies.yaml"} <= wanted
+    named = {"sim_nodes/sim_node.py", "fulmar_core/configs/policies.yaml"}
+    assert named | {f"fulmar_ros/{profile.name}" for profile in (NETWORK, LOOPBACK, LOOPBACK_UDP)} <= wanted
     assert content == wanted
 
 

@@ -8,6 +8,7 @@ import json
 import os
 import resource
 import shutil
+import socket
 import subprocess
 import sys
 import tempfile
@@ -38,6 +39,7 @@ from fulmar_cli.diagnosis.network import (
     check_shared_memory,
     check_transports,
 )
+from fulmar_cli.diagnosis.sockets import Listener, check_sockets, listeners
 
 RANGE, STRANGER = (
     "ROS_AUTOMATIC_DISCOVERY_RANGE",
@@ -162,9 +164,37 @@ def test_shared_memory_of_several_users_or_in_a_container_is_advised_against(tmp
     os.chown(tmp_path / "fastrtps_0123456789abcdef", os.getuid() + 1, -1)
     assert f"users {os.getuid()}, {os.getuid() + 1} share" in check().found
     assert (check().level, check().fix.split()[1]) == ("advice", "FASTDDS_BUILTIN_TRANSPORTS=UDPv4")
-    assert check(FASTDDS_BUILTIN_TRANSPORTS="UDPv4").level == "advice"
-    everywhere = {"FASTDDS_BUILTIN_TRANSPORTS": "UDPv4", "ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}
-    assert check(**everywhere).level == "ok"
+    assert check(FASTDDS_BUILTIN_TRANSPORTS="UDPv4").level == "ok"
+
+
+def test_sockets_that_other_hosts_can_reach_are_found_with_their_process_and_the_cause():
+    here, everywhere = (
+        Listener("127.0.0.1", 7410, "python (process 1)"),
+        Listener("0.0.0.0", 7412, "talker (process 2)"),
+    )
+
+    def check(*found, **environment):
+        return check_sockets(environment, found=found)
+
+    assert check().level == check(here).level == "ok"
+    finding = check(here, everywhere)
+    assert finding.level == "advice"
+    assert "talker (process 2)" in finding.found
+    assert "0.0.0.0:7412" in finding.found
+    assert "python" not in finding.found
+    assert "range SUBNET" in check(everywhere, ROS_AUTOMATIC_DISCOVERY_RANGE="SUBNET").found
+    assert "static peers" in check(everywhere, ROS_STATIC_PEERS="10.0.0.2").found
+    own = check(everywhere, FASTRTPS_DEFAULT_PROFILES_FILE="/etc/mine.xml")
+    assert "/etc/mine.xml" in own.found
+    assert own.fix.startswith("unset FASTRTPS_DEFAULT_PROFILES_FILE")
+
+
+def test_an_open_socket_of_the_domain_is_seen_on_this_computer():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as port:
+        port.bind(("0.0.0.0", 7400 + 250 * 101 + 249))
+        (found,) = [one for one in listeners(101) if one.port == port.getsockname()[1]]
+    assert found.is_open
+    assert str(os.getpid()) in found.process
 
 
 def test_publishers_that_do_not_reach_a_running_robot_are_named(monkeypatch):

@@ -17,7 +17,6 @@ import rclpy
 from mcap.reader import make_reader
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
 from rosbags.highlevel import AnyReader
 from sensor_msgs.msg import JointState
 
@@ -33,8 +32,8 @@ from fulmar_core.robot import Robot, load_robot
 from fulmar_core.topics import COMMAND, ODOMETRY
 from fulmar_ros.convert import stamp_of
 from fulmar_ros.deadline import Deadlines
-from fulmar_ros.middleware import set_up_middleware
 from fulmar_ros.qos import publisher_qos
+from fulmar_ros.runtime import init_ros
 
 START_TIMEOUT_S = 60.0
 STOP_TIMEOUT_S = 20.0
@@ -190,9 +189,8 @@ class Traffic:
 @contextlib.contextmanager
 def traffic(plan: RunPlan) -> Iterator[Traffic]:
     """Traffic that has not begun, in the ROS domain of the environment; it ends with the context."""
-    set_up_middleware()
     context = rclpy.Context()
-    rclpy.init(args=[], context=context, signal_handler_options=SignalHandlerOptions.NO)
+    init_ros(context=context)
     node = rclpy.create_node("traffic", namespace=plan.namespace, context=context)
     made = Traffic(node, load_robot(plan.robot))
     try:

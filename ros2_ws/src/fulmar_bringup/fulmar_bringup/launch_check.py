@@ -7,11 +7,10 @@ import time
 from collections.abc import Iterable
 
 import rclpy
-from rclpy.signals import SignalHandlerOptions
 
 from fulmar_bringup.run_plan import NodeSpec
 from fulmar_ros.living_plant import PLANT, refuse_living_plant
-from fulmar_ros.middleware import set_up_middleware
+from fulmar_ros.runtime import init_ros
 
 
 def refuse_living_plants(specs: Iterable[NodeSpec]) -> None:
@@ -26,9 +25,8 @@ def refuse_living_plants(specs: Iterable[NodeSpec]) -> None:
     namespaces = [spec.namespace for spec in specs if spec.name == PLANT]
     if not namespaces or os.environ.get("ROS_SECURITY_ENABLE", "").lower() == "true":
         return
-    set_up_middleware()
     context = rclpy.Context()
-    rclpy.init(args=[], context=context, signal_handler_options=SignalHandlerOptions.NO)
+    init_ros(context=context)
     try:
         node = rclpy.create_node(f"launch_{os.getpid()}", context=context)
         since_s = time.monotonic()

@@ -2,28 +2,83 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-DISCOVERY_RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
+DISCOVERY_RANGE, STATIC_PEERS = "ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_STATIC_PEERS"
+OWN_HOST = "LOCALHOST"  # the range where the environment says nothing
 TRANSPORTS, UDP_ONLY = (
     "FASTDDS_BUILTIN_TRANSPORTS",
     "UDPv4",
 )  # between containers or users: without shared memory
 # Jazzy's name of the file, and that of later ones.
 PROFILES = ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE")
-# Announces nodes early, and resends lost messages early.
-OWN_PROFILES = Path(__file__).with_name("fast_dds.xml")
+# All announce nodes early, and resend lost messages early. The others listen on 127.0.0.1 alone.
+NETWORK = Path(__file__).with_name("fast_dds.xml")
+LOOPBACK = Path(__file__).with_name("fast_dds_loopback.xml")
+LOOPBACK_UDP = Path(__file__).with_name("fast_dds_loopback_udp.xml")
+OWN_PROFILES = {str(profile) for profile in (NETWORK, LOOPBACK, LOOPBACK_UDP)}
+PROFILE_DECIDES = "SYSTEM_DEFAULT"  # the range with which rmw leaves all to the profile
+_loaded: list[str] = []  # the profile of this process; Fast DDS reads it once
+
+
+def discovery_range(environment: Mapping[str, str]) -> str:
+    """How far the nodes of an environment are discovered: not on the network, unless it says so."""
+    return environment.get(DISCOVERY_RANGE) or OWN_HOST
+
+
+def static_peers(environment: Mapping[str, str]) -> list[str]:
+    """Other hosts, by name or address, that the nodes of an environment talk to."""
+    return [peer for peer in environment.get(STATIC_PEERS, "").split(";") if peer]
+
+
+def foreign_profile(environment: Mapping[str, str]) -> str:
+    """Path of a Fast DDS profile that is none of ours; empty if there is none."""
+    named = (environment[name] for name in PROFILES if name in environment)
+    return next((path for path in named if path not in OWN_PROFILES), "")
+
+
+def own_profile(environment: Mapping[str, str]) -> Path:
+    """The profile for the range, peers and transports of an environment."""
+    if discovery_range(environment) not in (OWN_HOST, "OFF") or static_peers(environment):
+        return NETWORK
+    return LOOPBACK_UDP if environment.get(TRANSPORTS) == UDP_ONLY else LOOPBACK
 
 
 def middleware_environment() -> dict[str, str]:
     """The variables that Fast DDS reads, as this process or a child of it should have them."""
-    own = {DISCOVERY_RANGE: os.environ.get(DISCOVERY_RANGE, "LOCALHOST")}  # not visible on the network
-    if not any(name in os.environ for name in PROFILES):
-        own |= dict.fromkeys(PROFILES, str(OWN_PROFILES))
+    own = {DISCOVERY_RANGE: discovery_range(os.environ)}
+    if not foreign_profile(os.environ):
+        own |= dict.fromkeys(PROFILES, str(own_profile(os.environ)))
     return own
 
 
 def set_up_middleware() -> None:
-    """Set them for this process; call before `rclpy.init`."""
+    """Set them for this process; call before `rclpy.init`, or rather use `runtime.init_ros`."""
     os.environ |= middleware_environment()
+
+
+@contextlib.contextmanager
+def range_for_rclpy() -> Iterator[None]:
+    """The discovery range that `rclpy.init` shall read.
+
+    With LOCALHOST rmw_fastrtps adds transports of its own to those of a profile, which send on every interface and
+    deliver through shared memory twice. A profile that is bound to loopback needs neither.
+    """
+    if not _loaded:
+        _loaded.append(os.environ.get(PROFILES[0], ""))
+    wanted = discovery_range(os.environ)
+    bound = _loaded[0] == os.environ.get(PROFILES[0]) and _loaded[0] in (str(LOOPBACK), str(LOOPBACK_UDP))
+    os.environ[DISCOVERY_RANGE] = PROFILE_DECIDES if bound and wanted == OWN_HOST else wanted
+    try:
+        yield
+    finally:
+        os.environ[DISCOVERY_RANGE] = wanted
+
+
+def strangers_can_send(environment: Mapping[str, str]) -> bool:
+    """Whether nodes that talk to static peers alone listen on every interface, so that packets must be filtered."""
+    ours = not foreign_profile(environment)
+    return ours and discovery_range(environment) == OWN_HOST and bool(static_peers(environment))

@@ -27,7 +27,8 @@ from rclpy.task import Future
 
 from fulmar_core.errors import BAD_USAGE, DONE, FAILED, FulmarError
 from fulmar_core.process import end_with
-from fulmar_ros.middleware import set_up_middleware
+from fulmar_ros.middleware import range_for_rclpy, set_up_middleware, static_peers, strangers_can_send
+from fulmar_ros.peer_filter import PeerFilter
 
 # A thread that waits for the interpreter gets it after this long; Python's own 5 ms is a lot of 20 ms.
 SWITCH_INTERVAL_S = 0.0005
@@ -69,9 +70,11 @@ def run_node(make_node: Callable[[RequestExit], Node], argv: Sequence[str] | Non
     end_with_parent()
     sys.setswitchinterval(SWITCH_INTERVAL_S)
 
-    set_up_middleware()
     try:
-        rclpy.init(args=None if argv is None else list(argv), signal_handler_options=SignalHandlerOptions.NO)
+        init_ros(argv)
+    except FulmarError as error:
+        sys.stderr.write(f"{error}\n")
+        return BAD_USAGE
     except RuntimeError as error:  # what rclpy raises for ROS arguments that it cannot read
         sys.stderr.write(f"the ROS arguments on the command line are wrong: {str(error).splitlines()[0]}\n")
         return BAD_USAGE
@@ -89,6 +92,26 @@ def _collect_refused_node() -> None:
     """Free a node whose constructor raised: nobody holds it, and it keeps its DDS participant alive; see `_destroy`."""
     gc.unfreeze()
     gc.collect()
+
+
+def init_ros(argv: Sequence[str] | None = (), *, context: rclpy.Context | None = None) -> None:
+    """Start rclpy with the middleware's settings of Fulmar; every process starts it here.
+
+    Args:
+        argv: Command line with the ROS arguments; None: that of the process.
+        context: By default the global one.
+
+    Raises:
+        ConfigError: ROS_STATIC_PEERS cannot be resolved, or packets of others cannot be kept out.
+        RuntimeError: The arguments cannot be read.
+    """
+    set_up_middleware()
+    with range_for_rclpy():
+        arguments = None if argv is None else list(argv)
+        rclpy.init(args=arguments, context=context, signal_handler_options=SignalHandlerOptions.NO)
+    if strangers_can_send(os.environ):
+        number = (context or rclpy.get_default_context()).get_domain_id()
+        PeerFilter(static_peers(os.environ), number)
 
 
 def end_with_parent() -> None:
@@ -185,8 +208,7 @@ def _spin_for_a_while(executor: Executor, over: Future) -> None:
 @contextlib.contextmanager
 def ros_node(name: str, on_error: Callable[[Exception], None], *, namespace: str = "") -> Iterator[Node]:
     """A node of a process that is no node itself: rclpy starts, the node spins, and both end with the context."""
-    set_up_middleware()
-    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+    init_ros()
     try:
         node = rclpy.create_node(name, namespace=namespace or None)
         with spinning(node, on_error):

@@ -32,6 +32,7 @@ from fulmar_cli.diagnosis.network import (
     check_shared_memory,
     check_transports,
 )
+from fulmar_cli.diagnosis.sockets import check_sockets
 
 PURPOSES = ("hardware", "sim")
 EXTRAS_OF_A_ROBOT = ("ros", "policy", "bags")
@@ -64,6 +65,7 @@ def diagnose(purpose: str | None = None, name: str | None = None) -> list[Findin
         partial(check_multicast, environment),
         check_shared_memory,
         partial(check_transports, environment),
+        partial(check_sockets, environment),
         check_round_trip,
         check_running_robots,
         partial(check_timing, hardware=hardware),

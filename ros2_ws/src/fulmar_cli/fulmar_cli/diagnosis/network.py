@@ -17,10 +17,10 @@ from fulmar_bringup.shared_memory_cleanup import (
     give_back_abandoned_memory,
 )
 from fulmar_cli.diagnosis.check_result import Finding
-from fulmar_ros.middleware import DISCOVERY_RANGE, PROFILES, TRANSPORTS, UDP_ONLY
+from fulmar_ros.middleware import DISCOVERY_RANGE, TRANSPORTS, UDP_ONLY, discovery_range, foreign_profile
+from fulmar_ros.middleware import OWN_HOST as OURS
 
 RANGES = ("SUBNET", "LOCALHOST", "OFF", "SYSTEM_DEFAULT")
-OURS = "LOCALHOST"  # what Fulmar sets where the environment says nothing
 GROUP = "239.255.0.1"  # of DDS discovery (OMG DDSI-RTPS 2.5, 9.6.2)
 LOOPBACK = "127.0.0.1"
 CONTAINER_MARKS = (Path("/.dockerenv"), Path("/run/.containerenv"))  # files of Docker and of Podman
@@ -37,7 +37,7 @@ def check_discovery(environment: Mapping[str, str], *, hardware: bool) -> Findin
         environment: Environment of the nodes.
         hardware: Whether a robot shall be seen from other computers.
     """
-    what, reach = "discovery", environment.get(DISCOVERY_RANGE) or OURS
+    what, reach = "discovery", discovery_range(environment)
     domain = environment.get("ROS_DOMAIN_ID") or "0"
     found = f"range {reach}, domain {domain}"
     if reach not in RANGES:
@@ -70,7 +70,7 @@ def check_multicast(
         address: Of the interface; by default that of the discovery range.
         timeout_s: Longest wait for the datagram [s].
     """
-    wide = (environment.get(DISCOVERY_RANGE) or OURS) not in ("LOCALHOST", "OFF")
+    wide = (discovery_range(environment)) not in ("LOCALHOST", "OFF")
     try:
         address = address or (_address_of_route() if wide else LOOPBACK)
         _send_and_receive(address, GROUP, timeout_s)
@@ -133,14 +133,15 @@ def check_transports(
         container_marks: Files that exist in a container alone.
     """
     what, chosen = "transports", environment.get(TRANSPORTS, "")
-    wide = environment.get(DISCOVERY_RANGE) == "SUBNET"  # measured: with LOCALHOST UDP alone does not help
-    if (chosen == UDP_ONLY and wide) or any(name in environment for name in PROFILES):
-        return Finding(what, "ok", f"{TRANSPORTS}={chosen}" if chosen else "a Fast DDS profile of your own")
+    if foreign_profile(environment):
+        return Finding(what, "ok", "a Fast DDS profile of your own decides")
+    if chosen == UDP_ONLY:
+        return Finding(what, "ok", f"{TRANSPORTS}={chosen}")
     owners = set()
     for file in folder.glob("fastrtps_*"):
         with contextlib.suppress(OSError):  # its process has just ended
             owners.add(file.stat().st_uid)
-    fix = f"export {TRANSPORTS}={UDP_ONLY} {DISCOVERY_RANGE}=SUBNET   # for every node of the robot"
+    fix = f"export {TRANSPORTS}={UDP_ONLY}   # for every node of the robot"
     if len(owners | {os.getuid()}) > 1:
         users = ", ".join(map(str, sorted(owners | {os.getuid()})))
         found = f"users {users} share {folder}: messages between them are lost in it"

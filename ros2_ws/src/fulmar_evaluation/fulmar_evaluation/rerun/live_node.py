@@ -15,7 +15,6 @@ from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped, TwistStamped
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, String
 from visualization_msgs.msg import MarkerArray
@@ -47,9 +46,8 @@ from fulmar_core.topics import (
 from fulmar_evaluation.rerun.rerun import Answers
 from fulmar_ros.convert import VectorWriter
 from fulmar_ros.goal_messages import TYPES
-from fulmar_ros.middleware import set_up_middleware
 from fulmar_ros.qos import FLUSH_S, flush, publisher_qos, subscriber_qos
-from fulmar_ros.runtime import spinning
+from fulmar_ros.runtime import init_ros, spinning
 
 START_TIMEOUT_S, ANSWER_TIMEOUT_S = 30.0, 10.0
 RESEND_S = 0.5
@@ -159,8 +157,7 @@ class _Received:
 def _exchange(
     raw: dict[str, list[bytes]], course: ControlSteps, namespace: str, group: ProcessGroup
 ) -> tuple[Answers, str | None]:
-    set_up_middleware()
-    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+    init_ros()
     try:
         node = rclpy.create_node("plant", namespace=namespace)
         received = _Received()

@@ -1,0 +1,96 @@
+"""Which Fast DDS profile a process gets, and what the profiles have in common."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ElementTree
+
+import pytest
+
+from fulmar_ros import middleware
+from fulmar_ros.middleware import (
+    DISCOVERY_RANGE,
+    LOOPBACK,
+    LOOPBACK_UDP,
+    NETWORK,
+    PROFILES,
+    STATIC_PEERS,
+    TRANSPORTS,
+    middleware_environment,
+    own_profile,
+    range_for_rclpy,
+    strangers_can_send,
+)
+
+SUBNET, PEERS, UDP = {DISCOVERY_RANGE: "SUBNET"}, {STATIC_PEERS: "10.0.0.2"}, {TRANSPORTS: "UDPv4"}
+
+
+@pytest.fixture
+def environment(monkeypatch):
+    for name in (DISCOVERY_RANGE, STATIC_PEERS, TRANSPORTS, *PROFILES):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(middleware, "_loaded", [])
+    return monkeypatch
+
+
+@pytest.mark.parametrize(
+    ("variables", "profile", "filtered"),
+    [
+        ({}, LOOPBACK, False),
+        ({DISCOVERY_RANGE: "LOCALHOST"}, LOOPBACK, False),
+        ({DISCOVERY_RANGE: "OFF"}, LOOPBACK, False),
+        (UDP, LOOPBACK_UDP, False),
+        (SUBNET, NETWORK, False),
+        (SUBNET | UDP | PEERS, NETWORK, False),
+        (PEERS, NETWORK, True),
+        (PEERS | UDP, NETWORK, True),
+    ],
+)
+def test_nodes_listen_on_the_network_only_where_range_or_peers_ask_for_it(variables, profile, filtered):
+    assert own_profile(variables) == profile
+    assert strangers_can_send(variables) is filtered
+
+
+def test_the_profile_follows_a_range_that_changed_since_a_parent_chose_it(environment):
+    for name, value in middleware_environment().items():
+        environment.setenv(name, value)
+    environment.setenv(DISCOVERY_RANGE, "SUBNET")
+    assert {middleware_environment()[name] for name in PROFILES} == {str(NETWORK)}
+
+
+@pytest.mark.parametrize("name", PROFILES)
+def test_a_profile_of_the_user_is_left_alone(environment, name):
+    environment.setenv(name, "/etc/mine.xml")
+    assert middleware_environment() == {DISCOVERY_RANGE: "LOCALHOST"}
+    environment.setenv(STATIC_PEERS, "10.0.0.2")
+    assert not strangers_can_send({name: "/etc/mine.xml", STATIC_PEERS: "10.0.0.2"})
+
+
+def test_rclpy_leaves_the_transports_to_a_profile_that_is_bound_to_loopback_alone(environment):
+    def seen() -> str:
+        for name, value in middleware_environment().items():
+            environment.setenv(name, value)
+        with range_for_rclpy():
+            inside = middleware.os.environ[DISCOVERY_RANGE]
+        return f"{inside} {middleware.os.environ[DISCOVERY_RANGE]}"
+
+    assert seen() == "SYSTEM_DEFAULT LOCALHOST"
+    environment.setenv(STATIC_PEERS, "10.0.0.2")
+    assert seen() == "LOCALHOST LOCALHOST"
+    environment.delenv(STATIC_PEERS)
+    environment.setattr(middleware, "_loaded", [str(NETWORK)])  # of this process, and read but once
+    assert seen() == "LOCALHOST LOCALHOST"
+
+
+def test_the_profiles_differ_in_their_transports_only():
+    def rest(path):
+        root = ElementTree.parse(path).getroot()
+        for parent in list(root.iter()):
+            for child in list(parent):
+                if child.tag.rpartition("}")[2] in (
+                    "transport_descriptors", "useBuiltinTransports", "userTransports", "metatrafficUnicastLocatorList",
+                    "initialPeersList",
+                ):  # fmt: skip
+                    parent.remove(child)
+        return [(element.tag, element.attrib, (element.text or "").strip()) for element in root.iter()]
+
+    assert rest(NETWORK) == rest(LOOPBACK) == rest(LOOPBACK_UDP)
