@@ -8,6 +8,7 @@ import pytest
 from fulmar_core.controller_settings import ControllerSettings
 from fulmar_core.goal import goal_at
 from fulmar_core.guarded_loop import ENDED, GuardedLoop
+from fulmar_core.health.applied import AppliedHistory
 from fulmar_core.robot import load_robot
 from fulmar_core.safety.arbiter import BEARING_OFF, Mode
 from fulmar_core.safety.fallback import ControllerSwitch, Standby
@@ -51,13 +52,18 @@ class Estop:
 class Bench:
     """One guarded loop with a steady clock, and odometry in its rhythm."""
 
-    def __init__(self, *, fallback=None, task="go_to_position", armed=True, **settings):
+    def __init__(self, *, fallback=None, task="go_to_position", armed=True, applied=None, **settings):
         self.controller, self.estop = Scripted("first"), Estop()
         self.switch = ControllerSwitch(
             Standby(self.controller, "{}", ""), Standby(fallback, "{}", "") if fallback else None
         )
         self.guard = GuardedLoop(
-            ROBOT, load_task(task), ControllerSettings(**settings), self.switch, self.estop
+            ROBOT,
+            load_task(task),
+            ControllerSettings(**settings),
+            self.switch,
+            self.estop,
+            applied=applied,
         )
         self.now_ns = S
         if armed:
@@ -360,3 +366,67 @@ def test_a_step_without_odometry_is_answered_by_the_safe_command():
     assert not decision.may_act
     assert inputs is None
     assert bench.guard.loop.answered_ns == 0
+
+
+FAST = (0.4, 0.0)  # a command with authority
+
+
+def stand(bench, *, seconds=60.0):
+    """Let a robot be commanded that does not move; the last decision."""
+    for _ in range(round(seconds / 0.1)):
+        decision, _ = bench.step()
+        if not decision.may_act:
+            break
+    return decision
+
+
+def test_a_robot_that_does_not_converge_stops_in_words_until_it_has_a_new_goal():
+    bench = Bench()
+    bench.controller.answer = FAST
+    bench.give()
+    decision = stand(bench)
+    assert decision.mode is Mode.ARMED
+    assert decision.reason.startswith("does not converge")
+    assert bench.step()[0].reason == decision.reason
+    assert not bench.guard.loop.previous.any()
+    bench.give(OTHER, stamp_ns=bench.now_ns)
+    assert bench.step()[0].mode is Mode.ACTIVE
+
+
+def test_a_goal_that_is_repeated_moves_no_robot_that_does_not_converge():
+    bench = Bench()
+    bench.controller.answer = FAST
+    bench.give(stamp_ns=7)
+    stand(bench)
+    bench.give(stamp_ns=7)
+    assert not bench.step()[0].may_act
+
+
+def test_the_fallback_has_its_turn_before_a_robot_that_does_not_converge_stops():
+    fallback = Scripted("fallback", FAST)
+    bench = Bench(fallback=fallback)
+    bench.controller.answer = FAST
+    bench.give()
+    for _ in range(600):
+        bench.step()
+        if bench.guard.switch.fell_back:
+            break
+    assert bench.guard.switch.fell_back.startswith("does not converge")
+    assert bench.guard.loop.controller is fallback
+    assert not stand(bench).may_act
+
+
+def test_a_robot_that_another_one_drives_is_not_said_not_to_converge():
+    history = AppliedHistory(S)
+    bench = Bench(applied=history)
+    bench.controller.answer = FAST
+    bench.give()
+    for _ in range(600):
+        history.add(bench.now_ns, np.array([0.0, 0.9]))  # a person turns it
+        assert bench.step()[0].may_act
+
+
+def test_a_gentle_controller_is_not_said_not_to_converge():
+    bench = Bench()
+    bench.give()
+    assert stand(bench).may_act

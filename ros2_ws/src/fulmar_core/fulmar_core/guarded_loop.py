@@ -10,12 +10,15 @@ import numpy as np
 
 from fulmar_core.control_loop import ControlLoop, Step
 from fulmar_core.controller_settings import ControllerSettings
-from fulmar_core.controllers.controller import Inputs
+from fulmar_core.controllers.controller import Controller, Inputs
+from fulmar_core.controllers.excite import Excite
+from fulmar_core.controllers.excite_wheels import ExciteWheels
 from fulmar_core.goal import Goal
 from fulmar_core.health.applied import AppliedHistory
-from fulmar_core.mission import Mission
+from fulmar_core.mission import STREAM_NS, Mission
 from fulmar_core.robot import Robot
 from fulmar_core.safety.arbiter import Decision, Flags, arbitrate
+from fulmar_core.safety.convergence import ConvergenceWatch
 from fulmar_core.safety.fallback import ControllerSwitch, Standby
 from fulmar_core.safety.geofence import OUT_OF_BOUNDS, check_area_of, farthest_goal, outside, unreachable
 from fulmar_core.safety.input_gate import InputGate, Measurement
@@ -104,6 +107,7 @@ class GuardedLoop:
         self._flags = replace(settings.flags(robot), configured=True)
         self._bearing: bool | None = None if settings.has_bearing(robot) else True  # None: not received yet
         self._gate = gate or settings.input_gate(robot)
+        self._convergence = ConvergenceWatch(robot, self.loop.task, self.loop.dt, applied)
         self._newest_epoch = self._acted_epoch = 0  # of the newest measurement, and of the last control step
         # Another goal came; the controller, which may be acting now, forgets at the next step.
         self._anew = False
@@ -138,7 +142,8 @@ class GuardedLoop:
         with self._lock:
             self.newest, self.acted = None, 0
             self._gate.forget()
-            self._change(activated=True, last_input_ns=None, input_problem="", outside="")
+            self._convergence.reset()
+            self._change(activated=True, last_input_ns=None, input_problem="", outside="", unconverged="")
 
     def decide(self, now_ns: int) -> Decision:
         """Whether the controller may act now."""
@@ -171,11 +176,14 @@ class GuardedLoop:
                     self.refusal = Refusal(stamp_ns, ENDED)
                 return f"{ENDED}. Publish it with a new stamp."
             self.refusal = Refusal()
+            since_ns = stamp_ns - self.mission.goal_stamp_ns
             if self.mission.give(goal, stamp_ns):
                 self._anew = self._anew or not self.mission.moved
                 if not (self._settings.goals_streamed or self.mission.moved):
                     # A new goal after a look at the robot: one that was outside its area may go on, if it is back.
-                    self._change(outside=self._outside())
+                    self._change(outside=self._outside(), unconverged="")
+            elif self.loop.task.goal_topic == "goal_velocity" and not 0 <= since_ns <= STREAM_NS:
+                self._change(unconverged="")
             self._follow_mission()
             if self._settings.lockstep:
                 self._gate.forget()
@@ -218,6 +226,7 @@ class GuardedLoop:
         if not self.switch.apply():
             return False
         self.loop.use(self.switch.current.controller)
+        self._convergence.reset()
         return True
 
     def begin_step(self, measurement: Measurement | None, now_ns: int) -> tuple[Decision, Inputs | None]:
@@ -231,6 +240,7 @@ class GuardedLoop:
             self._begin_anew()
             if decision.may_act and measurement is not None:
                 return decision, self._inputs(measurement)
+        self._convergence.reset()
         self.loop.rest(measurement.stamp_ns if measurement is not None else 0)
         return decision, None
 
@@ -244,10 +254,15 @@ class GuardedLoop:
         """Let the controller act; see `ControlLoop.act`."""
         step = self.loop.act(inputs)
         self.acted += 1
+        if _strives(self.loop.controller):
+            self._convergence.see(inputs, step.command)
         return step
 
     def note(self, refusal: str) -> bool:
         """Count refused actions (empty: not refused): several in a row switch to the fallback, or latch a fault.
+
+        A controller whose robot does not converge gives way to the fallback, too; without one the robot stops until it
+        is given a new goal.
 
         Returns:
             Whether the fallback acts from now on.
@@ -256,6 +271,11 @@ class GuardedLoop:
         fault = self.switch.note(refusal or None)
         if fault:
             self.set(latched_fault=fault)
+        stuck = self._convergence.problem
+        if stuck:
+            self._convergence.reset()
+            if not self.switch.fall_back(stuck):
+                self.set(unconverged=stuck)
         return self._follow_switch(before)
 
     def fall_back(self, reason: str) -> bool:
@@ -268,6 +288,7 @@ class GuardedLoop:
         """Let the controller forget what was before a new goal or a jump."""
         if self._newest_epoch != self._acted_epoch or self._anew:
             self._acted_epoch, self._anew = self._newest_epoch, False
+            self._convergence.reset()
             self.loop.reset()
 
     def _inputs(self, measurement: Measurement) -> Inputs:
@@ -282,6 +303,7 @@ class GuardedLoop:
         changed = self.switch.current is not before
         if changed:
             self.loop.use(self.switch.current.controller)
+            self._convergence.reset()
         return changed
 
     def _arbitrate(self, now_ns: int) -> Decision:
@@ -292,7 +314,7 @@ class GuardedLoop:
                 self.refusal = Refusal(self.mission.goal_stamp_ns, stopped)
             self.mission.drop()
             self._follow_mission()
-            self._change(outside=self._outside())
+            self._change(outside=self._outside(), unconverged="")
         self._change(estop=stopped, active_s=self.acted * self._control_ns / 1e9)
         return arbitrate(self._flags, now_ns)
 
@@ -322,3 +344,8 @@ class GuardedLoop:
     def _change(self, **changes: object) -> None:
         for name, value in changes.items():
             setattr(self._flags, name, value)
+
+
+def _strives(controller: Controller) -> bool:
+    """Whether a controller means to meet the goal; those that excite a robot do not."""
+    return not isinstance(controller, Excite | ExciteWheels)

@@ -66,13 +66,16 @@ class ControllerStatus:
             *self.wire_problems,
             beliefs.dead,
             len(beliefs.words),
+            guard.flags.unconverged,
             self._swap.requests,
         )
         now = time.monotonic()
         if changed == self._said and now - self._said_at < PERIOD_S:
             return
         self._said, self._said_at = changed, now
+        unconverged = guard.flags.unconverged
         level = {Mode.ACTIVE: "ok", Mode.FAULT: "error"}.get(decision.mode, "warn")
+        level = "error" if unconverged else level
         doubtful = switch.fell_back or self.wire_problems or beliefs.words
         level = "warn" if level == "ok" and doubtful else level
         age_ms = (time.monotonic_ns() - last_input_ns) / 1e6 if last_input_ns else 0.0
@@ -86,6 +89,7 @@ class ControllerStatus:
             "swap": self._swap.said,
             "believed_dead": ", ".join(beliefs.dead),
             "beliefs": "; ".join(beliefs.words),
+            "unconverged": unconverged,
             "swap_requests": str(self._swap.requests),
             "epoch": str(guard.epoch),
             "goal_stamp_ns": str(mission.goal_stamp_ns),
@@ -106,4 +110,5 @@ class ControllerStatus:
             **deadlines.period_error_ms.percentiles("period_error_ms"),
         }
         warnings = BETWEEN.join([*self.wire_problems, *beliefs.words])
-        health.publish(level, decision.reason or warnings or decision.mode.value, values)
+        message = decision.reason or warnings or decision.mode.value
+        health.publish(level, message, values, warnings=[unconverged] if unconverged else [])

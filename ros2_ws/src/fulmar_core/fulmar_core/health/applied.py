@@ -50,6 +50,12 @@ class AppliedHistory:
         with self._lock:
             return self._stamps[-1] if self._stamps else -1
 
+    @property
+    def newest(self) -> np.ndarray | None:
+        """The newest state, shape (n,); None without any."""
+        with self._lock:
+            return self._commands[-1] if self._commands else None
+
     def add(self, stamp_ns: int, command: np.ndarray) -> None:
         """Take a state that holds from its stamp on; one that is older than the newest begins anew.
 

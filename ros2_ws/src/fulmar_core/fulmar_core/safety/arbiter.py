@@ -34,6 +34,7 @@ class Flags:
     lacking: str = "goal"  # what there is none of yet, where `has_goal` is false
     estop: str = ""  # why the emergency stop holds, empty if it does not
     outside: str = ""  # how the robot left the area that it may be in, empty if it did not
+    unconverged: str = ""  # why the robot came no nearer to its goal, empty if it does
     bearing_off: bool = False  # the robot has an air bearing that is not known to be on
     active_s: float = 0.0  # how long it has been acting [s]
     max_run_time_s: float = 0.0  # and how long it may; 0: for ever [s]
@@ -75,6 +76,8 @@ def arbitrate(flags: Flags, now_ns: int) -> Decision:
         return Decision(Mode.ARMED, False, flags.outside)
     if flags.bearing_off:
         return Decision(Mode.ARMED, False, BEARING_OFF)
+    if flags.unconverged:
+        return Decision(Mode.ARMED, False, flags.unconverged)
     if not flags.has_goal:
         return Decision(Mode.ARMED, False, f"no {flags.lacking} yet")
     if not flags.goal_distance <= flags.geofence:  # so that a distance that is not a number is beyond it too
