@@ -18,8 +18,9 @@ from fulmar_core.tasks import Task
 from fulmar_core.tasks.terms import Errors
 
 SLACK = 2.0  # errors up to so many tolerances are no reason to stop: noise and steady pushes hold robots there [-]
+SLACK_IN_FLIGHT = 20.0  # the same for an aircraft, which gusts move all the time [-]
 AUTHORITY = 0.2  # share of full command from which a robot counts as trying [-]
-SATURATED = 0.95  # the same for an aircraft, which gusts move all the time [-]
+SATURATED = 0.95  # the same for a surface of an aircraft [-]
 LEAST_S = 6.0  # without progress, however near the goal [s]
 LEAST_PERIODS = 20  # same, in control periods
 PATIENCE = 3.0  # least times to the goal that are given [-]
@@ -42,6 +43,7 @@ class TimeToGoal:
         self._thrust = best.force / robot.body.mass
         self._speed = STEEPEST * best.speed if robot.flies else best.speed
         self._turn, self._yaw_rate = best.torque / inertia, best.yaw_rate
+        self._slack = SLACK_IN_FLIGHT if robot.flies else SLACK
         limits = task.tolerance
         self._limits = Errors(
             limits.position,
@@ -67,15 +69,17 @@ class TimeToGoal:
 
     @property
     def at_tolerance(self) -> float:
-        """Of errors of `SLACK` tolerances [s]."""
+        """Of errors of so many tolerances that they are no reason to stop [s]."""
         names = Errors.__slots__
-        return float(self.of(Errors(*(np.asarray(SLACK * getattr(self._limits, name)) for name in names))))
+        return float(
+            self.of(Errors(*(np.asarray(self._slack * getattr(self._limits, name)) for name in names)))
+        )
 
     @staticmethod
     def _way(way: Array, speed: float, acceleration: float) -> np.ndarray:
         """Time for a distance or an angle from rest to rest."""
         size = np.abs(np.asarray(way, dtype=float))
-        return np.maximum(size / speed, 2.0 * np.sqrt(size / acceleration))
+        return np.asarray(np.maximum(size / speed, 2.0 * np.sqrt(size / acceleration)))
 
 
 class ConvergenceMonitor:
@@ -105,6 +109,7 @@ class ConvergenceMonitor:
     def reset(self) -> None:
         """Begin anew: another goal, another controller, or time has passed without it."""
         self._goal: Goal | None = None
+        self._before = np.zeros(1)
         self.late_s = self.patience_s = np.zeros(1)
 
     def see(self, state: State, goal: Goal, command: np.ndarray) -> np.ndarray:
@@ -146,7 +151,7 @@ class ConvergenceMonitor:
         if np.array_equal(self._goal.current, goal.current):
             return 0.0
         stood = replace(self._goal, things=goal.things)
-        return now - self._time.of(self._task.errors(state, stood))
+        return np.asarray(now - self._time.of(self._task.errors(state, stood)))
 
 
 class ConvergenceWatch:
