@@ -13,7 +13,7 @@ from fulmar_evaluation.faults import command_faults
 from fulmar_evaluation.faults.fault import Fault, Outcome, stopped
 from fulmar_evaluation.faults.fault_environment import request_of
 from fulmar_evaluation.faults.live_system import LiveSystem, NothingShown, live_system
-from fulmar_evaluation.faults.suite import EVERY, faults_of, run_faults
+from fulmar_evaluation.faults.suite import EVERY, faults_of, run_faults, times_of
 from tests.conftest import RosDomain
 from tests.ros.cli import fulmar, json_of
 
@@ -70,17 +70,19 @@ KEYS = [
     "data_lost",
     "bag_intact",
     "passed",
+    "launcher",
+    "launcher_ended",
 ]
 
 
 def others() -> list:
     """Every fault that applies to a robot, but that of the quick test."""
-    cases = [
-        pytest.param(robot, fault, id=f"{robot}-{fault.name}")
+    return [
+        pytest.param(robot, fault, launcher, id=f"{robot}-{fault.name}-{launcher}")
         for robot in ROBOTS
-        for fault in faults_of(robot)[0]
+        for fault, launcher in times_of(faults_of(robot)[0])
+        if (robot, fault.name) != THROUGH_THE_COMMAND
     ]
-    return [case for case in cases if tuple(case.id.split("-")) != THROUGH_THE_COMMAND]
 
 
 def test_a_robot_has_the_faults_that_mean_something_to_it():
@@ -153,17 +155,21 @@ def test_a_fault_is_survived_and_the_command_reports_all_of_it_in_json(
     report = json_of(done.stdout)
     assert list(report) == ["robot", "faults", "skipped"]
     assert report["robot"] == robot
-    (found,) = report["faults"]
-    assert list(found) == KEYS
-    assert found["passed"], found
+    assert [found["launcher"] for found in report["faults"]] == ["run", "up"]
+    for found in report["faults"]:
+        assert list(found) == KEYS
+        assert found["passed"], found
+        assert "controller was killed by SIGKILL" in found["launcher_ended"]
     assert done.returncode == 0
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(240)
-@pytest.mark.parametrize(("robot", "fault"), others())
-def test_every_other_fault_is_survived(robot: str, fault: Fault, ros_domain: RosDomain) -> None:
-    (found,) = run_faults(robot, [fault], lambda _done: None)
+@pytest.mark.parametrize(("robot", "fault", "launcher"), others())
+def test_every_other_fault_is_survived(
+    robot: str, fault: Fault, launcher: str, ros_domain: RosDomain
+) -> None:
+    (found,) = run_faults(robot, [fault], lambda _done: None, launcher)
     assert found.passed, found
     assert found.bag_intact
     if fault.name == "cable_cut" and robot == "floating_platform":
@@ -171,28 +177,29 @@ def test_every_other_fault_is_survived(robot: str, fault: Fault, ros_domain: Ros
         assert found.detected_by == "plant"
 
 
+def check_all(robot: str, fault: str) -> None:
+    """A fault is survived under every launcher under which it is done."""
+    for found in run_faults(robot, faults_of(robot, [fault])[0], lambda _done: None):
+        assert found.passed, found
+        assert found.bag_intact
+
+
 @pytest.mark.slow
 @pytest.mark.timeout(240)
 @pytest.mark.parametrize("fault", IN_SPACE)
 def test_a_spacecraft_survives_what_differs_in_space(fault: str, ros_domain: RosDomain) -> None:
-    (found,) = run_faults(SPACECRAFT, faults_of(SPACECRAFT, [fault])[0], lambda _done: None)
-    assert found.passed, found
-    assert found.bag_intact
+    check_all(SPACECRAFT, fault)
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(240)
 @pytest.mark.parametrize("fault", ON_A_SATELLITE)
 def test_a_satellite_survives_what_differs_there(fault: str, ros_domain: RosDomain) -> None:
-    (found,) = run_faults(SATELLITE, faults_of(SATELLITE, [fault])[0], lambda _done: None)
-    assert found.passed, found
-    assert found.bag_intact
+    check_all(SATELLITE, fault)
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(240)
 @pytest.mark.parametrize("fault", ON_AN_AIRCRAFT)
 def test_an_aircraft_flies_on_level_through_what_differs_there(fault: str, ros_domain: RosDomain) -> None:
-    (found,) = run_faults(AIRCRAFT, faults_of(AIRCRAFT, [fault])[0], lambda _done: None)
-    assert found.passed, found
-    assert found.bag_intact
+    check_all(AIRCRAFT, fault)

@@ -32,7 +32,8 @@ def run_info(plan: RunPlan, more: Mapping[str, Any] | None = None) -> str:
     """The plan, and more entries by name, as the JSON object that the recorder is given."""
     made_by = {"fulmar_version": fulmar_version(), "git_revision": git_revision()}
     own = {"name": plan.robot_name, **(more or {}), "calibration": str(calibration_path() or "")}
-    return json.dumps({k: v for k, v in asdict(plan).items() if k != "supervised"} | own | made_by)
+    plans = {k: v for k, v in asdict(plan).items() if k not in ("supervised", "intercepted")}
+    return json.dumps(plans | own | made_by)
 
 
 def attachments(plan: RunPlan) -> str:

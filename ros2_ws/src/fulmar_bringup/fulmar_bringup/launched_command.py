@@ -30,20 +30,28 @@ class LaunchedCommand:
         log: Lines of standard error so far, those of the nodes among them.
     """
 
-    def __init__(self, words: Sequence[str], *, environment: Mapping[str, str], folder: Path) -> None:
+    def __init__(
+        self,
+        words: Sequence[str],
+        *,
+        environment: Mapping[str, str],
+        folder: Path,
+        command: Sequence[str] = COMMAND,
+    ) -> None:
         """Start a command.
 
         Args:
             words: Such as `("up", "mujoco_lqr", "--json")`.
             environment: Of the command, with its ROS domain.
             folder: Where it runs.
+            command: What the words follow.
         """
         self.events: list[dict[str, Any]] = []
         self.log: list[str] = []
         self._output: list[str] = []
         self._seen: dict[int, psutil.Process] = {}
         self.process = psutil.Popen(
-            [*COMMAND, *words],
+            [*command, *words],
             env=dict(environment),
             cwd=folder,
             stdin=subprocess.DEVNULL,

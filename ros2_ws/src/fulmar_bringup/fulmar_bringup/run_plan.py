@@ -76,6 +76,8 @@ class RunPlan:
     controller_network: str = ""  # namespace of Linux, as another computer; empty: ours
     mocap_hz: float = 0.0  # simulated motion capture beside the odometry; 0: only for an estimator [Hz]
     remappings: tuple[tuple[str, str], ...] = ()  # topics and their other names, for every node
+    # Outputs of a node that another process takes and passes on: node, topic, and what it is called instead.
+    intercepted: tuple[tuple[str, str, str], ...] = ()
     adapter: str = (
         ""  # hardware file of an adapter, whose commands an external controller speaks; empty: none
     )

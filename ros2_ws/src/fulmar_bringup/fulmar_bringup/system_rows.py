@@ -72,10 +72,19 @@ def system_rows(
     check_rows(rows, outside=_from_outside(plan))
     there = {row.name for row in commander_specs(plan)} if plan.only else set()
     return {
-        row.name: row
+        row.name: _passed_on(row, plan)
         for row in _with_listeners(rows, plan)
         if not plan.only or (row.name in there) == (plan.only == CONTROLLER)
     }
+
+
+def _passed_on(row: NodeSpec, plan: RunPlan) -> NodeSpec:
+    """The row with its intercepted outputs under their other names, of which one process is the only subscriber."""
+    names = {topic: other for node, topic, other in plan.intercepted if node == row.name}
+    if not names:
+        return row
+    waits = {"wait_for_subscribers": 1} if "wait_for_subscribers" in row.parameters else {}
+    return replace(row, remappings={**row.remappings, **names}, parameters={**row.parameters, **waits})
 
 
 def own_nodes(system: System) -> tuple[NodeSpec, ...]:

@@ -23,26 +23,32 @@ def faults(
     only: Annotated[
         str | None, option("F,...", "Names of faults, with commas between; all by default.")
     ] = None,
+    launcher: Annotated[
+        str | None,
+        option("L", "What starts the systems: run, up or both; by default both where they differ, else run."),
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Inject faults into the parts of a live system, and measure how long it takes to be safe.
 
-    Each fault has a system of its own, which runs in real time in MuJoCo with the shipped policy. The time to
-    the safe state goes from the fault to the first applied state that is safe and stays so. Afterwards the bag is
-    opened and compared with what an observer received. The exit code is 1 if a fault fails or cannot be injected.
-    Faults that do not apply to the robot or to this computer are listed with the reason.
+    Each fault has a system of its own, as `fulmar run` or `fulmar up` starts it, which runs in real time in MuJoCo
+    with the shipped policy. The time to the safe state goes from the fault to the first applied state that is safe
+    and stays so. Afterwards the bag is opened and compared with what an observer received. The exit code is 1 if a
+    fault fails or cannot be injected. Faults that do not apply to the robot or to this computer are listed with the
+    reason.
 
     Try:
 
     fulmar faults --robot turtlebot2 --only controller_killed,odometry_silent
     """
     from fulmar_cli.extras import require
-    from fulmar_evaluation.faults.suite import faults_of, modules_for, run_faults
+    from fulmar_evaluation.faults.suite import faults_of, modules_for, run_faults, times_of
 
     chosen, skipped = faults_of(robot, names_in(only))
+    count = len(times_of(chosen, launcher))
     require(*modules_for(robot, chosen))
     with work_bar("injecting") as moved:
-        results = run_faults(robot, chosen, lambda done: moved(done, len(chosen)))
+        results = run_faults(robot, chosen, lambda done: moved(done, count), launcher)
     if as_json:
         print_json(
             {
@@ -64,15 +70,16 @@ def names_in(only: str | None) -> list[str] | None:
 
 def _print(robot: str, results: list[FaultResult], skipped: list[Skipped]) -> None:
     table = Table(title=f"faults of a live {robot}")
-    for column in ("fault", "detected by", "reaction"):
+    for column in ("fault", "by", "detected by", "reaction"):
         table.add_column(column)
     for column in ("safe after", "limit", "data lost", "bag", ""):
         table.add_column(column, justify="right")
     for result in results:
         table.add_row(
             result.name,
+            result.launcher,
             result.detected_by or "nobody",
-            result.reaction,
+            "; ".join(text for text in (result.reaction, _ended(result)) if text),
             _time_to_safe(result),
             "" if result.limit_s is None else f"{result.limit_s:.3f} s",
             "" if result.data_lost is None else str(result.data_lost),
@@ -85,6 +92,10 @@ def _print(robot: str, results: list[FaultResult], skipped: list[Skipped]) -> No
         for fault in skipped:
             left_out.add_row(fault.name, fault.reason)
         output.print(left_out)
+
+
+def _ended(result: FaultResult) -> str:
+    return f"`{result.launcher}` ends" if result.launcher_ended else ""
 
 
 def _time_to_safe(result: FaultResult) -> str:

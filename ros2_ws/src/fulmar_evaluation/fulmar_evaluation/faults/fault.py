@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from fulmar_core.robot import Robot
 from fulmar_evaluation.faults.fault_environment import USUAL, FaultEnvironment
 from fulmar_evaluation.faults.flight_watch import FLIES_S
+from fulmar_evaluation.faults.launched import RUN
 from fulmar_evaluation.faults.live_system import LiveSystem, NothingShown
 from fulmar_evaluation.faults.observer import wait_for
 
@@ -41,6 +42,8 @@ class FaultResult:
     data_lost: int | None  # messages that came and are not in the bag; None: the fault could not be done
     bag_intact: bool | None  # it opens, and has no gap while its recorder could work; None: same
     passed: bool
+    launcher: str = RUN  # the command that had started the system: run or up
+    launcher_ended: str = ""  # why the launcher ended by itself; empty if it did not
 
     @property
     def status(self) -> str:
@@ -103,6 +106,7 @@ def went_on(
     trips = {status.values.get("watchdog_trips", "") for status in statuses if status.who == "plant"}
     moved = any(moves for _, moves in live.observer.applied_since(since_s))
     wrong = [] if moved else ["the robot stood still"]
+    wrong += [f"{live.launcher} ended: {live.failure}"] if live.has_ended else []
     wrong += (
         []
         if len(trips) == 1
@@ -126,6 +130,7 @@ class Fault:
     # Why a robot, or this machine, cannot have it; empty if it can.
     why_not: Callable[[Robot], str] = possible
     begins: bool = True  # whether the system is under way when it is done
+    launchers: tuple[str, ...] = (RUN,)  # under which it is done; both where they differ
 
     def inapplicable(self, robot: Robot) -> str:
         """Why a robot, or this machine, cannot have it, by the system that it is done to too; empty if it can."""

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import yaml
-from geometry_msgs.msg import PoseStamped, TwistStamped
+from geometry_msgs.msg import PoseStamped, QuaternionStamped, TwistStamped
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
 from sensor_msgs.msg import Imu, JointState
@@ -24,17 +24,30 @@ from fulmar_core.robot import Robot, load_robot
 from fulmar_core.spatial import SpatialState
 from fulmar_core.state import State
 from fulmar_core.tasks import Task, load_task
-from fulmar_core.topics import COMMAND, GOAL_POINT, GOAL_POSE, IMU, MOCAP, ODOMETRY, VELOCITY_COMMAND, Wire
+from fulmar_core.topics import (
+    COMMAND,
+    GOAL_POINT,
+    GOAL_POSE,
+    IMU,
+    MOCAP,
+    ODOMETRY,
+    SENSOR_WIRES,
+    VELOCITY_COMMAND,
+    Wire,
+)
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 from policy_server.controllers import shipped_policy
 
+ATTITUDE = SENSOR_WIRES["star_tracker"]
 KINDS = {
     ODOMETRY: Odometry,
     IMU: Imu,
     MOCAP: PoseStamped,
     COMMAND: JointState,
     VELOCITY_COMMAND: TwistStamped,
+    ATTITUDE: QuaternionStamped,
 }
+FROM_PLANT = (IMU, MOCAP, ATTITUDE)
 Injection = Callable[[Any], Any]  # a message to what is passed on in its place, or to None
 
 

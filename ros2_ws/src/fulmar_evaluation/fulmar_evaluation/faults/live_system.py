@@ -1,47 +1,57 @@
-"""A whole system that runs in real time and that something is going to be done to."""
+"""A whole system that runs in real time, as people start it, and that something is going to be done to."""
 
 from __future__ import annotations
 
 import contextlib
+import os
 import signal
-import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
-from pathlib import Path
 
-import rclpy
+import psutil
 from rclpy.node import Node
 
+from fulmar_bringup.launched_command import LaunchedCommand
 from fulmar_bringup.operator_rows import teleop_spec
 from fulmar_bringup.planning import RunRequest
 from fulmar_bringup.processes import ProcessGroup
-from fulmar_bringup.readiness import CONTROLLER_AND_RECORDER, while_starting
-from fulmar_bringup.run_plan import NodeSpec, RunPlan
-from fulmar_bringup.supervisor import Supervisor, supervisor
-from fulmar_bringup.system_rows import system_rows
+from fulmar_bringup.run_plan import RunPlan
 from fulmar_core.controller_settings import MOST_COPIES
 from fulmar_core.errors import RunFailed
-from fulmar_core.robot import Robot, load_robot
+from fulmar_core.robot import load_robot
 from fulmar_core.safety.watchdog import default_timeout
+from fulmar_core.tasks import load_task
 from fulmar_core.topics import (
     ACTUATORS_STATE,
     DEVICE_STATE,
-    IMU,
-    MOCAP,
+    GOAL_WIRES,
     ODOMETRY,
     SIMULATION_START_NS,
     Wire,
     command_wire,
 )
-from fulmar_evaluation.faults.fault_environment import USUAL, FaultEnvironment, FaultInjector, source_of
+from fulmar_evaluation.faults.fault_environment import (
+    FROM_PLANT,
+    USUAL,
+    FaultEnvironment,
+    FaultInjector,
+    source_of,
+)
 from fulmar_evaluation.faults.flight_watch import FlightWatch
+from fulmar_evaluation.faults.launched import ENDS, RUN, UP, command_of
 from fulmar_evaluation.faults.observer import RunObserver, wait_for
 from fulmar_evaluation.faults.two_hosts import TwoHosts
-from fulmar_ros.runtime import spinning
+from fulmar_ros.goal_messages import TYPES, goal_message
+from fulmar_ros.qos import publisher_qos
+from fulmar_ros.runtime import ros_node
 
-MOVING_S = 20.0  # a robot that has far to go moves by then
+START_S = 60.0  # for a system to come up, on a busy computer
+MOVING_S = 20.0  # a robot that has far to go moves by then, once its plant runs
 RECORD_S = 1.0  # and the next state that moves it comes
+MATCH_S = 10.0  # for a publisher and its subscribers to find one another
+STOPPED = "stopped by"  # how the reason of an end begins that a person asked for
+MOST_S = 300.0  # of a run: no fault takes as long
 
 
 class NothingShown(RunFailed):
@@ -49,20 +59,32 @@ class NothingShown(RunFailed):
 
 
 class LiveSystem:
-    """Recorder, plant, e-stop, controller, and an observer of them."""
+    """A launcher with recorder, plant, e-stop and controller, and an observer of them.
+
+    Attributes:
+        launched: The process of `fulmar run` or `fulmar up`.
+        launcher: Which of them.
+        others: Nodes that people start beside it.
+    """
 
     def __init__(
         self,
         request: RunRequest,
-        group: ProcessGroup,
-        overseer: Supervisor,
+        launched: LaunchedCommand,
         bystander: Node,
-        about: FaultEnvironment,
-        hosts: TwoHosts | None,
+        about: FaultEnvironment = USUAL,
+        hosts: TwoHosts | None = None,
+        launcher: str = RUN,
     ) -> None:
         """Hold the parts together."""
-        self.plan, self.record, self.group = request.plan, request.record, group
-        self.bystander, self._request, self._overseer, self._hosts = bystander, request, overseer, hosts
+        self.plan, self.record, self.launched, self.launcher = (
+            request.plan,
+            request.record,
+            launched,
+            launcher,
+        )
+        self.bystander, self._request, self._hosts = bystander, request, hosts
+        self.others = ProcessGroup()
         robot = load_robot(self.plan.robot)
         self.robot = robot
         self.observer = RunObserver(bystander, robot, DEVICE_STATE if about.emulated else ACTUATORS_STATE)
@@ -96,30 +118,56 @@ class LiveSystem:
         return self._answers
 
     def begin(self) -> None:
-        """Give the goal, and start the plant.
+        """Wait until the system is up, and give a goal to one that has none yet.
 
         Raises:
-            RunFailed: A node has ended, or is not ready in time.
+            RunFailed: The launcher has ended, or the system is not up in time.
         """
-        alive, controller = while_starting(self.group, self._overseer), self._overseer.controller
-        if self.plan.goals:
-            self._overseer.wait_until(lambda: controller.values.get("mode") == "armed", alive)
-        else:
-            self._overseer.give_goal(
-                self._request.mission,
-                time_ns=time.time_ns() if self.plan.hardware else SIMULATION_START_NS,
-                alive=alive,
-                listeners=CONTROLLER_AND_RECORDER,
-            )
-        self._overseer.start_plant(alive, lambda: self.group.last_words("plant"))
+        self.until(lambda: bool(self._controller_mode()), "controller")
+        if self.launcher == UP:
+            self.until(lambda: self._controller_mode() != "idle", "controller")
+            self._give_goal()
+        self.until(lambda: len(self.observer.received()[0]) > 0, "plant")
 
-    def start_plant_alone(self) -> None:
-        """Start the plant, whoever has ended.
+    def until(self, condition: Callable[[], bool], what: str) -> None:
+        """Wait for something of a system that starts.
 
         Raises:
-            RunFailed: It refuses.
+            RunFailed: The launcher has ended, or it did not come in time.
         """
-        self._overseer.start_plant(lambda: None, lambda: self.group.last_words("plant"))
+        wait_for(lambda: condition() or self.has_ended, START_S)
+        if not condition():
+            reason = self.failure or f"{what} was not there within {START_S:g} s"
+            raise RunFailed(f"the system did not come up: {reason}")
+
+    def _give_goal(self) -> None:
+        """As `fulmar goals` gives one to a system that is up."""
+        wire, form = GOAL_WIRES[load_task(self.plan.task).goal_topic], self.robot.state_type
+        now_ns = time.time_ns() if self.plan.hardware else SIMULATION_START_NS
+        message = goal_message(self._request.mission, wire.name, now_ns, self.plan.frames, form=form)
+        publisher = self.bystander.create_publisher(TYPES[wire.name], wire.name, publisher_qos(wire))
+        wait_for(lambda: publisher.get_subscription_count() > 0, MATCH_S)
+        publisher.publish(message)
+
+    def _controller_mode(self) -> str:
+        statuses = [status for status in self.observer.statuses_since(0.0) if status.who == "controller"]
+        return next((each.values["mode"] for each in reversed(statuses) if "mode" in each.values), "")
+
+    @property
+    def has_ended(self) -> bool:
+        """Whether the launcher has ended."""
+        return self.launched.process.poll() is not None
+
+    @property
+    def failure(self) -> str:
+        """Why the launcher has ended; empty while it runs, and where somebody stopped it."""
+        ends = [event["failure"] or "" for event in self.launched.events if event["event"] == ENDS]
+        return "" if not ends or str(ends[0]).startswith(STOPPED) else str(ends[0])
+
+    def said(self, *words: str) -> str:
+        """The newest line of the launcher's log with all these words; empty where it has said nothing like it."""
+        lines = (line for line in reversed(list(self.launched.log)) if all(word in line for word in words))
+        return next(lines, "")
 
     def until_it_moves(self) -> float:
         """Wait until actuators are on; of an aircraft, until it flies level.
@@ -151,73 +199,67 @@ class LiveSystem:
             raise NothingShown("the robot stopped by itself before the fault; the fault would show nothing")
         return since_s
 
+    def process(self, name: str) -> psutil.Process:
+        """Process of a node."""
+        with contextlib.suppress(KeyError):
+            return self.others.process(name)
+        return self.launched.node(name)
+
     def send(self, name: str, number: signal.Signals) -> None:
         """Send a signal to a node."""
-        self.group.process(name).send_signal(number)
+        self.process(name).send_signal(number)
 
 
 @contextlib.contextmanager
 def live_system(
-    request: RunRequest, about: FaultEnvironment = USUAL, hosts: TwoHosts | None = None
+    request: RunRequest,
+    about: FaultEnvironment = USUAL,
+    hosts: TwoHosts | None = None,
+    launcher: str = RUN,
 ) -> Iterator[LiveSystem]:
-    """The processes of a system, which `begin` sets on its way to its goal; ended at the end.
+    """A system that a launcher has started, on its way to its goal after `begin`; ended at the end.
 
     Args:
         request: What to run.
         about: What is unusual about it; the same that the request was made with.
         hosts: The controller is on the other one, everything else on the robot's, which this thread has to be on.
+        launcher: `run` or `up`.
 
     Raises:
-        RunFailed: It does not come up.
+        RunFailed: Its observer failed.
     """
-    plan = replace(request.plan, supervised=True)
+    plan = replace(request.plan, intercepted=_intercepted(request.plan, about))
+    plan = replace(plan, duration_s=MOST_S if launcher == RUN else 0.0)
     if hosts is not None:
         plan = replace(plan, controller_network=hosts.other, copies=MOST_COPIES)
-    request, group = replace(request, plan=plan), ProcessGroup()
+    request = replace(request, plan=plan)
     errors: list[Exception] = []
     with contextlib.ExitStack() as stack:
-        wires = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="fulmar_")))
-        overseer = stack.enter_context(supervisor(plan))
-        bystander = rclpy.create_node("bystander", namespace=plan.namespace)
-        stack.enter_context(spinning(bystander, errors.append))
-        live = LiveSystem(request, group, overseer, bystander, about, hosts)
+        bystander = stack.enter_context(ros_node("bystander", errors.append, namespace=plan.namespace))
+        folder = request.record.parent
+        launched = LaunchedCommand(
+            (), environment=os.environ, folder=folder, command=command_of(launcher, request, folder)
+        )
+        live = LiveSystem(request, launched, bystander, about, hosts, launcher)
         try:
-            for spec in _specs(request, about, live.robot, wires):
-                group.start(spec)
+            if about.by_hand:
+                live.others.start(teleop_spec(plan.robot, name=plan.name, keyboard=False))
             yield live
         finally:
-            group.stop("controller")
-            group.stop_all()
+            launched.end()
+            live.others.stop_all()
     if errors:
         raise RunFailed(f"the bystander failed: {errors[0]!r}") from errors[0]
 
 
-def _specs(request: RunRequest, about: FaultEnvironment, robot: Robot, wires: Path) -> list[NodeSpec]:
-    plan = request.plan
-    rows = system_rows(plan, record={"directory": str(request.record)}, wires_folder=wires)
-    specs = [
-        *rows.values(),
-        *([teleop_spec(plan.robot, name=plan.name, keyboard=False)] if about.by_hand else []),
-    ]
-    commands = command_wire(robot)
-    intercepted = [about.intercepted or commands, *([commands] if about.answers_pass else [])]
-    sources = {_publisher_of(wire, plan): {wire.name: source_of(wire)} for wire in intercepted}
-    # Of an intercepted topic this process alone is the subscriber.
-    return [
-        replace(
-            spec,
-            remappings=sources[spec.name],
-            parameters={**spec.parameters, "wait_for_subscribers": 1}
-            if "wait_for_subscribers" in spec.parameters
-            else spec.parameters,
-        )
-        if spec.name in sources
-        else spec
-        for spec in specs
-    ]
+def _intercepted(plan: RunPlan, about: FaultEnvironment) -> tuple[tuple[str, str, str], ...]:
+    """Outputs of nodes that the injectors pass on, as of `RunPlan.intercepted`."""
+    commands = command_wire(load_robot(plan.robot))
+    wires = [about.intercepted or commands, *([commands] if about.answers_pass else [])]
+    return tuple((_publisher_of(wire, plan), wire.name, source_of(wire)) for wire in wires)
 
 
 def _publisher_of(wire: Wire, plan: RunPlan) -> str:
     if wire == ODOMETRY:  # it may have come from another process
         return "estimator" if plan.guards.estimator else "plant"
-    return "plant" if wire in (MOCAP, IMU) else "controller"
+    return "plant" if wire in FROM_PLANT else "controller"

@@ -67,15 +67,14 @@ def bundle_refused(live: LiveSystem) -> Outcome:
     began_s = time.monotonic()
     try:
         live.begin()
-    except RunFailed as error:
-        ended = str(error).startswith("controller ended with")
-        live.start_plant_alone()
+    except RunFailed:
         time.sleep(STAYS_S)
-        applied = live.observer.applied_since(began_s)
-        stands = bool(applied) and not any(moves for _, moves in applied)
-        reaction = live.group.last_words("controller").replace(live.plan.policy, "the bundle")
+        ended = live.failure.startswith("controller ended with")
+        stands = not any(moves for _, moves in live.observer.applied_since(began_s))
+        reaction = live.said("[controller]", live.plan.policy).partition("]: ")[2]
         who = "controller" if ended else ""
-        return Outcome(who, reaction, ended and stands, 0.0 if stands else None, limit_s=0.0)
+        words = reaction.replace(live.plan.policy, "the bundle") or live.failure
+        return Outcome(who, words, ended and stands, 0.0 if stands else None, limit_s=0.0)
     return Outcome("", "the controller took the bundle", False)
 
 

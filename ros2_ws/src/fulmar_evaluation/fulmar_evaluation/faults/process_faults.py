@@ -14,6 +14,7 @@ from fulmar_core.safety.estop import TIMEOUT_NS
 from fulmar_core.topics import MOCAP
 from fulmar_evaluation.faults.fault import STAYS_S, WORDS_S, Fault, Outcome, stopped, went_on
 from fulmar_evaluation.faults.fault_environment import FaultEnvironment, lost
+from fulmar_evaluation.faults.launched import LAUNCHERS
 from fulmar_evaluation.faults.live_system import LiveSystem
 from fulmar_evaluation.faults.observer import HealthStatus, wait_for
 
@@ -131,7 +132,7 @@ def disk_full(live: LiveSystem) -> Outcome:
     """The recorder cannot write a byte more, as on a full disk: control goes on, and what was written opens."""
     since_s = live.until_it_moves()
     time.sleep(PAUSE_S)
-    recorder = live.group.process("recorder")
+    recorder = live.process("recorder")
     recorder.rlimit(psutil.RLIMIT_FSIZE, (0, recorder.rlimit(psutil.RLIMIT_FSIZE)[1]))
     away_s = time.monotonic()
     wait_for(lambda: _problem(live, since_s) is not None, PROBLEM_S)
@@ -149,10 +150,10 @@ def disk_full(live: LiveSystem) -> Outcome:
 
 def _launcher_on(live: LiveSystem, name: str) -> tuple[str, str]:
     """Who noticed that a process has ended, and the words."""
-    ended = live.group.ended()
-    if ended is None or ended.name != name:
+    ended = live.said(name, "was killed")
+    if not ended:
         return "", f"nobody noticed that {name} has ended"
-    return "launcher", f"{ended.text}; control goes on"
+    return "launcher", f"{ended}; control goes on"
 
 
 def _problem(live: LiveSystem, since_s: float) -> HealthStatus | None:
@@ -172,9 +173,9 @@ PLAIN: tuple[Callable[[LiveSystem], Outcome], ...] = (
     disk_full,
 )
 PROCESS_FAULTS = (
-    *map(Fault, PLAIN),
+    *(Fault(do, launchers=LAUNCHERS) for do in PLAIN),
     Fault(goals_killed, FaultEnvironment(by_goal_node=True)),
-    Fault(estimator_killed, FaultEnvironment(estimated=True)),
-    Fault(estimator_hangs, FaultEnvironment(estimated=True)),
+    Fault(estimator_killed, FaultEnvironment(estimated=True), launchers=LAUNCHERS),
+    Fault(estimator_hangs, FaultEnvironment(estimated=True), launchers=LAUNCHERS),
     Fault(mocap_lost, FaultEnvironment(estimated=True, intercepted=MOCAP)),
 )

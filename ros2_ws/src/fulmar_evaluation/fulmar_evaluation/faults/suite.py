@@ -18,9 +18,10 @@ from fulmar_evaluation.faults.fault import Fault, FaultResult, Outcome
 from fulmar_evaluation.faults.fault_environment import request_of
 from fulmar_evaluation.faults.hardware_faults import HARDWARE_FAULTS
 from fulmar_evaluation.faults.input_faults import INPUT_FAULTS
+from fulmar_evaluation.faults.launched import LAUNCHERS, RUN, UP
 from fulmar_evaluation.faults.limit_faults import LIMIT_FAULTS
-from fulmar_evaluation.faults.live_system import NothingShown, live_system
-from fulmar_evaluation.faults.observer import BagEvidence, bag_evidence
+from fulmar_evaluation.faults.live_system import LiveSystem, NothingShown, live_system
+from fulmar_evaluation.faults.observer import BagEvidence, bag_evidence, wait_for
 from fulmar_evaluation.faults.operator_faults import OPERATOR_FAULTS
 from fulmar_evaluation.faults.policy_faults import POLICY_FAULTS
 from fulmar_evaluation.faults.process_faults import PROCESS_FAULTS
@@ -38,6 +39,8 @@ EVERY = (
     *CABLE_FAULTS,
     *SATELLITE_FAULTS,
 )
+BOTH = "both"  # launchers
+ENDS_S = 4.0  # for a launcher to end after a robot got safe
 ATTEMPTS = 3  # a robot may stand still just when something is done to it
 
 
@@ -91,8 +94,32 @@ def modules_for(robot: str, faults: list[Fault]) -> tuple[str, ...]:
     return tuple(needed)
 
 
-def run_faults(robot: str, faults: list[Fault], progress: Callable[[int], None]) -> list[FaultResult]:
+def times_of(faults: list[Fault], launcher: str | None = None) -> list[tuple[Fault, str]]:
+    """Faults with the launcher of the system that each is done to.
+
+    Args:
+        faults: Which.
+        launcher: run, up or both; None: that of each fault, both where they differ.
+
+    Raises:
+        UnknownNameError: It is none of these.
+    """
+    every = {RUN: (RUN,), UP: (UP,), BOTH: LAUNCHERS}
+    if launcher is not None and launcher not in every:
+        raise UnknownNameError("launcher", launcher, every)
+    return [(fault, each) for fault in faults for each in (every[launcher] if launcher else fault.launchers)]
+
+
+def run_faults(
+    robot: str, faults: list[Fault], progress: Callable[[int], None], launcher: str | None = None
+) -> list[FaultResult]:
     """Do each of them to a system of its own, one after another, in a ROS domain that nobody else uses.
+
+    Args:
+        robot: Its name.
+        faults: Which.
+        progress: Called with the number of faults that are done, each launcher counted.
+        launcher: As of `times_of`.
 
     Raises:
         FulmarError: The robot has no controller to run.
@@ -103,19 +130,19 @@ def run_faults(robot: str, faults: list[Fault], progress: Callable[[int], None])
         )  # a robot without a policy is refused once, not by every fault
     results = []
     with reserved_domains(1) as (domain,), environment({"ROS_DOMAIN_ID": str(domain)}):
-        for count, fault in enumerate(faults, 1):
-            results.append(_result_of(robot, fault))
+        for count, (fault, each) in enumerate(times_of(faults, launcher), 1):
+            results.append(_result_of(robot, fault, each))
             progress(count)
     return results
 
 
-def _result_of(robot: str, fault: Fault) -> FaultResult:
+def _result_of(robot: str, fault: Fault, launcher: str) -> FaultResult:
     """What came of a fault; whatever prevents it is reported, and the others go on."""
     problem = ""
     for _ in range(ATTEMPTS):
         with tempfile.TemporaryDirectory(prefix="fulmar_", ignore_cleanup_errors=True) as folder:
             try:
-                return _result(fault, *_done(robot, fault, Path(folder)))
+                return _done(robot, fault, launcher, Path(folder))
             except NothingShown as error:
                 problem = str(error)
             except FulmarError as error:
@@ -124,10 +151,10 @@ def _result_of(robot: str, fault: Fault) -> FaultResult:
             except Exception as error:  # noqa: BLE001 - one fault that cannot be done must not lose the others
                 problem = f"{type(error).__name__}: {error}"
                 break
-    return FaultResult(fault.name, "", problem, None, None, None, None, passed=False)
+    return FaultResult(fault.name, "", problem, None, None, None, None, passed=False, launcher=launcher)
 
 
-def _result(fault: Fault, outcome: Outcome, evidence: BagEvidence) -> FaultResult:
+def _result(fault: Fault, live: LiveSystem, outcome: Outcome, evidence: BagEvidence) -> FaultResult:
     words = "; ".join(
         text for text in (outcome.reaction, evidence.words and f"bag: {evidence.words}") if text
     )
@@ -140,26 +167,32 @@ def _result(fault: Fault, outcome: Outcome, evidence: BagEvidence) -> FaultResul
         evidence.lost,
         evidence.intact,
         outcome.passed and evidence.intact,
+        live.launcher,
+        live.failure,
     )
 
 
-def _done(robot: str, fault: Fault, folder: Path) -> tuple[Outcome, BagEvidence]:
+def _done(robot: str, fault: Fault, launcher: str, folder: Path) -> FaultResult:
     if not fault.about.two_hosts:
-        return _do(robot, fault, folder, None)
+        return _do(robot, fault, launcher, folder, None)
     # In a process of its own: the middleware asks once in a process which networks there are.
     with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
-        return pool.submit(_do_on_two_hosts, robot, fault, folder).result()
+        return pool.submit(_do_on_two_hosts, robot, fault, launcher, folder).result()
 
 
-def _do_on_two_hosts(robot: str, fault: Fault, folder: Path) -> tuple[Outcome, BagEvidence]:
+def _do_on_two_hosts(robot: str, fault: Fault, launcher: str, folder: Path) -> FaultResult:
     with environment(ACROSS), two_hosts() as hosts, inside(hosts.robot):
-        return _do(robot, fault, folder, hosts)
+        return _do(robot, fault, launcher, folder, hosts)
 
 
-def _do(robot: str, fault: Fault, folder: Path, hosts: TwoHosts | None) -> tuple[Outcome, BagEvidence]:
+def _do(robot: str, fault: Fault, launcher: str, folder: Path, hosts: TwoHosts | None) -> FaultResult:
     request = request_of(robot, folder / "bag", fault.about)
-    with live_system(request, fault.about, hosts) as live:
+    with live_system(request, fault.about, hosts, launcher) as live:
         if fault.begins:
             live.begin()
         outcome = fault.do(live)
-    return outcome, bag_evidence(request.record, live.observer, outcome.recorder_away)
+        # What stopped a robot may end its launcher; an aircraft is flown down first, which takes long.
+        if outcome.time_to_safe_s is not None and live.flight is None:
+            wait_for(lambda: live.has_ended, ENDS_S)
+    evidence = bag_evidence(request.record, live.observer, outcome.recorder_away)
+    return _result(fault, live, outcome, evidence)
