@@ -14,6 +14,7 @@ from fulmar_bringup.service.unit import RT_LIMIT, Service, command_of, system_of
 from fulmar_core.errors import BAD_USAGE, DONE, FAILED
 from fulmar_core.paths import config_names
 from hardware_drivers.hardware import load_hardware
+from tests.own_files import own_folder
 
 USER = "games"  # a user of every Debian, for whom systemd has no warning
 
@@ -70,6 +71,7 @@ def test_a_unit_restarts_with_a_limit_stops_gently_and_is_nothing_of_root(servic
     text = unit_of(tmp_path, "mujoco_lqr").read_text()
     for line in (
         f"User={USER}", "Restart=on-failure", "StartLimitBurst=20", "KillSignal=SIGTERM", "NoNewPrivileges=yes",
+        "UMask=0077", "StateDirectoryMode=0700",
         f"LimitRTPRIO={RT_LIMIT}", "LimitMEMLOCK=infinity", "WantedBy=multi-user.target", "StandardOutput=journal",
     ):  # fmt: skip
         assert f"\n{line}\n" in text
@@ -87,9 +89,9 @@ def test_a_unit_has_the_ros_settings_of_the_one_who_installs(service, tmp_path, 
 
 @pytest.mark.parametrize("word", ["/a b/fulmar", 'quo"ted', "100%", "$HOME", "back\\slash", "plain"])
 def test_words_of_the_command_survive_systemd_s_quoting(word):
-    text = unit_text(Service("a", "a system", ("/bin/fulmar", word), USER), {})
+    text = unit_text(Service("a", "a_system", ("/bin/fulmar", word), USER), {})
     assert command_of(text) == ("/bin/fulmar", word)
-    assert system_of_unit(text) == "a system"
+    assert system_of_unit(text) == "a_system"
 
 
 @pytest.mark.parametrize(
@@ -185,3 +187,86 @@ def test_files_are_written_anew_by_a_second_installation(service, tmp_path):
     service("install", "mujoco_lqr", "--user", USER)
     assert service("install", "mujoco_lqr", "--user", USER, "--recording", "whole")[0] == DONE
     assert "--recording whole" in unit_of(tmp_path, "mujoco_lqr").read_text()
+
+
+STEER = """
+import numpy as np
+
+class Steer:
+    def __init__(self, robot, task, settings):
+        self.count = len(robot.actuators.names)
+    def reset(self):
+        pass
+    def act(self, inputs):
+        return np.zeros((len(inputs.state.x), self.count))
+"""
+RELAYS = """
+from hardware_drivers.driver import DeviceDriver
+
+class RelayBoard(DeviceDriver):
+    def __init__(self, robot, settings, *, patience_s):
+        pass
+    def write(self, command):
+        pass
+    def close(self):
+        pass
+"""
+
+
+@pytest.fixture
+def own(tmp_path, monkeypatch):
+    """The current folder, with a controller and a driver of one's own."""
+    folder = tmp_path / "own folder"
+    folder.mkdir()
+    with own_folder(folder, monkeypatch):
+        (folder / "own_steer.py").write_text(STEER)
+        (folder / "own_relays.py").write_text(RELAYS)
+        (folder / "relays.yaml").write_text(
+            "title: t\nrobot: floating_platform\ndriver:\n  kind: own_relays:RelayBoard\n  port: /dev/ttyUSB0\n"
+        )
+        yield folder
+
+
+def variables_of(text: str) -> dict[str, str]:
+    lines = re.findall(r'^Environment="?(.*?)"?$', text, re.MULTILINE)
+    return dict(line.split("=", 1) for line in lines)
+
+
+def test_a_service_finds_own_classes_in_the_folder_that_it_was_installed_from(service, tmp_path, own):
+    chosen = ("--robot", "turtlebot2", "--task", "go_to_position", "--controller", "own_steer:Steer")
+    code, _, messages = service("install", "mujoco_classical", *chosen, "--user", USER)
+    assert code == DONE, messages
+    found = variables_of(unit_of(tmp_path, "mujoco_classical").read_text())
+    assert found["PYTHONPATH"].split(":")[0] == str(own)
+
+
+def test_a_service_finds_the_class_of_its_driver(service, tmp_path, own):
+    chosen = ("--backend", "hardware", "--hardware", "relays.yaml")
+    code, _, messages = service("install", "mujoco_lqr", *chosen, "--user", USER)
+    assert code == DONE, messages
+    text = unit_of(tmp_path, "mujoco_lqr").read_text()
+    assert variables_of(text)["PYTHONPATH"].split(":")[0] == str(own)
+    assert str(own / "relays.yaml") in command_of(text)
+
+
+def test_without_own_classes_a_service_gets_no_path_of_modules(service, tmp_path, own):
+    service("install", "mujoco_lqr", "--user", USER)
+    assert "PYTHONPATH" not in variables_of(unit_of(tmp_path, "mujoco_lqr").read_text())
+
+
+def test_paths_of_the_environment_are_whole_and_a_dollar_stays_one(service, tmp_path, own, monkeypatch):
+    for name in ("own$x", "second"):
+        (own / name / "robots").mkdir(parents=True)
+    monkeypatch.setenv("FULMAR_CONFIGS", "own$x:second")
+    code, _, messages = service("install", "mujoco_lqr", "--user", USER)
+    assert code == DONE, messages
+    found = variables_of(unit_of(tmp_path, "mujoco_lqr").read_text())
+    assert found["FULMAR_CONFIGS"] == f"{own}/own$x:{own}/second"
+
+
+def test_a_variable_with_a_line_break_is_refused_by_its_name(service, tmp_path, monkeypatch):
+    monkeypatch.setenv("ROS_STATIC_PEERS", "10.0.0.1\nUser=root")
+    code, _, messages = service("install", "mujoco_lqr", "--user", USER)
+    assert code == BAD_USAGE
+    assert "ROS_STATIC_PEERS = '10.0.0.1\\nUser=root' must be one line" in messages
+    assert not [path for path in tmp_path.rglob("*") if not path.is_dir()]

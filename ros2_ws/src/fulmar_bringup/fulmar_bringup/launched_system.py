@@ -17,6 +17,7 @@ from fulmar_bringup.system_rows import own_nodes, system_rows
 from fulmar_core.errors import ConfigError
 from fulmar_core.robot import load_robot
 from fulmar_core.tasks import load_task
+from fulmar_core.written_text import check_lines
 from hardware_drivers.hardware import load_hardware
 from hardware_drivers.own_driver import check_own_driver
 
@@ -60,6 +61,12 @@ def list_nodes(
     Raises:
         ConfigError: Unknown name, or a mistake in a file.
     """
+    given_texts = {
+        "system": system, "robot": robot, "name": name, "task": task, "controller": controller, "backend": backend,
+        "policy": policy, "goals": goals, "hardware": hardware, "adapter": adapter, "topic": topic,
+        "emulate": emulate, "markers": markers,
+    }  # fmt: skip
+    check_lines(given_texts.items())
     chosen = varied_system(
         system or "mujoco_policy",
         robot=robot,

@@ -20,11 +20,14 @@ from fulmar_bringup.service.installation import (
     texts_of,
     write_files,
 )
+from fulmar_bringup.service.own_places import module_path, whole_paths
 from fulmar_bringup.service.unit import Service, known_groups, unit_text
 from fulmar_bringup.standing_system import plan_system
-from fulmar_bringup.system import varied_system
+from fulmar_bringup.system import System, varied_system
 from fulmar_cli.extras import check_plan
 from fulmar_core.errors import ConfigError, FulmarError
+from fulmar_core.own_class import is_own
+from fulmar_core.written_text import NAME, USER, check_lines, check_written
 from hardware_drivers.hardware import load_hardware
 from hardware_drivers.presence import check_presence
 
@@ -74,8 +77,17 @@ def plan_service(wanted: Wanted, root: Path, *, dry_run: bool) -> PlannedService
         dry_run: Whether nothing is to be written, which needs no right to.
 
     Raises:
-        ConfigError: A name or a file is wrong, an extra is missing, or the user is root or unknown.
+        ConfigError: A name or a file is wrong, an extra is missing, the user is root or unknown, or a text does not fit
+            into a unit or a rule.
     """
+    check_written("SYSTEM", wanted.system, NAME)
+    check_lines(
+        {
+            "--robot": wanted.robot, "--name": wanted.name, "--task": wanted.task, "--backend": wanted.backend,
+            "--controller": wanted.controller, "--hardware": wanted.hardware, "--recording": wanted.recording,
+            "--policy": str(wanted.policy) if wanted.policy else None,
+        }.items()
+    )  # fmt: skip
     hardware = wanted.hardware
     if hardware is not None and hardware.endswith(".yaml"):
         hardware = str(Path(hardware).absolute())  # the service has another working folder
@@ -88,6 +100,7 @@ def plan_service(wanted: Wanted, root: Path, *, dry_run: bool) -> PlannedService
         backend=wanted.backend,
         hardware=hardware,
     )
+    _check_places(chosen)
     policy = wanted.policy.absolute() if wanted.policy else None
     request = plan_system(
         chosen, record=Path("runs/planned"), command="", policy=policy, hardware=hardware,
@@ -100,8 +113,11 @@ def plan_service(wanted: Wanted, root: Path, *, dry_run: bool) -> PlannedService
         )
     rules: tuple[str, ...] = ()
     groups: tuple[str, ...] = ()
+    own = [name for name in (chosen.controller, chosen.task) if is_own(name)]
+    own += [node.module for node in chosen.nodes]
     if request.plan.hardware:
         file = load_hardware(request.plan.hardware)
+        own += [file.driver.kind] if is_own(file.driver.kind) else []
         rules, groups = device_rules(file), device_groups(file)
         if root == Path("/"):
             _warn_of_absence(request.plan.hardware)
@@ -121,6 +137,7 @@ def plan_service(wanted: Wanted, root: Path, *, dry_run: bool) -> PlannedService
         (str(_program()), "up", wanted.system, "--service", *_options(wanted, hardware, policy)),
         user,
         known,
+        whole_paths(os.environ) | module_path(own, os.environ),
     )
     files = Files(root, service.name)
     return PlannedService(files, texts_of(files, unit_text(service, os.environ), rules))
@@ -143,10 +160,21 @@ def _program() -> Path:
     return Path(found).absolute()
 
 
+def _check_places(system: System) -> None:
+    """Refuse a path in a system file that the service, which runs in a folder of its own, does not find."""
+    keys = system.guards.trusted_keys
+    if keys is not None and not Path(keys).is_absolute():
+        raise ConfigError(
+            f"trusted_keys = '{keys}' of the system file is relative, and a service runs in a folder of its own: write "
+            f"{Path(keys).absolute()}."
+        )
+
+
 def _user(name: str | None, root: Path) -> str:
     """Who runs the service: never root, whose files and devices a mistake would reach."""
     chosen = name or os.environ.get("SUDO_USER") or pwd.getpwuid(os.geteuid()).pw_name
-    if chosen == "root":
+    check_written("--user" if name else "SUDO_USER", chosen, USER)
+    if chosen == "root" or chosen in _names_of_root(root):
         raise ConfigError("a service does not run as root: name who runs it by --user NAME.")
     if root == Path("/"):
         try:
@@ -156,6 +184,16 @@ def _user(name: str | None, root: Path) -> str:
                 f"there is no user '{chosen}' here. Make one: sudo useradd --create-home {chosen}"
             ) from None
     return chosen
+
+
+def _names_of_root(root: Path) -> set[str]:
+    """Every name with the id of root, here or in an image."""
+    try:
+        lines = (root / "etc/passwd").read_text(errors="replace").splitlines()
+    except OSError:  # an image without users yet
+        return set()
+    entries = [line.split(":") for line in lines]
+    return {entry[0] for entry in entries if len(entry) > 2 and entry[2] == "0"}
 
 
 def _check_program(program: str, user: str) -> None:

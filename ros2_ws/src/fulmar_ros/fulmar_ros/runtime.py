@@ -35,6 +35,7 @@ SWITCH_INTERVAL_S = 0.0005
 
 ENDS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 SPIN_S = 60.0
+PRIVATE = 0o077  # rights that group and others do not get
 RCLPY = os.path.dirname(rclpy.__file__) + os.sep
 EXECUTOR = "FULMAR_EXECUTOR"  # environment variable: default, or events
 
@@ -68,6 +69,7 @@ def run_node(make_node: Callable[[RequestExit], Node], argv: Sequence[str] | Non
         if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN:
             signal.signal(number, on_signal)
     end_with_parent()
+    keep_private()
     sys.setswitchinterval(SWITCH_INTERVAL_S)
 
     try:
@@ -86,6 +88,11 @@ def run_node(make_node: Callable[[RequestExit], Node], argv: Sequence[str] | Non
         rclpy.try_shutdown()
     _collect_refused_node()
     return BAD_USAGE
+
+
+def keep_private() -> None:
+    """Let other users read nothing that this process writes: bags, logs, and the shared memory of its messages."""
+    os.umask(os.umask(PRIVATE) | PRIVATE)
 
 
 def _collect_refused_node() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fulmar_core.written_text import LINE, NAME, check_written
 from hardware_drivers.hardware import Hardware
 from hardware_drivers.settings import GpioValves, Kobuki
 
@@ -16,9 +17,18 @@ GPIO = 'SUBSYSTEM=="gpio", KERNEL=="{device}", MODE="0660", GROUP="{gpio}"'
 
 
 def device_rules(hardware: Hardware) -> tuple[str, ...]:
-    """One rule for each device below /dev that a hardware file names, and for a Kobuki base by its chip."""
-    port = str(getattr(hardware.driver, "port", ""))
+    """One rule for each device below /dev that a hardware file names, and for a Kobuki base by its chip.
+
+    Raises:
+        ConfigError: `port` would mean more than one device in a rule.
+    """
+    port = str(getattr(hardware.driver, "port", "")).partition(",")[
+        0
+    ]  # an autopilot's baud rate stands behind it
     device = port.removeprefix("/dev/")
+    if port.startswith("/dev/"):
+        for part in check_written("port", device, LINE).split("/"):
+            check_written("port", part, NAME)
     rules = []
     if isinstance(hardware.driver, Kobuki):
         rules.append(KOBUKI)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from fulmar_core.process import RT_LIMIT
+from fulmar_core.written_text import LINE, NAME, USER, check_written
 
 MARK = "# Written by `fulmar service install`; `fulmar service remove` removes it."
 # Of the environment of the one who installs: where nodes find each other, and own files.
@@ -34,9 +35,13 @@ StartLimitBurst={failures}
 [Service]
 Type=exec
 User={user}
-{groups}{environment}StateDirectory={state}
+{groups}{environment}# Bags, logs and the shared memory of nodes are read by this user alone.
+UMask=0077
+StateDirectory={state}
+StateDirectoryMode=0700
 # rclpy writes a log file for each node, which the journal has too: these go with the service.
 RuntimeDirectory=fulmar-{name}
+RuntimeDirectoryMode=0700
 Environment=ROS_LOG_DIR=/run/fulmar-{name}
 WorkingDirectory=/var/lib/{state}
 ExecStart={command}
@@ -78,6 +83,9 @@ class Service:
     command: tuple[str, ...]  # program, with its whole path, and arguments
     user: str
     groups: tuple[str, ...] = ()  # beside the user's own
+    variables: Mapping[str, str] = field(
+        default_factory=dict
+    )  # of the environment; they replace what is passed
 
 
 def unit_text(service: Service, environment: Mapping[str, str]) -> str:
@@ -86,9 +94,22 @@ def unit_text(service: Service, environment: Mapping[str, str]) -> str:
     Args:
         service: What runs.
         environment: Of the one who installs; `PASSED` is taken from it, and paths of ROS where it is sourced.
+
+    Raises:
+        ConfigError: A text would mean more than itself in a unit, or is no name; with its field.
     """
+    check_written("name", service.name, NAME)
+    check_written("system", service.system, NAME)
+    check_written("user", service.user, USER)
+    for group in service.groups:
+        check_written("group", group, NAME)
+    for word in service.command:
+        check_written("command", word, LINE)
     names = (*PASSED, *OF_SOURCED_ROS) if environment.get(OF_SOURCED_ROS[0]) else PASSED
-    passed = {name: environment[name] for name in names if environment.get(name)}
+    passed = {name: check_written(name, environment[name], LINE) for name in names if environment.get(name)}
+    passed |= service.variables
+    for name, value in service.variables.items():
+        check_written(name, value, LINE)
     return UNIT.format(
         mark=MARK,
         system=service.system,
@@ -98,7 +119,7 @@ def unit_text(service: Service, environment: Mapping[str, str]) -> str:
         groups=f"SupplementaryGroups={' '.join(service.groups)}\n" if service.groups else "",
         environment="".join(f"Environment={_quoted(f'{name}={value}')}\n" for name, value in passed.items()),
         state=STATE,
-        command=" ".join(map(_quoted, service.command)),
+        command=" ".join(_quoted(word.replace("$", "$$")) for word in service.command),
         stop=STOP_S,
         restart=RESTART_S,
         rtprio=RT_LIMIT,
@@ -109,7 +130,8 @@ def unit_text(service: Service, environment: Mapping[str, str]) -> str:
 def command_of(text: str) -> tuple[str, ...]:
     """The words of ExecStart in the text of a unit; the inverse of `unit_text`."""
     (line,) = re.findall(r"^ExecStart=(.*)$", text, re.MULTILINE)
-    return tuple(_unquoted(word) for word in re.findall(r'"(?:[^"\\]|\\.)*"|\S+', line))
+    words = re.findall(r'"(?:[^"\\]|\\.)*"|\S+', line)
+    return tuple(_unquoted(word).replace("$$", "$") for word in words)
 
 
 def system_of_unit(text: str) -> str:
@@ -119,8 +141,8 @@ def system_of_unit(text: str) -> str:
 
 
 def _quoted(word: str) -> str:
-    """A word as systemd reads it (systemd.service, "Command lines"): % and $ would be replaced."""
-    word = word.replace("%", "%%").replace("$", "$$")
+    """A word as systemd reads it (systemd.syntax, "Quoting"): % would be replaced, and $ in commands alone."""
+    word = word.replace("%", "%%")
     if re.fullmatch(r"[\w@%+=:,./$-]+", word):
         return word
     return '"' + word.replace("\\", "\\\\").replace('"', '\\"') + '"'
@@ -129,7 +151,7 @@ def _quoted(word: str) -> str:
 def _unquoted(word: str) -> str:
     if word.startswith('"'):
         word = re.sub(r"\\(.)", r"\1", word[1:-1])
-    return word.replace("%%", "%").replace("$$", "$")
+    return word.replace("%%", "%")
 
 
 def known_groups(wanted: Iterable[str], known: Iterable[str]) -> tuple[str, ...]:

@@ -1,0 +1,53 @@
+"""What a service needs of the folder and environment that it is installed from: it runs in another folder."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+from fulmar_core.own_class import SEPARATOR, search_current_folder
+from fulmar_core.paths import OWN_FOLDERS
+
+PYTHONPATH = "PYTHONPATH"
+# Variables that hold a path, or several as in PATH.
+PATHS = (
+    OWN_FOLDERS, "FULMAR_CALIBRATION", "FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE",
+    "ROS_SECURITY_KEYSTORE",
+)  # fmt: skip
+
+
+def whole_paths(environment: Mapping[str, str]) -> dict[str, str]:
+    """The variables of an environment that hold paths, each path from the root on."""
+    return {name: _whole(environment[name]) for name in PATHS if environment.get(name)}
+
+
+def module_path(modules: Iterable[str], environment: Mapping[str, str]) -> dict[str, str]:
+    """PYTHONPATH by which a service finds own modules; nothing where none is needed.
+
+    Args:
+        modules: Modules, or dotted paths of classes: of controllers, tasks, drivers and nodes.
+        environment: Of the one who installs.
+    """
+    search_current_folder()
+    given = [part for part in environment.get(PYTHONPATH, "").split(os.pathsep) if part]
+    searched = [str(Path.cwd()), *map(_whole, given)]
+    roots = [_root(module.partition(SEPARATOR)[0].partition(".")[0]) for module in modules]
+    if not any(root in searched for root in roots):
+        return {}
+    own = [root for root in roots if root == searched[0]]
+    return {PYTHONPATH: os.pathsep.join(dict.fromkeys([*own, *searched[1:]]))}
+
+
+def _whole(paths: str) -> str:
+    return os.pathsep.join(str(Path(part).absolute()) for part in paths.split(os.pathsep) if part)
+
+
+def _root(top: str) -> str:
+    """The folder in which a module is found; empty for one without."""
+    spec = importlib.util.find_spec(top)
+    if spec is None:
+        return ""
+    places = list(spec.submodule_search_locations or [])
+    return str(Path(places[0] if places else spec.origin or "").parent.absolute())
