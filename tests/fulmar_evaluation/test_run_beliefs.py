@@ -1,4 +1,4 @@
-"""Which valves a run is remembered for as believed dead."""
+"""Which valves a run is remembered for as believed dead or open."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import pytest
 
 from fulmar_bags.run_record import HealthSample
-from fulmar_evaluation.run_summary import believed_dead
+from fulmar_evaluation.run_summary import believed
 
 
 def record(*said):
@@ -29,9 +29,9 @@ def record(*said):
     ],
 )
 def test_a_belief_that_stood_for_a_second_or_at_the_end_is_named(said, named):
-    assert believed_dead(record(*said)) == named
+    assert believed(record(*said), "believed_dead") == named
 
 
 def test_a_bag_from_before_beliefs_were_reported_names_none():
     old = HealthSample(0.0, "a: controller", 0, "", {"mode": "active"})
-    assert believed_dead(SimpleNamespace(health=(old,))) == []
+    assert believed(SimpleNamespace(health=(old,)), "believed_open") == []

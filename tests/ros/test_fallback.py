@@ -234,7 +234,7 @@ def test_the_swap_command_waits_for_the_controller_beside_a_recorder_and_asks_ag
     node = start(policy=SHIPPED)
     odometry = Stream(neighbour)
     second = str(copy_of(tmp_path, "second"))
-    node._beliefs = Beliefs(("thruster_1",), ("valve thruster_1 believed dead",))
+    node._actuator_beliefs._estimated = Beliefs(words=("a push of 2.00 N is believed",))
     until(lambda: values(neighbour)["beliefs"] != "")
     for number in (1, 2):
         assert person.say_swap(ROBOT, second, find_s=5.0, answer_s=10.0) == f"done {second}"

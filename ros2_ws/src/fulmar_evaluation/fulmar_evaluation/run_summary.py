@@ -62,7 +62,8 @@ def summarise(record: RunRecord) -> dict[str, Any]:
         "actuator_use": _use(result),
         "estop_pressed": estop_pressed(record),
         "warnings": warnings_of(record),
-        "believed_dead": believed_dead(record),
+        "believed_dead": believed(record, "believed_dead"),
+        "believed_open": believed(record, "believed_open"),
         "beliefs": last_beliefs(record),
         "bag": str(record.path),
     }
@@ -183,18 +184,22 @@ def _finite(value: float) -> float | None:
 STANDS_S = 1.0  # a belief that went sooner, and before the end, is none that a run is remembered for [s]
 
 
-def believed_dead(record: RunRecord) -> list[str]:
-    """Valves that `controller/status` named as believed dead, for a while or at the end of the run.
+def believed(record: RunRecord, key: str) -> list[str]:
+    """Valves or fans that `controller/status` named, for a while or at the end of the run.
+
+    Args:
+        record: The run.
+        key: What is believed of them: `believed_dead` or `believed_open`.
 
     Returns:
         Their names, in the order in which they were first named.
     """
-    said = [sample for sample in record.health if "believed_dead" in sample.values]
+    said = [sample for sample in record.health if key in sample.values]
     ends = [sample.log_s for sample in said[1:]] + [math.inf]
     lasted: dict[str, float] = {}
     for sample, end_s in zip(said, ends, strict=False):  # of none at all there is an end, too
         length = end_s - sample.log_s
-        for name in filter(None, sample.values["believed_dead"].split(", ")):
+        for name in filter(None, sample.values[key].split(", ")):
             lasted[name] = lasted.get(name, 0.0) + length
     return [name for name, length in lasted.items() if length >= STANDS_S]
 
@@ -242,8 +247,9 @@ def summary_text(summary: dict[str, Any]) -> str:
         counted = ", ".join(f"{count} {key.replace('_', ' ')}" for count, key in counts if count is not None)
         lines.append(f"  {summary['steps']} commands{spread}" + (f"; {counted}" if counted else ""))
     lines += [f"  warning: {warning}" for warning in summary["warnings"]]
-    if summary["believed_dead"]:
-        lines.append(f"  believed dead: {', '.join(summary['believed_dead'])}")
+    for key in ("believed_dead", "believed_open"):
+        if summary[key]:
+            lines.append(f"  {key.replace('_', ' ')}: {', '.join(summary[key])}")
     if summary["beliefs"]:
         lines.append(f"  at the end: {summary['beliefs']}")
     bag = summary["bag"]

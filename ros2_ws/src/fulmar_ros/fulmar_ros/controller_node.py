@@ -19,8 +19,7 @@ from fulmar_core.controllers.controller import Controller, Inputs
 from fulmar_core.errors import FAILED, FulmarError, TaskError
 from fulmar_core.guarded_loop import GuardedLoop
 from fulmar_core.health.applied import AppliedHistory
-from fulmar_core.health.beliefs import BeliefReader, Beliefs
-from fulmar_core.health.thruster_health import can_estimate_health
+from fulmar_core.health.beliefs import Beliefs
 from fulmar_core.robot import load_robot
 from fulmar_core.safety.arbiter import Decision, Mode
 from fulmar_core.safety.estop import EstopMonitor
@@ -28,6 +27,7 @@ from fulmar_core.safety.fallback import Standby
 from fulmar_core.safety.input_gate import Measurement
 from fulmar_core.tasks import load_task
 from fulmar_core.topics import ODOMETRY
+from fulmar_ros.actuator_beliefs import ActuatorBeliefs
 from fulmar_ros.controller_status import PERIOD_S, ControllerStatus
 from fulmar_ros.controller_wires import ControllerWires
 from fulmar_ros.convert import OdometryReader, VectorReader
@@ -90,7 +90,7 @@ class ControllerNode(LifecycleNode):
         )
         self._pause_ns = self.settings.pause_ns(self.robot)
         self._applied = AppliedHistory(self.settings.hold_ns(self.robot))
-        self._belief_reader = BeliefReader(self.robot) if can_estimate_health(self.robot) else None
+        self._actuator_beliefs = ActuatorBeliefs(self.robot, self.settings, self._applied)
         self._beliefs = Beliefs()
         self._beat = ControlBeat(
             1.0 / (hz * self.settings.rate), rate=self.settings.rate, copies=self.settings.copies
@@ -223,6 +223,7 @@ class ControllerNode(LifecycleNode):
 
     def _announce(self) -> None:
         """Publish the identity of the controller that acts from now on; estimates begin anew."""
+        self._actuator_beliefs.forget_estimate()
         self._beliefs = Beliefs()
         self.wires.publish_metadata(self._guarded.switch.current.metadata)
 
@@ -331,8 +332,9 @@ class ControllerNode(LifecycleNode):
         if step is not None:
             self.wires.publish_reasoning(step.observation[0], step.action.ravel(), stamp)
             self._publish_estimate(stamp)
-            if guard.note(step.refusal):
-                self._announce()
+        self._watch_actuators(measurement, decision)
+        if step is not None and guard.note(step.refusal):
+            self._announce()
         self._publish_status(decision)
 
     def _act(self, guard: GuardedLoop, inputs: Inputs) -> Step:
@@ -353,14 +355,25 @@ class ControllerNode(LifecycleNode):
             return activated
 
     def _publish_estimate(self, stamp: int) -> None:
-        """Publish the estimate of valves and push that the controller received, and keep what is a warning of it."""
+        """Publish the estimate of valves and push that the controller received."""
         estimate = self._guarded.loop.estimate
-        if estimate is None or self._belief_reader is None:
+        if estimate is None:
             return
         health = estimate.health[0]
-        self._beliefs = self._belief_reader.read(health)
+        self._actuator_beliefs.take_estimate(health)
         if self.wires.health_wanted:
             self.wires.publish_actuators_health(health.effectiveness, stamp)
+
+    def _watch_actuators(self, measurement: Measurement | None, decision: Decision) -> None:
+        """Keep what is believed of actuators that measure nothing; one that is stuck open ends a robot's control."""
+        if measurement is None:
+            return
+        guard = self._guarded
+        self._beliefs = self._actuator_beliefs.of(
+            measurement, epoch=guard.epoch, stands=guard.flags.bearing_off
+        )
+        if self._beliefs.open and decision.may_act and not guard.flags.latched_fault:
+            self._fail(f"{self._beliefs.words[0]}. Close its supply.")
 
     def _give_up(self, reason: str, stamp: int) -> None:
         """Command what is safe; let the fallback go on, or, where there is none, latch a fault and end the process."""

@@ -65,6 +65,7 @@ class ControllerStatus:
             self._swap.said,
             *self.wire_problems,
             beliefs.dead,
+            beliefs.open,
             len(beliefs.words),
             guard.flags.unconverged,
             self._swap.requests,
@@ -88,6 +89,7 @@ class ControllerStatus:
             "fell_back": switch.fell_back,
             "swap": self._swap.said,
             "believed_dead": ", ".join(beliefs.dead),
+            "believed_open": ", ".join(beliefs.open),
             "beliefs": "; ".join(beliefs.words),
             "unconverged": unconverged,
             "swap_requests": str(self._swap.requests),
@@ -111,4 +113,5 @@ class ControllerStatus:
         }
         warnings = BETWEEN.join([*self.wire_problems, *beliefs.words])
         message = decision.reason or warnings or decision.mode.value
-        health.publish(level, message, values, warnings=[unconverged] if unconverged else [])
+        warned = [*beliefs.warnings, *([unconverged] if unconverged else [])]
+        health.publish(level, message, values, warnings=warned)

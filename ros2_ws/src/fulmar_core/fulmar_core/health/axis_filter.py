@@ -99,7 +99,9 @@ class AxisFilters:
         )
         settled = self._last is not None and all(
             np.allclose(new, old, rtol=SETTLED, atol=1e-9)
-            for new, old in zip((*gains.pose, *gains.velocity), (*self._last.pose, *self._last.velocity), strict=True)
+            for new, old in zip(
+                (*gains.pose, *gains.velocity), (*self._last.pose, *self._last.velocity), strict=True
+            )
         )
         self._settled_at = (dt, half) if settled else (0.0, 0.0)
         self._last = gains

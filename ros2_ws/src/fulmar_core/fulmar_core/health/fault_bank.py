@@ -40,6 +40,7 @@ class BankSettings:
     velocity: float = 0.006  # same [m/s]
     yaw_rate: float = 0.01  # same [rad/s]
     misfit: float = 0.15  # error of the wrench of a command, anew at each step, as a share of it [-]
+    wander: float = 0.05  # change of the factors in one second [-]
     change: float = 2e-3  # chance that what is wrong changes, in one second [-]
     anew: float = 0.2  # share of its chance before anything is seen, below which one begins anew [-]
     surprise: float = 12.0  # largest weight of one measurement against a hypothesis, as log-likelihood [-]
@@ -74,7 +75,9 @@ class FaultBank:
             ]
         ).T
         self._spread = np.clip(0.3 * (self._factors[1] - self._factors[0]), 0.05, 0.5)
-        self._filters = _filters(robot, self._settings)
+        #: Largest force and moment of one actuator that can move the body [N, N·m].
+        self.one_actuator = _one_actuator(robot)
+        self._filters = _filters(robot, self._settings, self.one_actuator)
         easy = np.array([each.kind is Kind.PUSHED for each in self.hypotheses.all], dtype=int)
         group = np.array([MOVING] * self._moving + [TURNING] * (len(self._axes) - self._moving))
         self._which = 2 * easy[:, None] + group  # filter of each hypothesis and axis
@@ -92,6 +95,11 @@ class FaultBank:
         self._doubt = np.tile(self._spread**2, (count, 1))
         self._noise = 1.0  # mean square of the best hypothesis' white errors, at least 1
         self._filters.reset()
+
+    @property
+    def misfit(self) -> float:
+        """Mean square of the errors of the likeliest hypothesis, in standard deviations, at least 1."""
+        return self._noise
 
     def push(self, number: int) -> np.ndarray:
         """Force and torque from outside under a hypothesis, along the world's axes, shape (6,) [N, N·m]."""
@@ -172,7 +180,7 @@ class FaultBank:
         better = self._by_axis(factor - self._factor)
         kept = _corrected(gains, response, -response[0], -response[1])
         state = _corrected(gains, ahead, off, off_speed) + better * kept
-        self._mix(state, kept, factor, left + 1e-5, dt)
+        self._mix(state, kept, factor, left + s.wander**2 * dt, dt)
 
     def _mix(
         self, state: np.ndarray, response: np.ndarray, factor: np.ndarray, doubt: np.ndarray, dt: float
@@ -181,7 +189,10 @@ class FaultBank:
         change = self._settings.change * dt
         kept = (1.0 - change) * self.chance
         total = kept + change * self.hypotheses.prior
-        own, chance = (self.chance / (self.chance + self._settings.anew * self.hypotheses.prior))[:, None], self.chance
+        own, chance = (
+            (self.chance / (self.chance + self._settings.anew * self.hypotheses.prior))[:, None],
+            self.chance,
+        )
         self._state = own * state + (1.0 - own) * (chance @ state)[:, None]
         self._response = own * response + (1.0 - own) * (chance @ response)[:, None]
         self._factor = own * factor + (1.0 - own) * (chance @ factor)
@@ -258,20 +269,28 @@ def _corrected(gains: Gains, state: np.ndarray, pose: np.ndarray, velocity: np.n
     )
 
 
-def _filters(robot: Robot, s: BankSettings) -> AxisFilters:
-    """Filters of both groups for most hypotheses, and of both for a push that changes as it likes."""
+def _one_actuator(robot: Robot) -> tuple[float, float]:
+    """Largest force and moment of one actuator along axes in which the body moves [N, N·m]."""
     assert isinstance(robot.actuators, Pushing)
+    wrench = robot.actuators.full_thrust[:, None] * robot.actuators.wrench_per_newton
+    axes = [[0, 1], [5]] if robot.body.planar else [[0, 1, 2], [3, 4, 5]]
+    force, moment = (float(np.linalg.norm(wrench[:, part], axis=1).max()) for part in axes)
+    return force, moment
+
+
+def _filters(robot: Robot, s: BankSettings, one_actuator: tuple[float, float]) -> AxisFilters:
+    """Filters of both groups for most hypotheses, and of both for a push that changes as it likes."""
     odometry = robot.sensors.odometry
     pose = [max(s.position, odometry.position.std), max(s.heading, odometry.heading.std)]
     velocity = [max(s.velocity, odometry.velocity.std), max(s.yaw_rate, odometry.yaw_rate.std)]
-    wrench = robot.actuators.full_thrust[:, None] * robot.actuators.wrench_per_newton
-    axes = [5] if robot.body.planar else [3, 4, 5]
-    moment = float(np.linalg.norm(wrench[:, axes], axis=1).max())
     inertia = robot.body.inertia[2] if robot.body.planar else min(robot.body.inertia[:3])
-    thrust = float(np.linalg.norm(wrench[:, :3], axis=1).max())
-    one = np.array([thrust / robot.body.mass, moment / inertia])
+    one = np.array(one_actuator) / (robot.body.mass, inertia)
     twice = np.concatenate((one, one))
     shares = np.repeat([[s.push, s.drift], [s.sudden, s.sudden]], 2, axis=0)
     return AxisFilters(
-        np.array(pose * 2), np.array(velocity * 2), s.model * twice, shares[:, 0] * twice, shares[:, 1] * twice
+        np.array(pose * 2),
+        np.array(velocity * 2),
+        s.model * twice,
+        shares[:, 0] * twice,
+        shares[:, 1] * twice,
     )

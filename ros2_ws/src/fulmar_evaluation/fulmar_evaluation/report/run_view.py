@@ -181,7 +181,8 @@ def table_rows(runs: Sequence[View]) -> list[Row]:
         row("Period error [ms]", "median / p99 / largest", spread("period_error_ms")),
         row("Inference [ms]", "median / p99 / longest", spread("inference_ms")),
         row("Overruns", "deadlines missed", lambda s: _value(s["overruns"], "", 0)),
-        row("Believed dead", "valves, by the estimator", lambda s: ", ".join(s["believed_dead"]) or "none"),
+        row("Believed dead", "valves or fans", lambda s: ", ".join(s["believed_dead"]) or "none"),
+        row("Believed open", "valves or fans", lambda s: ", ".join(s["believed_open"]) or "none"),
         row("Watchdog trips", "no fresh command", lambda s: _value(s["watchdog_trips"], "", 0)),
     ]
 
