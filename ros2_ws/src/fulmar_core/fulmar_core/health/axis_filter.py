@@ -14,25 +14,22 @@ class Gains:
     """Of one step; arrays of shape (...,) of as many filters.
 
     Attributes:
-        pose: Corrections of pose, velocity and push for an innovation of the pose.
+        pose: Corrections of pose, velocity and push for an innovation of the pose, shape (3, ...).
         velocity: Same for one of the velocity.
-        white: Three numbers that make innovations white: the first times that of the pose is the first white number,
-            the second times that of the pose and the third times that of the velocity add up to the other.
+        white: Three numbers that make innovations white, shape (3, ...): the first times that of the pose is the first
+            white number, the second times that of the pose and the third times that of the velocity are the other.
         log_white: Logarithm of the determinant of these.
     """
 
-    pose: tuple[np.ndarray, ...]
-    velocity: tuple[np.ndarray, ...]
-    white: tuple[np.ndarray, ...]
+    pose: np.ndarray
+    velocity: np.ndarray
+    white: np.ndarray
     log_white: np.ndarray
 
     def at(self, index: np.ndarray) -> Gains:
         """Those of some filters."""
         return Gains(
-            tuple(part[index] for part in self.pose),
-            tuple(part[index] for part in self.velocity),
-            tuple(part[index] for part in self.white),
-            self.log_white[index],
+            self.pose[:, index], self.velocity[:, index], self.white[:, index], self.log_white[index]
         )
 
 
@@ -92,16 +89,14 @@ class AxisFilters:
         self._covariance = 0.5 * (after + np.swapaxes(after, 1, 2))
         white = np.linalg.inv(np.linalg.cholesky(spread))
         gains = Gains(
-            tuple(gain[:, i, 0] for i in range(3)),
-            tuple(gain[:, i, 1] for i in range(3)),
-            (white[:, 0, 0], white[:, 1, 0], white[:, 1, 1]),
+            gain[:, :, 0].T,
+            gain[:, :, 1].T,
+            np.stack((white[:, 0, 0], white[:, 1, 0], white[:, 1, 1])),
             np.log(white[:, 0, 0] * white[:, 1, 1]),
         )
         settled = self._last is not None and all(
             np.allclose(new, old, rtol=SETTLED, atol=1e-9)
-            for new, old in zip(
-                (*gains.pose, *gains.velocity), (*self._last.pose, *self._last.velocity), strict=True
-            )
+            for new, old in ((gains.pose, self._last.pose), (gains.velocity, self._last.velocity))
         )
         self._settled_at = (dt, half) if settled else (0.0, 0.0)
         self._last = gains

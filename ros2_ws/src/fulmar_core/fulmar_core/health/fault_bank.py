@@ -258,15 +258,14 @@ def _moved(state: np.ndarray, dt: float, half: float) -> np.ndarray:
 
 def _white(gains: Gains, pose: np.ndarray, velocity: np.ndarray) -> np.ndarray:
     """White numbers of an innovation, shape (2, hypotheses, axes)."""
-    first, both, second = gains.white
-    return np.stack((first * pose, both * pose + second * velocity))
+    white = gains.white[:2] * pose
+    white[1] += gains.white[2] * velocity
+    return white
 
 
 def _corrected(gains: Gains, state: np.ndarray, pose: np.ndarray, velocity: np.ndarray) -> np.ndarray:
     """State after an innovation."""
-    return np.stack(
-        [state[i] + gains.pose[i] * pose + gains.velocity[i] * velocity for i in range(len(state))]
-    )
+    return np.asarray(state + gains.pose * pose + gains.velocity * velocity)
 
 
 def _one_actuator(robot: Robot) -> tuple[float, float]:
