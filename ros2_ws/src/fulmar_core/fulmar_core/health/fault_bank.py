@@ -258,7 +258,7 @@ def _moved(state: np.ndarray, dt: float, half: float) -> np.ndarray:
 
 def _white(gains: Gains, pose: np.ndarray, velocity: np.ndarray) -> np.ndarray:
     """White numbers of an innovation, shape (2, hypotheses, axes)."""
-    white = gains.white[:2] * pose
+    white: np.ndarray = gains.white[:2] * pose
     white[1] += gains.white[2] * velocity
     return white
 
