@@ -16,6 +16,7 @@ import numpy as np
 from fulmar_core.errors import shortened
 from fulmar_core.robot_name import PLAIN, Frames
 from fulmar_core.safety.input_gate import Measurement
+from fulmar_core.sensors.imu import UNKNOWN
 from fulmar_core.sensors.kind import SensorKind
 from fulmar_core.sensors.reading import Reading
 from fulmar_core.state import RigidBodyState
@@ -24,6 +25,11 @@ NS = 1_000_000_000
 FRAME, BODY_FRAME = PLAIN.odom, PLAIN.base
 MOST_WAYPOINTS = 10_000  # more than that is a mistake, and would hold up the control loop
 MOST_OBSTACLES = 30  # ways around more would take longer to find than a control step lasts
+FIRST, LAST = (
+    0,
+    35,
+)  # entries of a covariance of 6 × 6 that say by -1, as in REP-145, that a part is not known
+PARTS_OF_ODOMETRY = ("position", "attitude", "velocity", "turn rate")
 ADD = 0  # action of a marker that is there
 
 
@@ -54,7 +60,16 @@ def measurement_of(message: Any, frames: Frames = PLAIN) -> Measurement:
     frame, child_frame = (
         shortened(frames.plain(name)) for name in (message.header.frame_id, message.child_frame_id)
     )
-    return Measurement(stamp_ns(message.header.stamp), frame, child_frame, state)
+    lacks = lacks_of(message.pose.covariance, message.twist.covariance)
+    return Measurement(stamp_ns(message.header.stamp), frame, child_frame, state, lacks)
+
+
+def lacks_of(pose: Sequence[float], twist: Sequence[float]) -> tuple[str, ...]:
+    """What a source of odometry does not know, by the covariances of pose and twist, 36 numbers each."""
+    if UNKNOWN not in (pose[FIRST], pose[LAST], twist[FIRST], twist[LAST]):
+        return ()
+    entries = (pose[FIRST], pose[LAST], twist[FIRST], twist[LAST])
+    return tuple(part for part, entry in zip(PARTS_OF_ODOMETRY, entries, strict=True) if entry == UNKNOWN)
 
 
 def reading_of(message: Any, kind: SensorKind) -> Reading:

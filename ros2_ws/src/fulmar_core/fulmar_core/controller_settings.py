@@ -100,7 +100,12 @@ class ControllerSettings:
     def input_gate(self, robot: Robot) -> InputGate:
         """What lets measurements in; in lock step they may repeat themselves, and episodes begin anywhere."""
         if self.lockstep:
-            return InputGate(robot.limits, frozen_after=0, turns_freely=robot.state_type is SpatialState)
+            return InputGate(
+                robot.limits,
+                frozen_after=0,
+                turns_freely=robot.state_type is SpatialState,
+                turns_only=robot.actuators.turns_only,
+            )
         odometry = robot.sensors.odometry
         repeats = self.odometry_may_repeat or not is_noisy(odometry.position, odometry.heading)
         return InputGate(
@@ -108,4 +113,5 @@ class ControllerSettings:
             frozen_after=0 if repeats else FROZEN_AFTER,
             jump_m=JUMP_M,
             turns_freely=robot.state_type is SpatialState,
+            turns_only=robot.actuators.turns_only,
         )

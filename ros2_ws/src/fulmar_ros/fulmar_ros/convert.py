@@ -17,12 +17,14 @@ from nav_msgs.msg import Odometry
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 
-from fulmar_bags.message_reader import BODY_FRAME, FRAME, NS, measurement_of, stamp_ns, turned
+from fulmar_bags.message_reader import BODY_FRAME, FRAME, NS, lacks_of, measurement_of, stamp_ns, turned
 from fulmar_core.robot_name import PLAIN, Frames
 from fulmar_core.safety.input_gate import Measurement
 from fulmar_core.sensors.odometer import OdometrySpec
 from fulmar_core.state import RigidBodyState
 from fulmar_ros.wire_image import LATEST_NS, WireImage, marks
+
+COVARIANCE = 36  # numbers of the covariance of a pose or a twist
 
 
 def stamp_of(time_ns: int) -> Time:
@@ -57,7 +59,7 @@ class OdometryWriter:
             speed, turn = spec.velocity.std, spec.yaw_rate.std
             self._message.twist.covariance = _diagonal((speed, speed, 0.0, 0.0, 0.0, turn))
         pose, twist = marks(7), marks(6, after=7)
-        self._fill(pose, twist)
+        _fill(self._message, pose, twist)
         self.image = WireImage(self._message, pose, twist, texts=(frame, child_frame))
 
     def raw(self, state: RigidBodyState, time_ns: int) -> bytes:
@@ -72,14 +74,15 @@ class OdometryWriter:
             time_ns: Time of measurement [ns].
         """
         self._message.header.stamp = stamp_of(time_ns)
-        self._fill(*_pose_and_twist(state))
+        _fill(self._message, *_pose_and_twist(state))
         return self._message
 
-    def _fill(self, pose: Sequence[float], twist: Sequence[float]) -> None:
-        position, q = self._message.pose.pose.position, self._message.pose.pose.orientation
-        position.x, position.y, position.z, q.x, q.y, q.z, q.w = pose
-        v, w = self._message.twist.twist.linear, self._message.twist.twist.angular
-        v.x, v.y, v.z, w.x, w.y, w.z = twist
+
+def _fill(message: Odometry, pose: Sequence[float], twist: Sequence[float]) -> None:
+    position, q = message.pose.pose.position, message.pose.pose.orientation
+    position.x, position.y, position.z, q.x, q.y, q.z, q.w = pose
+    v, w = message.twist.twist.linear, message.twist.twist.angular
+    v.x, v.y, v.z, w.x, w.y, w.z = twist
 
 
 def _pose_and_twist(state: RigidBodyState) -> tuple[Sequence[float], Sequence[float]]:
@@ -177,7 +180,12 @@ class OdometryReader:
     def __init__(self, frames: Frames = PLAIN) -> None:
         """Learn the layout of a robot's own odometry."""
         self._frames = frames
-        self._image = OdometryWriter(None, frame=frames.odom, child_frame=frames.base).image
+        message = Odometry(child_frame_id=frames.base)
+        message.header.frame_id = frames.odom
+        pose, twist = marks(7 + COVARIANCE), marks(6 + COVARIANCE, after=7 + COVARIANCE)
+        _fill(message, pose[:7], twist[:6])
+        message.pose.covariance, message.twist.covariance = np.array(pose[7:]), np.array(twist[6:])
+        self._image = WireImage(message, pose, twist, texts=(frames.odom, frames.base))
 
     def read(self, data: bytes) -> Measurement | None:
         """Read a message, without a check of its content; None for bytes that are no odometry."""
@@ -186,11 +194,11 @@ class OdometryReader:
             message = deserialized(data, Odometry)
             return None if message is None else measurement_of(message, self._frames)
         stamp, (pose, twist) = found
-        quat = pose[3:]
+        quat = pose[3:7]
         state = RigidBodyState(
-            np.array(pose[:3]), np.array(quat), np.array(turned(quat, twist[:3])), np.array(twist[3:])
+            np.array(pose[:3]), np.array(quat), np.array(turned(quat, twist[:3])), np.array(twist[3:6])
         )
-        return Measurement(stamp, FRAME, BODY_FRAME, state)
+        return Measurement(stamp, FRAME, BODY_FRAME, state, lacks_of(pose[7:], twist[6:]))
 
 
 @dataclass(frozen=True, slots=True)

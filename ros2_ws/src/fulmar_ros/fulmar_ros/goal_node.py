@@ -97,7 +97,12 @@ class GoalNode(Node):
         self._sequence = goal_sequence(goals, robot, as_path=self._settings.as_path)
         self._request_exit = request_exit
         # Controllers check for stuck sensors.
-        self._gate = InputGate(robot.limits, frozen_after=0, turns_freely=robot.state_type is SpatialState)
+        self._gate = InputGate(
+            robot.limits,
+            frozen_after=0,
+            turns_freely=robot.state_type is SpatialState,
+            turns_only=robot.actuators.turns_only,
+        )
         self._lock = threading.Lock()
         self._sent: Goal | None = None
         self._newest: Measurement | None = None

@@ -15,6 +15,9 @@ BACK_NS = 1_000_000_000  # further back than this is no reordering: whoever meas
 JUMP_M = 1.0  # beyond what speed explains: a correction of a fix or of a filter is less
 FORWARD_NS = 10_000_000_000  # further ahead than this is no gap: it is another clock, or one wrong stamp
 
+PLACE = ("position", "velocity")  # parts of odometry that a robot needs which moves from place to place
+TURNING = ("attitude", "turn rate")  # that every robot needs
+
 
 @dataclass(frozen=True, slots=True)
 class Measurement:
@@ -24,6 +27,7 @@ class Measurement:
     frame: str
     child_frame: str
     state: RigidBodyState
+    lacks: tuple[str, ...] = ()  # of PLACE and TURNING: what its source says that it does not know
 
 
 class InputGate:
@@ -40,6 +44,7 @@ class InputGate:
         frozen_after: int = FROZEN_AFTER,
         jump_m: float = math.inf,
         turns_freely: bool = False,
+        turns_only: bool = False,
     ) -> None:
         """Check against a robot's limits.
 
@@ -50,7 +55,9 @@ class InputGate:
             jump_m: So much further from the last place than the highest speed explains is a jump; infinite where
                 episodes may begin anywhere [m].
             turns_freely: Whether the robot turns about any axis; the limit then counts for the length of its turn rate.
+            turns_only: Whether nothing moves the robot from its place, which its source then need not know.
         """
+        self._needs = TURNING if turns_only else (*PLACE, *TURNING)
         self._turns_freely = turns_freely
         self._limits, self._jump_m = limits, jump_m
         self._repetition = RepetitionCheck(after=frozen_after)
@@ -59,7 +66,11 @@ class InputGate:
 
     def problem(self, measurement: Measurement) -> str | None:
         """Reason, for people, why the next measurement is rejected; None if it may be used."""
-        reason = self._frame_problem(measurement) or self._value_problem(measurement.state)
+        reason = (
+            self._frame_problem(measurement)
+            or self._lack_problem(measurement)
+            or self._value_problem(measurement.state)
+        )
         if reason is None and self._last is not None:
             reason = self._stamp_problem(measurement, measurement.stamp_ns - self._last.stamp_ns)
         if reason is None:
@@ -77,6 +88,12 @@ class InputGate:
             return (
                 f"odom is '{measurement.frame}' → '{measurement.child_frame}', must be 'odom' → 'base_link'"
             )
+        return None
+
+    def _lack_problem(self, measurement: Measurement) -> str | None:
+        lacks = [part for part in measurement.lacks if part in self._needs]
+        if lacks:
+            return f"odom has no {' and no '.join(lacks)}: the covariance of its source says so by -1"
         return None
 
     def _value_problem(self, state: RigidBodyState) -> str | None:
