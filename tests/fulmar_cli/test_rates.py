@@ -42,7 +42,8 @@ def fulmar(*arguments, cwd: Path):
     finally:
         os.chdir(before)
     refused = "" if done.exception is None else str(done.exception)
-    return SimpleNamespace(returncode=done.exit_code, stdout=done.stdout, stderr=done.stderr + refused)
+    error = done.stderr + refused
+    return SimpleNamespace(returncode=done.exit_code, stdout=done.stdout, stderr=error, error=done.exception)
 
 
 def whole(file: EventFile) -> Events:
@@ -176,3 +177,62 @@ def test_a_bag_without_events_and_a_robot_without_cameras_are_refused_in_words(t
     assert done.returncode != 0 and "two numbers of pixels" in done.stderr
     done = fulmar("rates", AEDAT4, AEDAT4, AEDAT4, cwd=tmp_path)
     assert done.returncode != 0 and "has 2 event cameras" in done.stderr
+
+
+@pytest.mark.parametrize("kind", [np.int8, np.uint8, np.int64, np.uint32])
+def test_minus_one_stands_for_darker_in_integers_of_any_kind(kind, tmp_path, recorded):
+    with np.errstate(all="ignore"):
+        p = np.where(recorded.p > 0, 1, -1).astype(np.int64).astype(kind)
+    found = whole(open_event_file(write_dsec(tmp_path / "pm.h5", recorded, p=p), SIZE))
+    np.testing.assert_array_equal(found.p, recorded.p)
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "said"),
+    [
+        ("p", lambda p: 2 * p, "p reaches from 0 to 2, must lie in 0 to 1"),
+        ("x", lambda x: x.astype(np.int32) + 65536, "x reaches from 65"),
+        ("y", lambda y: y.astype(np.int32) - 300, "y reaches from -"),
+        ("t", lambda t: t * 1e-6, "'events/t' is float64 of shape"),
+        ("p", lambda p: np.stack([p, p]), "'events/p' is uint8 of shape (2, "),
+    ],
+)
+def test_numbers_that_no_event_has_are_refused_in_one_line(name, change, said, tmp_path, recorded):
+    begin = int(recorded.t[0]) // 1000
+    arrays = {
+        "x": recorded.x,
+        "y": recorded.y,
+        "t": (recorded.t.astype(np.int64) // 1000 - begin),
+        "p": recorded.p,
+    }
+    path = write_dsec(tmp_path / "odd.h5", recorded, **{name: change(arrays[name])})
+    done = fulmar("rates", path, "--size", "320x240", cwd=tmp_path)
+    assert done.returncode != 0
+    assert said in done.stderr
+    assert isinstance(done.error, BagError)
+
+
+def test_a_table_of_columns_is_refused_by_its_layout(tmp_path):
+    with h5py.File(tmp_path / "columns.h5", "w") as file:
+        file["events"] = np.zeros((10, 4))
+    with pytest.raises(BagError, match="'events' is one table of columns"):
+        open_event_file(tmp_path / "columns.h5", SIZE)
+
+
+@pytest.mark.parametrize("offset", [np.zeros(3, dtype=np.int64), 0.5])
+def test_an_offset_that_is_no_whole_number_is_refused(offset, dsec):
+    with h5py.File(dsec, "r+") as file:
+        del file["t_offset"]
+        file["t_offset"] = offset
+    with pytest.raises(BagError, match="'t_offset' must be one whole number"):
+        open_event_file(dsec, SIZE)
+
+
+@pytest.mark.parametrize("later_us", [3_600_000_000, 2_000_000])
+def test_recordings_that_do_not_overlap_in_time_are_refused(later_us, dsec, tmp_path, recorded):
+    right = write_dsec(tmp_path / "right.h5", recorded)
+    with h5py.File(right, "r+") as file:
+        file["t_offset"][()] = OFFSET_US + later_us
+    done = fulmar("rates", dsec, right, "--size", "320x240", cwd=tmp_path)
+    assert isinstance(done.error, BagError)
+    assert "do not overlap in time: 'events' ends" in done.stderr

@@ -15,12 +15,13 @@ from typing import Any
 import numpy as np
 
 from fulmar_core.errors import BagError, ConfigError
-from fulmar_core.sky.events import Events, joined
+from fulmar_core.sky.events import Events, as_polarities, joined
 
 DSEC, AEDAT4 = (".h5", ".hdf5"), (".aedat4",)
 BLOCK = 1_000_000  # events that are read at once
 LONGEST_PAUSE_S = 10.0  # through a longer one no empty packets are made
 US = 1_000  # [ns]
+LAYOUT = "DSEC's files have events/x, y, t [µs] and p, each a row of its own, and t_offset [µs]."
 
 
 @dataclass(frozen=True)
@@ -63,8 +64,29 @@ class EventFile:
         read = _dsec if self.path.suffix in DSEC else _aedat4
         for x, y, t_ns, p in read(self.path):
             if len(t_ns):
+                p = as_polarities(p)
+                self._refuse_beyond(x, y, t_ns, p)
                 x, y, p = x.astype(np.uint16), y.astype(np.uint16), p.astype(np.uint8)
                 yield Events(x, y, t_ns.astype(np.uint64), p, self.width, self.height)
+
+    def _refuse_beyond(self, x: np.ndarray, y: np.ndarray, t_ns: np.ndarray, p: np.ndarray) -> None:
+        """Refuse numbers that an event does not have, before smaller integers wrap them around.
+
+        Raises:
+            BagError: As said.
+        """
+        for name, values, most in (
+            ("x", x, 2**16 - 1),
+            ("y", y, 2**16 - 1),
+            ("t", t_ns, 2**63 - 1),
+            ("p", p, 1),
+        ):
+            least, greatest = int(values.min()), int(values.max())
+            if least < 0 or greatest > most:
+                hint = ": 1 stands for brighter, 0 or -1 for darker" if name == "p" else ""
+                raise BagError(
+                    f"{self.path}: {name} reaches from {least} to {greatest}, must lie in 0 to {most}{hint}."
+                )
 
 
 def is_event_file(path: Path) -> bool:
@@ -110,21 +132,50 @@ def _dsec(path: Path) -> Iterator[tuple[np.ndarray, ...]]:
 
     try:
         with h5py.File(path) as file:
+            if isinstance(file.get("events"), h5py.Dataset):
+                raise BagError(f"{path}: 'events' is one table of columns. {LAYOUT}")
             missing = [name for name in ("events/x", "events/y", "events/t", "events/p") if name not in file]
             if missing:
-                raise BagError(f"{path}: '{missing[0]}' is missing. DSEC's files have events/x, y, t and p.")
+                raise BagError(f"{path}: '{missing[0]}' is missing. {LAYOUT}")
             parts = [file[f"events/{name}"] for name in "xytp"]
+            for name, part in zip("xytp", parts, strict=True):
+                _refuse_layout(path, f"events/{name}", part)
             lengths = {len(part) for part in parts}
             if len(lengths) != 1:
                 raise BagError(
                     f"{path}: events/x, y, t and p have lengths {', '.join(str(len(p)) for p in parts)}."
                 )
-            offset_ns = US * int(file["t_offset"][()]) if "t_offset" in file else 0
+            offset_ns = US * _offset_us(path, file["t_offset"]) if "t_offset" in file else 0
             for first in range(0, max(lengths.pop(), 1), BLOCK):
                 x, y, t, p = (part[first : first + BLOCK] for part in parts)
                 yield x, y, US * t.astype(np.int64) + offset_ns, p
     except (OSError, RuntimeError) as error:
         raise BagError(f"{path}: cannot be read as HDF5: {error}") from error
+
+
+def _refuse_layout(path: Path, name: str, part: Any) -> None:
+    """Refuse what is no row of whole numbers.
+
+    Raises:
+        BagError: As said.
+    """
+    shape, kind = getattr(part, "shape", None), getattr(part, "dtype", None)
+    if shape is None or len(shape) != 1 or kind is None or kind.kind not in "iub":
+        found = "a group" if shape is None else f"{kind} of shape {shape}"
+        seconds = " Times in seconds: multiply them by 1e6, and round." if name == "events/t" else ""
+        raise BagError(f"{path}: '{name}' is {found}, must be a row of whole numbers. {LAYOUT}{seconds}")
+
+
+def _offset_us(path: Path, part: Any) -> int:
+    """Offset of the times [µs].
+
+    Raises:
+        BagError: It is no whole number.
+    """
+    value = np.asarray(part[()]) if getattr(part, "shape", None) is not None else np.zeros(0)
+    if value.size != 1 or value.dtype.kind not in "iu":
+        raise BagError(f"{path}: 't_offset' must be one whole number of microseconds. {LAYOUT}")
+    return int(value.reshape(-1)[0])
 
 
 def _aedat4(path: Path) -> Iterator[tuple[np.ndarray, ...]]:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_core.sky.events import Events
+from fulmar_core.sky.events import Events, as_polarities
 
 POINT = np.dtype([("x", "<u2"), ("y", "<u2"), ("t", "<u8"), ("p", "u1")])
 UINT8, UINT16, UINT32 = 2, 4, 6  # of sensor_msgs/PointField
@@ -35,4 +35,4 @@ def events_of_cloud(message: Any) -> tuple[Events | None, str]:
     if len(data) != size * POINT.itemsize:
         return None, f"it has {len(data)} bytes, and {size} events have {size * POINT.itemsize}"
     points = np.frombuffer(data, dtype=POINT)
-    return Events(points["x"], points["y"], points["t"], points["p"], 0, 0), ""
+    return Events(points["x"], points["y"], points["t"], as_polarities(points["p"]), 0, 0), ""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import heapq
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -28,6 +28,7 @@ from fulmar_core.topics import EVENTS, EVENTS_2
 from fulmar_evaluation.event_bag import CAMERAS
 
 WIRES = {"events": EVENTS, "events_2": EVENTS_2}
+LONGEST_PAUSE_S = 600.0  # in which a camera that looks at the stars may see nothing [s]
 PACKET_S = 0.05  # of recordings that have no packets
 Packet = tuple[int, str, Events]  # end [ns], name of the reading, events
 
@@ -133,11 +134,14 @@ def rates_of(
     words: Counter[str] = Counter()
     first_ns = end_ns = -1
     events = 0
+    spans: dict[str, tuple[int, int]] = {}  # first and last end of a packet of each camera [ns]
     for packet in packets:
         each(packet)
         end_ns, name, some = packet
         first_ns = end_ns if first_ns < 0 else first_ns
         events += len(some)
+        spans[name] = spans.get(name, (end_ns, end_ns))[0], end_ns
+        _refuse_apart(spans, LONGEST_PAUSE_S)
         before = estimator.problem
         refusal = estimator.take(name, Reading(some, end_ns))
         if refusal is not None:
@@ -147,6 +151,7 @@ def rates_of(
             found.append((estimate.stamp_ns, estimate.value, np.sqrt(np.diag(estimate.covariance))))
         elif estimator.problem and estimator.problem != before:
             words[estimator.problem] += 1
+    _refuse_apart(spans, 0.0)
     if first_ns < 0:
         raise BagError("there is no event in it.")
     if not found and not words:
@@ -155,6 +160,22 @@ def rates_of(
     rates = np.array([rate for _, rate, _ in found]).reshape(-1, 3)
     stds = np.array([std for _, _, std in found]).reshape(-1, 3)
     return Rates(times, rates, stds, (end_ns - first_ns) / 1e9, events, words)
+
+
+def _refuse_apart(spans: Mapping[str, tuple[int, int]], pause_s: float) -> None:
+    """Refuse cameras that recorded nothing at the same time; so far they may be apart by a pause [s].
+
+    Raises:
+        BagError: As said.
+    """
+    if len(spans) < 2:
+        return
+    (first, (_, first_until)), (second, (begin, _)) = sorted(spans.items(), key=lambda span: span[1])
+    if begin - first_until > 1e9 * pause_s:
+        raise BagError(
+            f"the recordings do not overlap in time: '{first}' ends {(begin - first_until) / 1e9:.6g} s before "
+            f"'{second}' begins. They must be of one clock: do both files have 't_offset'?"
+        )
 
 
 def _of_file(file: EventFile, name: str) -> Iterator[Packet]:

@@ -395,6 +395,7 @@ class ControllerNode(LifecycleNode):
     def _publish_idle_status(self) -> None:
         """Publish the status where no control step does it."""
         self._status.wire_problems = self._wire_watch.look()
+        self._status.inputs_refused = self._satellite.refused, self._satellite.refusal
         flags = self._guarded.flags
         if self.settings.lockstep or not flags.activated or flags.latched_fault:
             self._publish_status()

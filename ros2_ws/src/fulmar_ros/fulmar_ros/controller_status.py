@@ -23,6 +23,8 @@ class ControllerStatus:
         steps: Control steps so far.
         inference_ms: Time that the controller took to act.
         wire_problems: Publishers from which nothing arrives, in words.
+        inputs_refused: How many readings beside the odometry were refused, and why the newest of them was; empty if it
+            was not.
     """
 
     def __init__(self, swap: PolicySwap, identity: Mapping[str, str], *, goals_streamed: bool) -> None:
@@ -31,6 +33,7 @@ class ControllerStatus:
         self.steps = 0
         self.inference_ms = Spread()
         self.wire_problems: list[str] = []
+        self.inputs_refused = 0, ""
         self._said: tuple[object, ...] = ()
         self._said_at = 0.0
 
@@ -64,6 +67,7 @@ class ControllerStatus:
             switch.fell_back,
             self._swap.said,
             *self.wire_problems,
+            bool(self.inputs_refused[1]),
             beliefs.dead,
             beliefs.open,
             len(beliefs.words),
@@ -77,7 +81,7 @@ class ControllerStatus:
         unconverged = guard.flags.unconverged
         level = {Mode.ACTIVE: "ok", Mode.FAULT: "error"}.get(decision.mode, "warn")
         level = "error" if unconverged else level
-        doubtful = switch.fell_back or self.wire_problems or beliefs.words
+        doubtful = switch.fell_back or self.wire_problems or beliefs.words or self.inputs_refused[1]
         level = "warn" if level == "ok" and doubtful else level
         age_ms = (time.monotonic_ns() - last_input_ns) / 1e6 if last_input_ns else 0.0
         values = {
@@ -102,6 +106,8 @@ class ControllerStatus:
             "goals_done": str(mission.done),
             "goal_distance_m": f"{guard.flags.goal_distance:.3f}",
             "at_goal": str(guard.at_goal()).lower(),
+            "inputs_refused": str(self.inputs_refused[0]),
+            "last_input_refusal": self.inputs_refused[1],
             WIRE_WARNINGS: BETWEEN.join(self.wire_problems),
             "steps": str(self.steps),
             "observation_age_ms": f"{age_ms:.1f}",

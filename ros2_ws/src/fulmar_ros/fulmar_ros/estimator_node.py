@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import sys
 import time
+import traceback
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -19,8 +21,10 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 
 from fulmar_bags.message_reader import stamp_ns
+from fulmar_core.errors import shortened
 from fulmar_core.estimation.estimator import LACKS_NOTHING, Estimate
 from fulmar_core.estimation.kinds import estimator_kind, load_estimator, make_estimator
+from fulmar_core.estimation.reading_check import reading_problem
 from fulmar_core.process import CONTROL_PRIORITY, take_priority_with_helpers
 from fulmar_core.robot import load_robot
 from fulmar_core.sensors.reading import Reading
@@ -37,6 +41,7 @@ from fulmar_ros.runtime import RequestExit, run_node
 WATCH_S = 0.1
 STATUS_PERIOD_S = 0.5
 DEPTHS = {"best_effort": 5, "stream": 50}  # by delivery: of a stream each reading counts
+BROKEN = "the estimator began anew after a message that it cannot use, of"
 NEW_EPOCH_NS = 1_000_000_000  # an estimate so much older than the last one is of a new epoch
 
 
@@ -68,6 +73,7 @@ class EstimatorNode(Node):
         super().__init__("estimator", cli_args=cli_args)
         settings = read_parameters(self, EstimatorNodeSettings)
         robot, kind = load_robot(settings.robot), estimator_kind(settings.estimator)
+        self._robot = robot
         self._estimator = make_estimator(settings.estimator, robot, exact_sensors=settings.exact_sensors)
         self._bridge_s = load_estimator(settings.estimator).bridge_s
         self._frames = own_frames(self, robot)
@@ -121,7 +127,7 @@ class EstimatorNode(Node):
         self.create_subscription(kind, wire.name, partial(self._on_message, name, topic, read), qos)
 
     def _on_message(self, name: str, topic: str, read: Read, message: Any) -> None:
-        reading = read(message, self._frames)
+        reading = self._unbroken(name, read, message, self._frames)
         if self._period is not None:
             self._period.add(topic, stamp_ns(message.header.stamp), reading)
         elif reading is not None and self._take(name, reading):
@@ -133,7 +139,9 @@ class EstimatorNode(Node):
             take_priority_with_helpers(CONTROL_PRIORITY)  # a controller waits for us
             self._prior = True
         begun_s = time.perf_counter()
-        refusal = reading if isinstance(reading, str) else self._estimator.take(name, reading)
+        refusal = reading
+        if not isinstance(reading, str):
+            refusal = self._unbroken(name, self._refusal_of, name, reading)
         self._computation_ms.add(1e3 * (time.perf_counter() - begun_s))
         if refusal is not None:
             self._refused += 1
@@ -141,6 +149,21 @@ class EstimatorNode(Node):
             return False
         self._received_s = time.monotonic()
         return True
+
+    def _unbroken(self, name: str, use: Callable[..., Any], *given: Any) -> Any:
+        """What a function makes of a message; where it raises, its error in words, and the estimator begins anew.
+
+        Without an estimator a robot has no estimate at all: it never ends by a message, whatever that holds.
+        """
+        try:
+            return use(*given)
+        except Exception as error:  # noqa: BLE001 - whatever a message holds must not end the estimates
+            self.get_logger().error(traceback.format_exc())
+            self._estimator.reset()
+            return f"{BROKEN} '{name}': {type(error).__name__}: {shortened(str(error))}"
+
+    def _refusal_of(self, name: str, reading: Reading) -> str | None:
+        return reading_problem(name, reading, self._robot) or self._estimator.take(name, reading)
 
     def _publish(self) -> None:
         """Publish the estimate, if it is newer than the last one."""
@@ -168,9 +191,12 @@ class EstimatorNode(Node):
         return since_ns < -NEW_EPOCH_NS or since_ns >= max(1, self._every_ns)
 
     def _estimate(self, time_ns: int | None) -> Estimate | None:
-        estimate = self._estimator.estimate(time_ns)
+        estimate = self._unbroken("estimate", self._estimator.estimate, time_ns)
+        if isinstance(estimate, str):
+            self._problem = self._refusal = estimate
+            return None
         self._problem = self._estimator.problem
-        return estimate
+        return estimate  # type: ignore[no-any-return]
 
     def _note(self, estimate: Estimate) -> None:
         if self._transform is not None:

@@ -12,17 +12,26 @@ from sensor_msgs.msg import JointState
 from fulmar_bags.message_reader import reading_of, stamp_ns
 from fulmar_core.actuators.reaction_wheels import ReactionWheels
 from fulmar_core.control_loop import ControlLoop
+from fulmar_core.inertia_estimation.momentum_balance import is_body
 from fulmar_core.robot import Robot
 from fulmar_core.sensors.table import SENSORS
 from fulmar_core.topics import INERTIA, SENSOR_WIRES
 from fulmar_ros.qos import subscriber_qos
 
 WHEELS_LAST_NS = 1_000_000_000  # older speeds are not used [ns]
+MOST_INERTIA = (
+    5.0  # of a body by that of its file: tanks that run dry and panels that unfold change it by less [-]
+)
 INERTIA_LASTS_NS = 10_000_000_000  # an estimate that is not repeated for so long was withdrawn [ns]
 
 
 class SatelliteInputs:
-    """Subscribes wheel speeds and inertia of a robot with reaction wheels; of any other robot nothing."""
+    """Subscribes wheel speeds and inertia of a robot with reaction wheels; of any other robot nothing.
+
+    Attributes:
+        refused: How many messages were refused.
+        refusal: Why the newest of them was; empty if the newest message was not.
+    """
 
     def __init__(self, node: Node, robot: Robot, on_wheels: Callable[[], None], *, lockstep: bool) -> None:
         """Create the subscriptions.
@@ -33,11 +42,13 @@ class SatelliteInputs:
             on_wheels: Called after each message with speeds.
             lockstep: Whether a step waits for the speeds of its time.
         """
+        self._robot = robot
         self._names: tuple[str, ...] = ()
         self._waits = False
         self._wheels: tuple[int, np.ndarray] | None = None  # stamp [ns], and speeds, shape (1, count)
         self._inertia: tuple[int, np.ndarray] | None = None
         self._on_wheels, self._subscriptions = on_wheels, []
+        self.refused, self.refusal = 0, ""
         if not isinstance(robot.actuators, ReactionWheels):
             return
         self._names = robot.actuators.wheel_names
@@ -68,11 +79,12 @@ class SatelliteInputs:
         loop.inertia = _young(self._inertia, time_ns, INERTIA_LASTS_NS)
 
     def _take_wheels(self, message: JointState) -> None:
-        by_name = dict(
-            zip(message.name, reading_of(message, SENSORS["wheels"]).value.speeds.tolist(), strict=False)
-        )
-        speeds = np.array([[by_name.get(name, np.nan) for name in self._names]])
-        if np.isfinite(speeds).all():  # speeds that are not numbers count as not measured
+        reading = reading_of(message, SENSORS["wheels"])
+        if self._accept(
+            SENSORS["wheels"].problem(reading, self._robot)
+        ):  # refused ones count as not measured
+            by_name = dict(zip(message.name, reading.value.speeds.tolist(), strict=True))
+            speeds = np.array([[by_name[name] for name in self._names]])
             self._wheels = stamp_ns(message.header.stamp), speeds
             self._on_wheels()
 
@@ -81,8 +93,23 @@ class SatelliteInputs:
         tensor = np.array(
             [[its.ixx, its.ixy, its.ixz], [its.ixy, its.iyy, its.iyz], [its.ixz, its.iyz, its.izz]]
         )
-        if np.isfinite(tensor).all() and np.linalg.eigvalsh(tensor)[0] > 0.0:
+        if self._accept(_inertia_problem(tensor, self._robot.body.inertia_matrix)):
             self._inertia = stamp_ns(message.header.stamp), tensor
+
+    def _accept(self, problem: str) -> bool:
+        self.refusal = problem
+        self.refused += bool(problem)
+        return not problem
+
+
+def _inertia_problem(tensor: np.ndarray, known: np.ndarray) -> str:
+    """Why an estimate is the inertia of no body that is built as a robot's file says."""
+    if not np.isfinite(tensor).all() or not is_body(tensor):
+        return "the inertia on the wire is that of no body"
+    shares = np.linalg.eigvalsh(tensor) / np.linalg.eigvalsh(known)
+    if shares.min() < 1.0 / MOST_INERTIA or shares.max() > MOST_INERTIA:
+        return f"the inertia on the wire differs from that of the robot's file by a factor of over {MOST_INERTIA:g}"
+    return ""
 
 
 def _young(newest: tuple[int, np.ndarray] | None, time_ns: int, lasts_ns: int) -> np.ndarray | None:

@@ -26,6 +26,9 @@ NO_EVENTS = "no events yet. Does the camera run?"
 LEAST_PX, LEAST_PX_LONG = 1.0, 0.5
 BOUND_PX = 2.0  # a star that moves so far in a window makes events enough to be found
 UNKNOWN_STD = 1.0  # of an axis about which nothing is observable [rad/s]
+LATE_NS, EARLY_NS = 10_000_000_000, 1_000_000_000  # from an event to the stamp of its packet, at most [ns]
+APART_NS = 1_000_000_000  # between packets of two cameras that come one after the other, at most [ns]
+APART_PACKETS = 100  # of one camera alone that are of another time: then the other camera has fallen silent
 SILENT = 3  # windows without a camera's events, after which the other goes on alone
 
 
@@ -58,6 +61,8 @@ class EventRateEstimator:
         self._spacing_ns: dict[str, int] = {}  # shortest time between two packets, by camera
         self._until_ns: dict[str, int] = {}  # end of the newest packet, by camera
         self._window_ns = self._begun_ns = -1  # where the next window begins, and where the first one began
+        self._newest = ("", 0)  # camera and end of the newest packet that was taken
+        self._apart = 0  # packets of the other camera since then that were too far from it
         self._estimate: Estimate | None = None
         self._noise_hz = 0.0
         self._events_hz = 0.0
@@ -79,9 +84,12 @@ class EventRateEstimator:
             return f"packet of '{name}' comes from a camera of {its} pixels, and the robot's has {ours}"
         if problem := packet.problem():
             return f"packet of '{name}': {problem}"
+        if problem := self._clock_problem(name, packet, reading.stamp_ns):
+            return problem
         if problem := self._times.problem(f"'{name}'", reading.stamp_ns):
             return problem
         end_ns = reading.stamp_ns or 0
+        self._newest, self._apart = (name, end_ns), 0
         self._count_lost(name, end_ns)
         self._until_ns[name] = end_ns
         self._packets[name].append((end_ns, packet))
@@ -90,6 +98,24 @@ class EventRateEstimator:
             self._window_ns = self._begun_ns = begin
         self._run()
         return None
+
+    def _clock_problem(self, name: str, packet: Events, end_ns: int | None) -> str:
+        """Why the times of a packet are of another clock than its stamp, or than the packets of the other camera."""
+        if end_ns is None:
+            return ""
+        if len(packet):
+            late_ns = (end_ns - int(packet.t[0]), end_ns - int(packet.t[-1]))
+            if max(late_ns) > LATE_NS or min(late_ns) < -EARLY_NS:
+                worst_s = max(late_ns, key=abs) / 1e9
+                return (
+                    f"packet of '{name}': its events lie {worst_s:.6g} s before its stamp, of another clock"
+                )
+        other, other_ns = self._newest
+        if other in ("", name) or abs(end_ns - other_ns) <= APART_NS or self._apart >= APART_PACKETS:
+            return ""
+        self._apart += 1
+        apart_s = (end_ns - other_ns) / 1e9
+        return f"packet of '{name}' is {apart_s:+.6g} s apart from those of '{other}': their clocks differ"
 
     def _count_lost(self, name: str, end_ns: int) -> None:
         last_ns = self._until_ns.get(name)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -11,11 +12,14 @@ import numpy as np
 from fulmar_core.plausible_ranges import Plausible
 from fulmar_core.sensors.kind import MessageFields, SensorKind, Truth
 from fulmar_core.sensors.odometer import Channel, largest_reading
+from fulmar_core.sensors.ranges import named_problem
 from fulmar_core.sensors.reading import Reading
 from fulmar_core.sensors.sampling import Sampling, sensor_rng
 from fulmar_core.wire import Wire
 
 NAME = "air_data"
+# What probes can report whose file states no limit: below the speed of sound; a whole turn; the stratosphere.
+MOST = {"airspeed": 340.0, "alpha": math.pi, "beta": math.pi, "height": 5e4}  # m/s, rad, rad, m
 
 
 @dataclass(frozen=True)
@@ -104,6 +108,14 @@ def _read(values: Sequence[Any]) -> Reading:
     return Reading(AirData(tuple(names), np.array(numbers, dtype=float)))
 
 
+def _problem(reading: Reading, robot: Any) -> str:
+    spec = robot.sensors.specs.get(NAME, AirDataSpec())
+    largest = {
+        name: channel.limit or MOST[name] for name, channel in zip(spec.names, spec.channels, strict=True)
+    }
+    return named_problem("probe", reading.value.names, reading.value.values, largest)
+
+
 KIND = SensorKind(
     spec=AirDataSpec,
     wire=Wire(
@@ -113,6 +125,7 @@ KIND = SensorKind(
     frame="base_link",
     message=MessageFields(paths=("name", "position"), write=_write, read=_read),
     simulate=AirProbes,
+    problem=_problem,
     plausible=(
         Plausible("airspeed.std", "m/s", (0.0, 20.0), (0.0, 3.0), "pitot tubes"),
         Plausible("alpha.std", "rad", (0.0, 0.5), (0.0, 0.1), "vanes"),

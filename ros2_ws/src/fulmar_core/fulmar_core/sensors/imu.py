@@ -14,11 +14,16 @@ import numpy as np
 from fulmar_core.counter_rng import NOISE
 from fulmar_core.sensors.kind import MessageFields, SensorKind, Truth
 from fulmar_core.sensors.odometer import Channel, largest_reading
+from fulmar_core.sensors.ranges import size_problem
 from fulmar_core.sensors.reading import Reading
 from fulmar_core.wire import Wire
 
 INERTIAL = 4  # stream of the unit's random numbers, beside that of the odometry
 UNKNOWN = -1.0  # REP-145: first covariance entry of a field that is absent
+# What no inertial unit reports: 200 g, and 20,000 °/s [m/s², rad/s]. Where a gyroscope's own range ends, estimators
+# need the reading: the body may turn faster.
+MOST_FORCE, MOST_RATE = 2000.0, 350.0
+OVERRANGE = 1.05  # specific force by the limit of the robot's file that its unit can report [-]
 NO_GYROSCOPE = "the inertial unit reports no turn rate: it has no gyroscope"
 
 
@@ -203,6 +208,21 @@ def _read(values: Sequence[Any]) -> Reading:
     return Reading(ImuSample(force, turn))
 
 
+def _problem(reading: Reading, robot: Any) -> str:
+    sample, spec = reading.value, robot.sensors.imu
+    if not sample.is_finite:
+        return "the inertial reading holds a value that is not finite"
+    if not (sample.has_force or sample.has_rate):
+        return "the inertial reading has neither a specific force nor a turn rate"
+    parts = []
+    if sample.has_force:
+        most = OVERRANGE * spec.accelerometer.limit or MOST_FORCE
+        parts += [("the accelerometer", each, most) for each in sample.specific_force.tolist()]
+    if sample.has_rate:
+        parts += [("the gyroscope", each, MOST_RATE) for each in sample.angular_velocity.tolist()]
+    return size_problem(parts)
+
+
 KIND = SensorKind(
     spec=ImuSpec,
     wire=Wire(
@@ -212,4 +232,5 @@ KIND = SensorKind(
     frame="imu_link",
     message=MessageFields(PATHS, _write, _read),
     simulate=SimulatedImu,
+    problem=_problem,
 )  # fmt: skip

@@ -66,4 +66,6 @@ class SensorKind:
     message: MessageFields | None  # None: `fulmar_ros.sensor_wires` has a writer of its own for it
     # A spec, and whether there are errors of measurement, to a sensor; None: the simulated world itself measures it.
     simulate: Callable[[Any, bool], SimulatedSensor] | None
+    # Why a reading cannot come from the device of a robot (`fulmar_core.robot.Robot`); empty if it can.
+    problem: Callable[[Reading, Any], str] = lambda _reading, _robot: ""
     plausible: tuple[Plausible, ...] = ()  # ranges of the spec's numbers; keys relative to the spec

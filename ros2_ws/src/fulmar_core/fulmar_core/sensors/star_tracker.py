@@ -7,12 +7,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from fulmar_core.plausible_ranges import Plausible
 from fulmar_core.rotation import multiply
 from fulmar_core.sensors.kind import MessageFields, SensorKind, Truth
+from fulmar_core.sensors.ranges import attitude_problem, covariance_problem
 from fulmar_core.sensors.reading import Reading
 from fulmar_core.sensors.sampling import Sampling, sensor_rng
 from fulmar_core.wire import Wire
@@ -98,6 +100,11 @@ def _write(reading: Reading, _spec: StarTrackerSpec) -> list[float]:
     return list(attitude.tolist())
 
 
+def _problem(reading: Reading, _robot: Any) -> str:
+    problem = attitude_problem(reading.value) or covariance_problem(reading.covariance)
+    return problem and f"the star tracker's reading is refused: {problem}"
+
+
 KIND = SensorKind(
     spec=StarTrackerSpec,
     wire=Wire(
@@ -112,6 +119,7 @@ KIND = SensorKind(
         read=lambda values: Reading(np.array(values, dtype=float)),
     ),
     simulate=StarTracker,
+    problem=_problem,
     plausible=(
         *(
             Plausible(key, "rad", (0.0, 0.2), (0.0, 0.01), "data sheets: 1 to 200 arcseconds; one is 4.85e-6 rad")

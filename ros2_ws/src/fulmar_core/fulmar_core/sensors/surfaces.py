@@ -12,10 +12,12 @@ from fulmar_core.actuators.control_surfaces import is_throttle
 from fulmar_core.plausible_ranges import Plausible
 from fulmar_core.sensors.joints import JointSensors, JointSpec
 from fulmar_core.sensors.kind import MessageFields, SensorKind, Truth
+from fulmar_core.sensors.ranges import named_problem
 from fulmar_core.sensors.reading import Reading
 from fulmar_core.wire import Wire
 
 NAME = "surfaces"
+OVERTRAVEL = 1.5  # position that a servo can report, by the limit of the robot's file [-]
 
 
 @dataclass(frozen=True)
@@ -55,6 +57,12 @@ def _read(values: Sequence[Any]) -> Reading:
     return Reading(SurfacePositions(tuple(names), np.array(positions, dtype=float)))
 
 
+def _problem(reading: Reading, robot: Any) -> str:
+    names, most = robot.actuators.names, robot.actuators.scale
+    ranges = {name: OVERTRAVEL * float(each) for name, each in zip(names, most, strict=True)}
+    return named_problem("actuator", reading.value.names, reading.value.positions, ranges)
+
+
 KIND = SensorKind(
     spec=SurfacesSpec,
     wire=Wire(
@@ -65,6 +73,7 @@ KIND = SensorKind(
     frame="base_link",
     message=MessageFields(paths=("name", "position"), write=_write, read=_read),
     simulate=ServoSensors,
+    problem=_problem,
     plausible=(
         Plausible("std", "rad", (0.0, 0.5), (0.0, 0.05), "potentiometers of servos"),
         Plausible("quantum", "rad", (0.0, 0.2), (0.0, 0.02), "magnetic encoders: 12 bit a turn"),

@@ -11,10 +11,12 @@ import numpy as np
 from fulmar_core.plausible_ranges import Plausible
 from fulmar_core.sensors.joints import JointSensors, JointSpec
 from fulmar_core.sensors.kind import MessageFields, SensorKind, Truth
+from fulmar_core.sensors.ranges import named_problem
 from fulmar_core.sensors.reading import Reading
 from fulmar_core.wire import Wire
 
 NAME = "wheels"
+OVERSPEED = 1.2  # speed that a tachometer can report, by the top speed of the robot's file [-]
 
 
 @dataclass(frozen=True)
@@ -53,6 +55,13 @@ def _read(values: Sequence[Any]) -> Reading:
     return Reading(WheelSpeeds(tuple(names), np.array(speeds, dtype=float)))
 
 
+def _problem(reading: Reading, robot: Any) -> str:
+    spec = robot.sensors.specs.get(NAME, WheelsSpec())
+    most = OVERSPEED * robot.actuators.top_speed + 5.0 * spec.std
+    ranges = dict.fromkeys(robot.actuators.wheel_names, most)
+    return named_problem("wheel", reading.value.names, reading.value.speeds, ranges)
+
+
 KIND = SensorKind(
     spec=WheelsSpec,
     wire=Wire(
@@ -62,6 +71,7 @@ KIND = SensorKind(
     frame="base_link",
     message=MessageFields(paths=("name", "velocity"), write=_write, read=_read),
     simulate=Tachometers,
+    problem=_problem,
     plausible=(
         Plausible("std", "rad/s", (0.0, 100.0), (0.0, 2.0), "tachometers: a thousandth of the speed"),
         Plausible("rate_hz", "Hz", (0.05, 1e4), (0.5, 1000.0), "wheel electronics"),

@@ -40,9 +40,17 @@ class Events:
         if int(self.x.max()) >= self.width or int(self.y.max()) >= self.height:
             x, y = int(self.x.max()), int(self.y.max())
             return f"events up to ({x}, {y}) are of a camera of another size than {self.width} × {self.height} pixels"
-        if (np.diff(self.t.astype(np.int64)) < 0).any():
+        if int(self.p.max()) > 1:
+            return f"polarities up to {int(self.p.max())}, must be 1 for brighter, 0 or -1 for darker"
+        if (self.t[1:] < self.t[:-1]).any():
             return "events are not in the order of time"
         return ""
+
+
+def as_polarities(p: np.ndarray) -> np.ndarray:
+    """Polarities with 0 for darker where a source says -1, in integers of any kind; all others stay as they are."""
+    darker = -1 if p.dtype.kind != "u" else np.iinfo(p.dtype).max
+    return np.asarray(np.where(p == darker, 0, p))
 
 
 def no_events(width: int, height: int) -> Events:

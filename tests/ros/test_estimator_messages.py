@@ -1,0 +1,170 @@
+"""Any message on any wire that any estimator takes: it is used, or refused in words, and the node goes on.
+
+Handlers are called directly, with real messages, on real nodes: DDS would only slow the search down.
+"""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from geometry_msgs.msg import Quaternion
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from sensor_msgs.msg import JointState, PointCloud2
+
+from fulmar_core.estimation.kinds import KINDS
+from fulmar_core.robot import load_robot
+from fulmar_core.sky.events import Events
+from fulmar_core.topics import SENSOR_WIRES
+from fulmar_ros.convert import stamp_of
+from fulmar_ros.estimator_node import BROKEN, EstimatorNode
+from fulmar_ros.estimator_wires import READERS
+from fulmar_ros.event_packets import cloud_of_events
+from tests.ros.neighbour import Neighbour
+
+pytest.importorskip("filterpy")
+FUZZ = settings(
+    max_examples=60,
+    deadline=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
+)
+FILES = {
+    "planar_motion": ("mocap_imu", "floating_platform"),
+    "spatial_motion": ("mocap_imu_3d", "spacecraft_16"),
+    "attitude": ("attitude", "cubesat_wheels"),
+    "inertia": ("inertia", "cubesat_wheels"),
+    "event_rate": ("event_rate", "cubesat_wheels"),
+}
+WHEELS = list(load_robot("cubesat_wheels").actuators.wheel_names)
+BEGIN_NS = 1_000_000_000_000
+INTEGERS = {
+    "uint8": (0, 2**8 - 1),
+    "uint16": (0, 2**16 - 1),
+    "uint32": (0, 2**32 - 1),
+    "int32": (-(2**31), 2**31 - 1),
+}
+numbers = st.sampled_from([0.0, 1.0, -1.0, 1e-3, 1e308, 4294967295.0]) | st.floats()
+names = st.sampled_from(["odom", "map", "", "base_link", *WHEELS]) | st.text(max_size=4)
+
+
+def of_field(kind: str) -> st.SearchStrategy[Any]:
+    """Any value of a field of a message."""
+    if kind.startswith("sequence<"):
+        return st.lists(of_field(kind[9:-1]), max_size=4)
+    if kind.endswith("]"):
+        part, count = kind[:-1].split("[")
+        few = st.lists(st.tuples(st.integers(0, int(count) - 1), numbers), max_size=3)
+        return few.map(lambda found: _filled(int(count), found)) if part == "double" else st.nothing()
+    if kind in ("double", "float"):
+        return numbers
+    if kind in INTEGERS:
+        return st.integers(*INTEGERS[kind])
+    if kind == "boolean":
+        return st.booleans()
+    return names if kind == "string" else any_message(_class_of(kind))
+
+
+def _class_of(kind: str) -> Any:
+    package, name = kind.split("/")
+    return getattr(importlib.import_module(f"{package}.msg"), name)
+
+
+def _filled(count: int, entries: list[tuple[int, float]]) -> np.ndarray:
+    found = np.zeros(count)
+    for index, value in entries:
+        found[index] = value
+    return found
+
+
+@st.composite
+def any_message(draw: st.DrawFn, cls: Any) -> Any:
+    """Any content in every field."""
+    if cls is Quaternion and draw(st.booleans()):
+        return Quaternion(w=1.0)
+    message = cls()
+    for name, kind in cls.get_fields_and_field_types().items():
+        setattr(message, name, draw(of_field(kind)))
+    return message
+
+
+@st.composite
+def messages_of(draw: st.DrawFn, wire: Any, cls: Any) -> Any:
+    """Any message of a wire, often near to one that its estimator takes."""
+    message = draw(any_message(cls))
+    if cls is PointCloud2 and draw(st.booleans()):
+        message = draw(packets())
+    if draw(st.booleans()):
+        message.header.stamp = stamp_of(BEGIN_NS + 50_000_000 * draw(st.integers(0, 20)))
+    if cls is JointState and wire is SENSOR_WIRES["wheels"] and draw(st.booleans()):
+        message.name, message.velocity = WHEELS, draw(st.lists(numbers, min_size=3, max_size=3))
+    return message
+
+
+@st.composite
+def packets(draw: st.DrawFn) -> PointCloud2:
+    count = draw(st.integers(0, 30))
+    ints = np.random.default_rng(draw(st.integers(0, 99)))
+    end_ns = BEGIN_NS + 50_000_000 * draw(st.integers(0, 20))
+    begin_ns = max(0, end_ns - draw(st.sampled_from([50_000_000, 1, 10**12])))
+    t = np.sort(ints.integers(begin_ns, end_ns + 1, count)).astype(np.uint64)
+    p = ints.integers(0, draw(st.sampled_from([2, 2, 256])), count).astype(np.uint8)
+    p = np.where(p == 0, draw(st.sampled_from([0, 0, 255])), p).astype(np.uint8)
+    xy = ints.integers(0, draw(st.sampled_from([1024, 65536])), (2, count)).astype(np.uint16)
+    return cloud_of_events(Events(*xy, t, p, 1024, 1024), end_ns, "camera")
+
+
+@pytest.fixture(params=list(FILES))
+def estimating(
+    neighbour: Neighbour, request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
+) -> Iterator[tuple[str, EstimatorNode]]:
+    monkeypatch.setattr(sys, "argv", ["node"])
+    name, robot = FILES[request.param]
+    words = ["--ros-args", "-p", f"robot:={robot}", "-p", f"estimator:={name}"]
+    node = EstimatorNode(lambda _code: None, cli_args=words)
+    yield request.param, node
+    node.destroy_node()
+
+
+def test_every_kind_of_estimator_is_tried():
+    assert set(FILES) == set(KINDS)
+
+
+@given(data=st.data())
+@FUZZ
+def test_no_message_on_any_wire_breaks_an_estimator(
+    estimating: tuple[str, EstimatorNode], data: st.DataObject
+) -> None:
+    kind, node = estimating
+    wires = KINDS[kind].readings
+    node._estimator.reset()
+    for name in data.draw(st.lists(st.sampled_from(list(wires)), min_size=1, max_size=12)):
+        message_class, read = READERS[wires[name]]
+        message = data.draw(messages_of(wires[name], message_class))
+        refused = node._refused
+        with np.errstate(all="ignore"):
+            node._on_message(name, wires[name].name, read, message)
+        assert not node._refusal.startswith(BROKEN), node._refusal
+        assert node._refused in (refused, refused + 1)
+
+
+def test_a_node_whose_estimator_raises_says_so_and_begins_anew(
+    estimating: tuple[str, EstimatorNode], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    kind, node = estimating
+    name, wire = next(iter(KINDS[kind].readings.items()))
+
+    def breaks(*_given: object) -> None:
+        raise ZeroDivisionError("of a test")
+
+    message = READERS[wire][0]()
+    monkeypatch.setattr(node._estimator, "take", breaks)
+    monkeypatch.setattr("fulmar_ros.estimator_node.reading_problem", lambda *_given: "")
+    node._on_message(name, wire.name, lambda *_given: object(), message)
+    assert node._refused == 1
+    assert node._refusal == f"{BROKEN} '{name}': ZeroDivisionError: of a test"
+    node._publish_status()
