@@ -139,8 +139,10 @@ class EstimatorNode(Node):
             take_priority_with_helpers(CONTROL_PRIORITY)  # a controller waits for us
             self._prior = True
         begun_s = time.perf_counter()
-        refusal = reading
-        if not isinstance(reading, str):
+        refusal: str | None
+        if isinstance(reading, str):
+            refusal = reading
+        else:
             refusal = self._unbroken(name, self._refusal_of, name, reading)
         self._computation_ms.add(1e3 * (time.perf_counter() - begun_s))
         if refusal is not None:
@@ -191,12 +193,12 @@ class EstimatorNode(Node):
         return since_ns < -NEW_EPOCH_NS or since_ns >= max(1, self._every_ns)
 
     def _estimate(self, time_ns: int | None) -> Estimate | None:
-        estimate = self._unbroken("estimate", self._estimator.estimate, time_ns)
+        estimate: Estimate | str | None = self._unbroken("estimate", self._estimator.estimate, time_ns)
         if isinstance(estimate, str):
             self._problem = self._refusal = estimate
             return None
         self._problem = self._estimator.problem
-        return estimate  # type: ignore[no-any-return]
+        return estimate
 
     def _note(self, estimate: Estimate) -> None:
         if self._transform is not None:
