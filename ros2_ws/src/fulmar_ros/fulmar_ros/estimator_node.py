@@ -139,11 +139,8 @@ class EstimatorNode(Node):
             take_priority_with_helpers(CONTROL_PRIORITY)  # a controller waits for us
             self._prior = True
         begun_s = time.perf_counter()
-        refusal: str | None
-        if isinstance(reading, str):
-            refusal = reading
-        else:
-            refusal = self._unbroken(name, self._refusal_of, name, reading)
+        words: str | None = reading if isinstance(reading, str) else None
+        refusal = words or self._unbroken(name, self._refusal_of, name, reading)
         self._computation_ms.add(1e3 * (time.perf_counter() - begun_s))
         if refusal is not None:
             self._refused += 1
