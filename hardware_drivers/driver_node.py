@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
+from rclpy.publisher import Publisher
 
 from fulmar_core.backend import Backend
 from fulmar_core.errors import ConfigError
@@ -21,7 +22,7 @@ from hardware_drivers.driver_backend import DriverBackend, backend_of
 from hardware_drivers.hardware import Hardware, load_hardware
 from hardware_drivers.mavlink_address import place_of
 from hardware_drivers.settings import UNARMED, MavlinkBoat, OwnDriver, ThrustTopic, ValveTopic, VelocityTopic
-from hardware_drivers.topic_driver import TopicDriver, ValveTopicDriver
+from hardware_drivers.topic_driver import Listeners, TopicDriver, ValveTopicDriver
 from hardware_drivers.valves import to_message
 from hardware_drivers.wiring import channel_velocity, channels
 
@@ -92,7 +93,7 @@ class DriverNode(PlantNode):
         if hardware.robot != robot.name:
             raise ConfigError(f"{settings.hardware} is of '{hardware.robot}', the robot is '{robot.name}'.")
         hardware = self._armed(hardware, settings)
-        by_topic = self._by_topic(robot, hardware)
+        by_topic = self._by_topic(robot, hardware, settings.connect_s)
         return by_topic or make_device(robot, hardware, port=settings.port, patience_s=settings.connect_s)
 
     def _armed(self, hardware: Hardware, settings: DriverSettings) -> Hardware:
@@ -123,39 +124,51 @@ class DriverNode(PlantNode):
         )
         return replace(hardware, driver=driver)
 
-    def _by_topic(self, robot: Robot, hardware: Hardware) -> DriverBackend | None:
+    def _by_topic(self, robot: Robot, hardware: Hardware, patience_s: float) -> DriverBackend | None:
         driver = hardware.driver
         if isinstance(driver, VelocityTopic):
             frame = own_frames(self, robot).base
-            send_velocity = velocity_sender(self, driver.topic, stamped=driver.stamped, frame=frame)
+            send_velocity, publisher = velocity_sender(
+                self, driver.topic, stamped=driver.stamped, frame=frame
+            )
             track = robot.actuators.track  # type: ignore[attr-defined]  # settings refuse any other
 
             def send_wheels(command: np.ndarray) -> None:
                 speed, turn_rate = (float(value) for value in command)
                 send_velocity(np.array(channel_velocity(driver.wiring, track, speed, turn_rate)))
 
-            return backend_of(robot, TopicDriver(send_wheels))
+            return backend_of(
+                robot, TopicDriver(send_wheels, _listeners(driver.topic, publisher), patience_s=patience_s)
+            )
         if isinstance(driver, ThrustTopic):
-            send_thrust = thrust_sender(self, driver.topic)
+            send_thrust, publisher = thrust_sender(self, driver.topic)
 
             def send_shares(command: np.ndarray) -> None:
                 send_thrust(np.array(channels(driver.wiring, *(float(s) for s in command))))
 
-            return backend_of(robot, TopicDriver(send_shares))
+            return backend_of(
+                robot, TopicDriver(send_shares, _listeners(driver.topic, publisher), patience_s=patience_s)
+            )
         if isinstance(driver, ValveTopic):
-            publish = valve_sender(self, driver.topic, driver.message)
+            publish, publisher = valve_sender(self, driver.topic, driver.message)
 
             def send(valves: np.ndarray, bearing: bool) -> None:
                 publish(to_message(valves, bearing=bearing, order=driver.order))
 
             valves = ValveTopicDriver(
                 send,
+                _listeners(driver.topic, publisher),
                 count=len(robot.actuators.names),
                 bearing_on=driver.bearing_on_at_start,
                 linger_s=driver.linger_s,
+                patience_s=patience_s,
             )
             return backend_of(robot, valves)
         return None
+
+
+def _listeners(topic: str, publisher: Publisher) -> Listeners:
+    return Listeners(topic, publisher.get_subscription_count)
 
 
 def main() -> None:

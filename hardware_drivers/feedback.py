@@ -93,13 +93,6 @@ class Feedback:
                 hint = self._hint or "Is it switched on, and is this the right port and baud rate?"
                 raise DeviceError(f"{self._device}: {why}. {hint}")
 
-    @property
-    def measured(self) -> RigidBodyState:
-        """The newest odometry, of a device that measures it; there must be a report."""
-        with self._changed:
-            assert self._newest is not None and self._newest.odometry is not None
-            return self._newest.odometry
-
     def read(self) -> Report:
         """The newest report, if it is recent.
 

@@ -26,6 +26,10 @@ class LineRequest(Protocol):
         """Make lines active or inactive; the request decided which level that is."""
         ...
 
+    def get_values(self, lines: list[int | str]) -> list[Value]:
+        """Whether lines are active, as the chip reads them; raises OSError where it cannot."""
+        ...
+
     def release(self) -> None:
         """Release the lines."""
         ...
@@ -98,6 +102,12 @@ class FileLines:
         for line, value in values.items():
             active = value is Value.ACTIVE
             self._levels[self._offsets[line]] = int(active != self._settings[line].active_low)
+
+    def get_values(self, lines: list[int | str]) -> list[Value]:
+        """See `LineRequest`."""
+        high = [bool(self._levels[self._offsets[line]]) for line in lines]
+        active = [level != self._settings[line].active_low for line, level in zip(lines, high, strict=True)]
+        return [Value.ACTIVE if each else Value.INACTIVE for each in active]
 
     def release(self) -> None:
         """See `LineRequest`."""

@@ -16,6 +16,7 @@ from hardware_drivers.driver import DeviceDriver
 from hardware_drivers.earth_frame import LocalFrame, attitude
 from hardware_drivers.feedback import DeviceTime, Feedback, Report
 from hardware_drivers.kingfisher_protocol import Decoder
+from hardware_drivers.placed_reports import PlacedReports
 from hardware_drivers.ports import Reader, open_port
 from hardware_drivers.settings import KingfisherNmea
 from hardware_drivers.wiring import channels
@@ -33,8 +34,8 @@ class KingfisherDriver(DeviceDriver):
             DeviceError: Nothing is there, or it has no fix.
         """
         self._settings = settings
-        self._shift = np.zeros(3)  # from where the frame begins to where `odom` does [m]
         self._feedback = Feedback(f"boat at {settings.port}", settings.silent_s)
+        self._reports = PlacedReports(self._feedback, robot.limits)
         self._decoder, self._time = Decoder(), DeviceTime(DAY_MS)
         origin = settings.origin
         self._frame = LocalFrame(origin.latitude, origin.longitude) if origin else None
@@ -54,8 +55,7 @@ class KingfisherDriver(DeviceDriver):
     def begin(self, x: float, y: float, heading: float) -> None:
         """Without an origin, set the boat's position in `odom`; see `DeviceDriver`."""
         if self._settings.origin is None:
-            here = self._feedback.measured.position_in_world - self._shift
-            self._shift = np.array([x, y, 0.0]) - here
+            self._reports.begin(x, y)
 
     def write(self, command: np.ndarray) -> None:
         """Send a command; see `DeviceDriver`."""
@@ -71,8 +71,13 @@ class KingfisherDriver(DeviceDriver):
         self._reader.stop()
 
     def health(self) -> dict[str, str]:
-        """Battery and lost sentences; see `DeviceDriver`."""
-        return {"battery_v": self._voltage, "lost_sentences": str(self._decoder.lost), "warning": ""}
+        """Battery, lost sentences and refused positions; see `DeviceDriver`."""
+        return {
+            "battery_v": self._voltage,
+            "lost_sentences": str(self._decoder.lost),
+            "refused_positions": str(self._reports.refused),
+            "warning": self._feedback.refusal,
+        }
 
     def _take(self, data: bytes) -> None:
         now_ns = time.time_ns()
@@ -84,6 +89,8 @@ class KingfisherDriver(DeviceDriver):
                 self._imu = message.reading
             elif isinstance(message, protocol.Battery):
                 self._voltage = f"{message.voltage:.1f}"
+            elif isinstance(message, protocol.NoFix):
+                self._feedback.refuse("the boat has no fix of its position")
             elif isinstance(message, protocol.Fix):
                 self._report(message, now_ns)
 
@@ -97,9 +104,9 @@ class KingfisherDriver(DeviceDriver):
         east, north = self._frame.metres(fix.latitude, fix.longitude)
         turn = np.array([0.0, 0.0, -math.radians(rates.yaw_rate)])
         state = RigidBodyState(
-            np.array([east, north, 0.0]) + self._shift,
+            np.array([east, north, 0.0]),
             attitude(*(math.radians(angle) for angle in (fix.roll, fix.pitch, fix.heading))),
             np.array([rates.east, rates.north, 0.0]),
             turn,
         )
-        self._feedback.put(Report(state, self._imu, self._time.stamp_ns(1e3 * fix.time_s, now_ns)))
+        self._reports.take(Report(state, self._imu, self._time.stamp_ns(1e3 * fix.time_s, now_ns)))

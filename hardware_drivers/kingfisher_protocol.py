@@ -33,6 +33,11 @@ class Fix:
 
 
 @dataclass(frozen=True)
+class NoFix:
+    """`$CPNVG` of a boat that does not know where it is."""
+
+
+@dataclass(frozen=True)
 class Rates:
     """`$CPNVR`: how the boat moves."""
 
@@ -57,7 +62,7 @@ class Battery:
     voltage: float  # [V]
 
 
-Message = Fix | Rates | Inertial | Battery
+Message = Fix | NoFix | Rates | Inertial | Battery
 
 
 def drive(left: float, right: float) -> bytes:
@@ -77,7 +82,7 @@ def read(fields: list[str]) -> Message | None:
         fields: Of a sound sentence, its name first.
 
     Returns:
-        What it says; None where it says nothing that a driver needs, no fix included, or nonsense.
+        What it says; None where it says nothing that a driver needs, or nonsense.
     """
     reader = READERS.get(fields[0])
     try:
@@ -87,7 +92,9 @@ def read(fields: list[str]) -> Message | None:
     return message
 
 
-def _fix(fields: list[str]) -> Fix | None:
+def _fix(fields: list[str]) -> Fix | NoFix | None:
+    if fields[6] == "0":
+        return NoFix()
     if fields[6] != "1" or fields[3] not in ("N", "S") or fields[5] not in ("E", "W"):
         return None
     latitude = _degrees(fields[2]) * (1.0 if fields[3] == "N" else -1.0)

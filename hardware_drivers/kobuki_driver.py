@@ -28,6 +28,7 @@ from hardware_drivers.wheel_odometry import StalledWheels, WheelOdometry
 from hardware_drivers.wiring import channel_velocity
 
 LOW_BATTERY = 13.2  # [V]: kobuki_node calls it dangerous
+LIFTED_S = 1.0  # our value: on a threshold a wheel hangs for less
 ABSENT = np.full(3, np.nan)  # the base has no accelerometer
 
 
@@ -35,7 +36,7 @@ class KobukiDriver(DeviceDriver):
     """Drives by base control, measures by encoders and gyroscope.
 
     While a bumper or a cliff sensor answers, the base stands, or backs off straight; while a wheel hangs in the air, it
-    stands.
+    stands. One that was lifted does not drive off as soon as it is put down.
     """
 
     def __init__(self, robot: Robot, settings: Kobuki, *, patience_s: float) -> None:
@@ -52,6 +53,7 @@ class KobukiDriver(DeviceDriver):
         self._standing = StalledWheels()
         self._begin: tuple[float, float, float] | None = None
         self._core: CoreSensors | None = None
+        self._lifted_s: float | None = None  # since when a wheel has hung in the air
         self._sent = robot.actuators.safe_command
         self._port = open_port(settings.port, settings.baud, patience_s)
         self._reader = Reader(self._port, self._take, self._feedback.fail)
@@ -80,6 +82,13 @@ class KobukiDriver(DeviceDriver):
     def read(self) -> Report:
         """See `DeviceDriver`."""
         return self._feedback.read()
+
+    def refusal(self) -> str:
+        """Whether somebody has lifted the base; see `Answering`."""
+        lifted_s = self._lifted_s
+        if lifted_s is None or time.monotonic() - lifted_s < LIFTED_S:
+            return ""
+        return "a wheel of the base hangs in the air: it was lifted, and its odometry does not know where to"
 
     def close(self) -> None:
         """Close the port; see `DeviceDriver`."""
@@ -117,6 +126,10 @@ class KobukiDriver(DeviceDriver):
         for packet in self._decoder.feed(data):
             if packet.core is not None:
                 self._core = packet.core
+                if not packet.core.wheel_drops:
+                    self._lifted_s = None
+                elif self._lifted_s is None:
+                    self._lifted_s = time.monotonic()
             if packet.core is not None and packet.inertia is not None:
                 self._report(packet.core, packet.inertia, now_ns)
 

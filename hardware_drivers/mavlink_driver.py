@@ -6,15 +6,12 @@ import contextlib
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from fulmar_core.errors import DeviceError
 from fulmar_core.robot import Robot
-from fulmar_core.state import RigidBodyState
-from hardware_drivers.believable_motion import unbelievable
 from hardware_drivers.driver import DeviceDriver
 from hardware_drivers.feedback import Feedback, Report
 from hardware_drivers.mavlink_autopilot import ERROR, MANUAL, Autopilot
@@ -22,6 +19,7 @@ from hardware_drivers.mavlink_commands import Commands
 from hardware_drivers.mavlink_link import Address, heartbeat, open_link, wait_for_autopilot
 from hardware_drivers.mavlink_signing import read_key
 from hardware_drivers.mavlink_telemetry import Telemetry
+from hardware_drivers.placed_reports import PlacedReports
 from hardware_drivers.settings import UNARMED, MavlinkBoat
 from hardware_drivers.wiring import bounded
 from hardware_drivers.wiring import channels as wired
@@ -53,14 +51,12 @@ class MavlinkDriver(DeviceDriver):
             ConfigError: The file with the key of its signatures cannot be used.
             DeviceError: No autopilot answers, or it does not go to MANUAL.
         """
-        self._safe, self._limits, self._settings = robot.actuators.safe_command, robot.limits, settings
+        self._safe, self._settings = robot.actuators.safe_command, settings
         self._name = f"autopilot at {settings.port}"
         self._feedback, self._telemetry = Feedback(self._name, settings.silent_s), Telemetry()
         self._state = Autopilot(settings.steering_channel, settings.throttle_channel)
-        self._placing = threading.Lock()  # no report is placed by a shift that has just changed
-        self._shift = np.zeros(3)  # from where the autopilot's frame begins to where `odom` does [m]
-        self._believed: tuple[RigidBodyState, int, Report] | None = None  # and when by the steady clock [ns]
-        self._jumps, self._has_begun = 0, False
+        self._reports = PlacedReports(self._feedback, robot.limits)
+        self._has_begun = False
         self._over = threading.Event()
         key = read_key(settings.signing_key) if settings.signing_key else b""
         self._link = open_link(settings.port, settings.baud, key, patience_s)
@@ -86,11 +82,7 @@ class MavlinkDriver(DeviceDriver):
         Raises:
             DeviceError: It left MANUAL, or refuses to arm.
         """
-        with self._placing:
-            assert self._believed is not None  # as of the first report
-            state, _, report = self._believed
-            self._shift = np.array([x, y, 0.0]) - state.position_in_world
-            self._feedback.put(self._placed(report))
+        self._reports.begin(x, y)
         if not self._settings.arm:
             return
         if self._state.mode != MANUAL:
@@ -144,7 +136,7 @@ class MavlinkDriver(DeviceDriver):
             "autopilot_says": state.words(now_s),
             "refused_commands": self._commands.refused if self._commands else "",
             "refused_messages": str(self._link.refused),
-            "refused_positions": str(self._jumps),
+            "refused_positions": str(self._reports.refused),
             "warning": warning,
         }
 
@@ -220,29 +212,12 @@ class MavlinkDriver(DeviceDriver):
 
     def _take(self, message: object) -> None:
         """Take a message of the autopilot."""
-        steady_ns = time.monotonic_ns()
-        self._state.take(message, steady_ns / 1e9)
+        self._state.take(message, time.monotonic())
         if self._commands is not None:
             self._commands.take(message)
         report = self._telemetry.take(message, time.time_ns())
-        if report is None:
-            return
-        assert report.odometry is not None
-        with self._placing:
-            last = None if self._believed is None else self._believed[:2]
-            reason = unbelievable(report.odometry, steady_ns, last, self._limits)
-            if reason:
-                self._jumps += 1
-                self._feedback.refuse(reason)
-                return
-            self._believed = report.odometry, steady_ns, report
-            self._feedback.put(self._placed(report))
-
-    def _placed(self, report: Report) -> Report:
-        """A report of the autopilot's frame in `odom`."""
-        assert report.odometry is not None
-        place = report.odometry.position_in_world + self._shift
-        return replace(report, odometry=replace(report.odometry, position_in_world=place))
+        if report is not None:
+            self._reports.take(report)
 
 
 def override_of(settings: MavlinkBoat, left: float, right: float) -> list[int]:

@@ -32,16 +32,24 @@ class ValveDriver(DeviceDriver):
             settings.port, settings.every_line, active_low=settings.active_low, patience_s=patience_s
         )
         self._timing = ValveTiming(len(self._valves), settings.min_on_s)
+        self._chip = settings.port
+        self._written: dict[int | str, Value] = {}  # what each line was set to last
+        self._refusal = ""
         self._lock = threading.Lock()
 
     def write(self, command: np.ndarray) -> np.ndarray:
         """Set the valves; see `DeviceDriver`."""
         now_ns = time.monotonic_ns()
         with self._lock:
+            self._read_back()
             applied = self._timing.allowed(command, now_ns)
             self._set(applied)
             self._note(bool(applied.any()), now_ns)
         return applied
+
+    def refusal(self) -> str:
+        """Whether a line is not as it was set; see `Answering`."""
+        return self._refusal
 
     def close(self) -> None:
         """Close the valves and release the lines; see `DeviceDriver`."""
@@ -54,11 +62,29 @@ class ValveDriver(DeviceDriver):
 
     def _set(self, valves: np.ndarray) -> None:
         """Bring every valve into its state; call with the lock held."""
+        wired = valves[self._order] > 0.5
+        self._write({line: STATES[bool(on)] for line, on in zip(self._valves, wired, strict=True)})
+
+    def _write(self, values: dict[int | str, Value]) -> None:
+        """Set lines; call with the lock held."""
         if self._lines is not None:
-            wired = valves[self._order] > 0.5
-            self._lines.set_values(
-                {line: STATES[bool(on)] for line, on in zip(self._valves, wired, strict=True)}
-            )
+            self._lines.set_values(values)
+            self._written |= values
+
+    def _read_back(self) -> None:
+        """Compare the lines with what they were set to a tick ago; call with the lock held."""
+        if self._lines is None:
+            return
+        lines = list(self._written)
+        try:
+            found = self._lines.get_values(lines)
+        except OSError:  # a chip that does not read its outputs
+            return
+        wrong = [
+            str(line) for line, value in zip(lines, found, strict=True) if value is not self._written[line]
+        ]
+        lines_are = f"{self._chip}: line {', '.join(wrong)} is not at the level that was set"
+        self._refusal = f"{lines_are}: a short circuit, or another program?" if wrong else ""
 
     def _note(self, used: bool, now_ns: int) -> None:
         """Called after each command, with whether a valve is open and the steady clock [ns], with the lock held."""
@@ -122,8 +148,7 @@ class ThrusterDriver(ValveDriver):
 
     def _switch(self, on: bool) -> None:
         """Switch the bearing; call with the lock held."""
-        assert self._lines is not None
-        self._lines.set_values({self._bearing: STATES[on]})
+        self._write({self._bearing: STATES[on]})
         self._bearing_on = on
 
     def _let_go(self) -> None:

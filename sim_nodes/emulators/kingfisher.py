@@ -26,6 +26,7 @@ class KingfisherEmulator:
 
     Attributes:
         mute: Report nothing, as a boat whose cable is cut.
+        lost: Have no fix, as below a bridge.
     """
 
     def __init__(self, link: Link) -> None:
@@ -33,7 +34,7 @@ class KingfisherEmulator:
         self._pending = b""
         self._command, self._commanded_s = np.zeros(2), -math.inf
         self._due = dict.fromkeys(("navigation", "inertial", "battery"), -math.inf)
-        self.mute = False
+        self.mute = self.lost = False
 
     def command(self, now_s: float) -> np.ndarray:
         """See `EmulatedDevice`."""
@@ -74,7 +75,7 @@ class KingfisherEmulator:
         pitch = math.degrees(math.asin(max(-1.0, min(1.0, float(ahead[0])))))
         heading = (90.0 - math.degrees(float(state.yaw))) % 360.0
         self._send(
-            f"CPNVG,{clock},{_minutes(latitude, 'NS')},{_minutes(longitude, 'EW')},1,,,"
+            f"CPNVG,{clock},{_minutes(latitude, 'NS')},{_minutes(longitude, 'EW')},{int(not self.lost)},,,"
             f"{heading:.5f},{roll:.5f},{pitch:.5f},{clock}"
         )
 

@@ -115,6 +115,33 @@ def test_a_boat_that_falls_silent_is_an_error_not_old_odometry(bench, driver):
         drive(driver, (0.0, 0.0), 2.0)
 
 
+@pytest.mark.parametrize("kind", ["serial"], indirect=True)
+def test_a_boat_without_a_fix_says_so(bench, driver):
+    bench.device.lost = True
+    with pytest.raises(DeviceError, match="refused, the last: the boat has no fix of its position"):
+        drive(driver, (0.0, 0.0), 3.0)
+    assert driver.health()["warning"] == "the boat has no fix of its position"
+
+
+@pytest.mark.parametrize("kind", ["serial"], indirect=True)
+def test_a_place_of_the_boat_that_jumps_is_refused(bench, driver):
+    """Thirty metres for an instant, as by a reflected signal; then it is back."""
+    report, steps = bench.device.report, iter(range(100))
+
+    def elsewhere(sample, now_s):
+        away = 30.0 if next(steps, 99) < 20 else 0.0
+        sample.odometry.position_in_world[0] += away
+        report(sample, now_s)
+        sample.odometry.position_in_world[0] -= away
+
+    bench.device.report = elsewhere
+    for _ in range(60):
+        sample = drive(driver, (0.0, 0.0), 0.02)
+        assert sample.odometry.position_in_world[:2] == pytest.approx(START[:2], abs=0.1)
+    assert int(driver.health()["refused_positions"]) > 0
+    assert driver.health()["warning"] == ""
+
+
 @pytest.mark.parametrize("kind", ["tcp"], indirect=True)
 def test_a_closed_connection_is_reported_at_once(bench, driver):
     bench.device.mute = True

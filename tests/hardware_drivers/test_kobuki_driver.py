@@ -11,7 +11,7 @@ import pytest
 from fulmar_core.errors import DeviceError
 from fulmar_core.planar import PlanarState
 from hardware_drivers.driver_backend import backend_of
-from hardware_drivers.kobuki_driver import KobukiDriver
+from hardware_drivers.kobuki_driver import LIFTED_S, KobukiDriver
 from hardware_drivers.settings import Kobuki
 from sim_nodes.emulators.device import PtyLink
 from sim_nodes.emulators.kobuki import TIMEOUT_S, KobukiEmulator
@@ -113,6 +113,17 @@ def test_a_wheel_in_the_air_stops_everything(bench, driver):
     bench.device.wheel_drops = 1
     until(lambda: not driver.step(np.array([-0.3, 0.0])).applied.any())
     assert "hangs in the air" in driver.health()["warning"]
+
+
+def test_a_base_that_is_lifted_is_a_refusal_and_one_on_a_threshold_is_none(bench, driver):
+    bench.device.wheel_drops = 1
+    assert drive(driver, (0.2, 0.0), 0.5 * LIFTED_S).refusal == ""
+    bench.device.wheel_drops = 0
+    assert drive(driver, (0.2, 0.0), 0.2).refusal == ""
+    bench.device.wheel_drops = 3
+    until(lambda: "it was lifted" in drive(driver, (0.2, 0.0), 0.02).refusal, timeout_s=LIFTED_S + 1.0)
+    bench.device.wheel_drops = 0
+    until(lambda: not drive(driver, (0.2, 0.0), 0.02).refusal)
 
 
 def test_a_base_slows_down_as_fast_as_it_may_and_no_faster(bench, driver):

@@ -176,3 +176,29 @@ def test_wiring_that_cannot_be_is_refused(change, says):
     }
     with pytest.raises(ValueError, match=says):
         GpioValves(**{**fields, **change})
+
+
+def test_a_line_that_is_not_at_the_level_that_was_set_is_a_refusal_by_its_name(rig):
+    bank, settings = rig
+    driver = started(settings)
+    assert driver.step(np.eye(8)[2]).refusal == ""
+    assert driver.step(np.eye(8)[2]).refusal == ""
+    line = driver._driver._lines
+    line._levels[3] ^= 1  # as by another program
+    refusal = driver.step(np.zeros(8)).refusal
+    assert refusal.startswith(f"{bank.address}: line {settings.lines[3]} is not at the level that was set")
+    assert driver.step(np.zeros(8)).refusal == ""
+    driver.close()
+
+
+def test_a_chip_that_does_not_read_its_outputs_refuses_nothing(rig, monkeypatch):
+    _, settings = rig
+    driver = started(settings)
+
+    def unreadable(_lines):
+        raise OSError("not supported")
+
+    monkeypatch.setattr(driver._driver._lines, "get_values", unreadable)
+    assert driver.step(np.eye(8)[2]).refusal == ""
+    assert driver.step(np.zeros(8)).refusal == ""
+    driver.close()

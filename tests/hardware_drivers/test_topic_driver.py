@@ -7,12 +7,14 @@ import time
 import numpy as np
 import pytest
 
+from fulmar_core.errors import DeviceError
 from fulmar_core.robot import load_robot
 from hardware_drivers.driver_backend import STOPS, DriverBackend, backend_of
 from hardware_drivers.settings import LONGEST_LINGER_S, Bearing, ValveTopic
-from hardware_drivers.topic_driver import TopicDriver, ValveTopicDriver
+from hardware_drivers.topic_driver import LONELY_S, Listeners, TopicDriver, ValveTopicDriver
 
 ROBOT = load_robot("floating_platform")
+THERE = Listeners("/valves", lambda: 1)
 
 
 class Listener:
@@ -26,7 +28,9 @@ class Listener:
 
 
 def floating(listener: Listener, *, bearing_on: bool, linger_s: float) -> DriverBackend:
-    driver = ValveTopicDriver(listener, count=8, bearing_on=bearing_on, linger_s=linger_s)
+    driver = ValveTopicDriver(
+        listener, THERE, count=8, bearing_on=bearing_on, linger_s=linger_s, patience_s=0.0
+    )
     return backend_of(ROBOT, driver)
 
 
@@ -34,7 +38,7 @@ def test_stops_come_one_by_one_and_the_last_has_time_to_arrive():
     """A publisher that keeps one message would send of a burst only the last, and of that one nothing if the process
     ends with it."""
     listener = Listener()
-    driver = backend_of(ROBOT, TopicDriver(listener))
+    driver = backend_of(ROBOT, TopicDriver(listener, THERE, patience_s=0.0))
     driver.step(np.ones(8))
     driver.make_safe()
     times = [at for at, _, _ in listener.received[1:]] + [time.monotonic()]
@@ -45,7 +49,7 @@ def test_stops_come_one_by_one_and_the_last_has_time_to_arrive():
 
 def test_wheels_of_another_node_slow_down_first():
     listener, base = Listener(), load_robot("turtlebot2")
-    driver = backend_of(base, TopicDriver(listener))
+    driver = backend_of(base, TopicDriver(listener, THERE, patience_s=0.0))
     driver.step(np.array([0.3, -0.6]))
     driver.make_safe()
     sent = np.array([command for _, command, _ in listener.received])
@@ -81,3 +85,19 @@ def test_a_lingering_that_a_launcher_would_not_wait_for_is_refused(linger_s):
         Bearing("7", linger_s=linger_s)
     with pytest.raises(ValueError, match="linger_s"):
         ValveTopic("valve_topic", "/x", tuple(range(8)), linger_s=linger_s)
+
+
+def test_a_topic_without_a_subscriber_is_a_device_that_is_not_there():
+    with pytest.raises(DeviceError, match="no node subscribes to /valves"):
+        TopicDriver(Listener(), Listeners("/valves", lambda: 0), patience_s=0.1)
+
+
+def test_a_subscriber_that_has_gone_is_a_refusal_and_one_that_returns_soon_is_none():
+    there = [1]
+    driver = TopicDriver(Listener(), Listeners("/valves", lambda: there[0]), patience_s=0.0)
+    there[0] = 0
+    assert driver.refusal() == ""
+    time.sleep(LONELY_S + 0.05)
+    assert driver.refusal() == "no node subscribes to /valves any more: nobody carries out commands"
+    there[0] = 1
+    assert driver.refusal() == ""

@@ -126,9 +126,12 @@ def test_the_lab_s_controllers_command_our_valves_through_the_adapter(neighbour,
         assert bool(found) is (commanded is not None)
 
 
-def test_an_adapter_that_receives_our_own_driver_passes_nothing_on_and_ends(neighbour) -> None:
+def test_an_adapter_that_receives_our_own_driver_passes_nothing_on_and_ends(neighbour, received) -> None:
     """Both of one hardware file: what the driver publishes would come back as a command and feed its watchdog."""
     ended: list[int] = []
+    received(
+        Int16MultiArray, "/spacer_floating_platform/valves/input"
+    )  # the valve node, which the driver waits for
     file = "hardware:=zero_g_lab_valve_node"
     node, spin = running(DriverNode, "floating_platform", file)
     _adapter, spin_adapter = running(AdapterNode, "floating_platform", file, request_exit=ended.append)

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 import yaml
 from geometry_msgs.msg import QuaternionStamped
+from std_srvs.srv import Trigger
 
 from fulmar_bags.message_reader import stamp_ns
 from fulmar_bringup.node_table import plant_spec
@@ -23,7 +24,8 @@ from fulmar_bringup.processes import ProcessGroup
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_core.errors import BAD_USAGE, FAILED
 from fulmar_core.paths import config_path
-from fulmar_core.topics import SENSOR_WIRES
+from fulmar_core.topics import GIVE_BACK, SENSOR_WIRES
+from fulmar_core.wire_check import WARNINGS
 from fulmar_ros.qos import subscriber_qos
 from fulmar_ros.runtime import spinning
 from hardware_drivers.driver_node import DriverNode
@@ -41,7 +43,7 @@ BOARD = """
 import threading
 from hardware_drivers.driver import DeviceDriver
 
-SENT, CLOSED, RAISES, HOLD = [], [], [], threading.Event()
+SENT, CLOSED, RAISES, REFUSES, HOLD = [], [], [], [], threading.Event()
 HOLD.set()
 
 class Board(DeviceDriver):
@@ -52,6 +54,8 @@ class Board(DeviceDriver):
         SENT.append(command.tolist())
         if RAISES and command.any():
             raise OSError("relay 3 does not answer")
+    def refusal(self):
+        return REFUSES[-1] if REFUSES else ""
     def close(self):
         CLOSED.append(True)
 """
@@ -154,6 +158,29 @@ def test_silence_closes_it_and_a_write_that_raises_ends_it_closed(
     assert "own_board.py:15)" in reason
     node.stop()
     assert board.CLOSED == [True]
+
+
+def test_a_device_that_refuses_is_held_until_a_person_gives_control_back(
+    neighbour: Neighbour, board: ModuleType, node: DriverNode
+) -> None:
+    """Also after it obeys again, while its controller goes on: an operator may stand beside it."""
+    until(lambda: open_first(neighbour) or any(any(sent) for sent in board.SENT))
+    board.REFUSES.append("mode HOLD: commands do nothing")
+    until(lambda: open_first(neighbour) or "mode HOLD" in neighbour.said["plant"][0])
+    words, values = neighbour.said["plant"]
+    assert "until `fulmar teleop ROBOT --give-back`" in words
+    assert values[WARNINGS] == "mode HOLD: commands do nothing"
+    give_back = neighbour.node.create_client(Trigger, GIVE_BACK)
+    assert give_back.wait_for_service(5.0)
+    refused = give_back.call(Trigger.Request())
+    assert (refused.success, refused.message) == (False, "refused: mode HOLD: commands do nothing")
+    board.REFUSES.clear()
+    sent = len(board.SENT)
+    until(lambda: open_first(neighbour) or len(board.SENT) > sent + 30)
+    assert not any(any(command) for command in board.SENT[sent + 2 :])
+    assert give_back.call(Trigger.Request()).success
+    until(lambda: open_first(neighbour) or any(board.SENT[-1]))
+    node.stop()
 
 
 def test_a_write_that_hangs_is_reported_and_does_not_hold_up_the_end(

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from geometry_msgs.msg import Twist, TwistStamped
 from rclpy.node import Node
+from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 from std_msgs.msg import ByteMultiArray, Float32MultiArray, Int16MultiArray, UInt8MultiArray
 
@@ -23,8 +24,8 @@ VALVE_MESSAGES: dict[str, type] = {
 Send = Callable[[np.ndarray], None]
 
 
-def velocity_sender(node: Node, topic: str, *, stamped: bool, frame: str) -> Send:
-    """Publishes speed and turn rate as Twist, or as TwistStamped in a frame, stamped when it is sent."""
+def velocity_sender(node: Node, topic: str, *, stamped: bool, frame: str) -> tuple[Send, Publisher]:
+    """What publishes speed and turn rate as Twist, or as TwistStamped in a frame, and its publisher."""
     publisher = node.create_publisher(TwistStamped if stamped else Twist, topic, RELIABLE)
 
     def send(command: np.ndarray) -> None:
@@ -38,22 +39,28 @@ def velocity_sender(node: Node, topic: str, *, stamped: bool, frame: str) -> Sen
         message.header.stamp = node.get_clock().now().to_msg()
         publisher.publish(message)
 
-    return send
+    return send, publisher
 
 
-def thrust_sender(node: Node, topic: str) -> Send:
-    """Publishes shares of full thrust as Float32MultiArray."""
+def thrust_sender(node: Node, topic: str) -> tuple[Send, Publisher]:
+    """What publishes shares of full thrust as Float32MultiArray, and its publisher."""
     publisher = node.create_publisher(Float32MultiArray, topic, RELIABLE)
-    return lambda command: publisher.publish(Float32MultiArray(data=[float(share) for share in command]))
+
+    def send(command: np.ndarray) -> None:
+        publisher.publish(Float32MultiArray(data=[float(share) for share in command]))
+
+    return send, publisher
 
 
-def valve_sender(node: Node, topic: str, message: str = "int16") -> Callable[[Sequence[int]], None]:
-    """Publishes zeros and ones as a message of `VALVE_MESSAGES`."""
+def valve_sender(
+    node: Node, topic: str, message: str = "int16"
+) -> tuple[Callable[[Sequence[int]], None], Publisher]:
+    """What publishes zeros and ones as a message of `VALVE_MESSAGES`, and its publisher."""
     kind = VALVE_MESSAGES[message]
     publisher = node.create_publisher(kind, topic, RELIABLE)
     if kind is ByteMultiArray:
-        return lambda values: publisher.publish(kind(data=[bytes([value]) for value in values]))
-    return lambda values: publisher.publish(kind(data=list(values)))
+        return lambda values: publisher.publish(kind(data=[bytes([value]) for value in values])), publisher
+    return lambda values: publisher.publish(kind(data=list(values))), publisher
 
 
 def valve_values(message: Any) -> list[int]:
