@@ -134,6 +134,7 @@ class FaultEnvironment:
     scenario: str = "nominal"
     emulated: bool = False  # a driver drives an emulated device
     two_hosts: bool = False  # the controller is on another one
+    clock_of: str = ""  # node whose clock may step; empty: none
     bundle: Callable[[Path], None] | None = None  # what is done to the bundle before the start
     nadir: bool = False  # a satellite keeps pointing to the Earth, and turns with its orbit
 

@@ -41,6 +41,7 @@ from fulmar_evaluation.faults.fault_environment import (
 from fulmar_evaluation.faults.flight_watch import FlightWatch
 from fulmar_evaluation.faults.launched import ENDS, RUN, UP, command_of
 from fulmar_evaluation.faults.observer import RunObserver, wait_for
+from fulmar_evaluation.faults.stepped_clock import SteppedClock
 from fulmar_evaluation.faults.two_hosts import TwoHosts
 from fulmar_ros.goal_messages import TYPES, goal_message
 from fulmar_ros.qos import publisher_qos
@@ -75,6 +76,7 @@ class LiveSystem:
         about: FaultEnvironment = USUAL,
         hosts: TwoHosts | None = None,
         launcher: str = RUN,
+        clock: SteppedClock | None = None,
     ) -> None:
         """Hold the parts together."""
         self.plan, self.record, self.launched, self.launcher = (
@@ -83,7 +85,7 @@ class LiveSystem:
             launched,
             launcher,
         )
-        self.bystander, self._request, self._hosts = bystander, request, hosts
+        self.bystander, self._request, self._hosts, self._clock = bystander, request, hosts, clock
         self.others = ProcessGroup()
         robot = load_robot(self.plan.robot)
         self.robot = robot
@@ -110,6 +112,12 @@ class LiveSystem:
         """The hosts that plant and controller are on; there must be two."""
         assert self._hosts is not None
         return self._hosts
+
+    @property
+    def clock(self) -> SteppedClock:
+        """The clock of a node that may step; there must be one."""
+        assert self._clock is not None
+        return self._clock
 
     @property
     def answers(self) -> FaultInjector:
@@ -237,10 +245,12 @@ def live_system(
     with contextlib.ExitStack() as stack:
         bystander = stack.enter_context(ros_node("bystander", errors.append, namespace=plan.namespace))
         folder = request.record.parent
+        clock = SteppedClock(folder, about.clock_of) if about.clock_of else None
+        variables = {**os.environ, **(clock.environment if clock is not None else {})}
         launched = LaunchedCommand(
-            (), environment=os.environ, folder=folder, command=command_of(launcher, request, folder)
+            (), environment=variables, folder=folder, command=command_of(launcher, request, folder)
         )
-        live = LiveSystem(request, launched, bystander, about, hosts, launcher)
+        live = LiveSystem(request, launched, bystander, about, hosts, launcher, clock)
         try:
             if about.by_hand:
                 live.others.start(teleop_spec(plan.robot, name=plan.name, keyboard=False))

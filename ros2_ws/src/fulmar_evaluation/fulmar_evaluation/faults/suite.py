@@ -13,10 +13,12 @@ from fulmar_bringup.domains import environment, reserved_domains
 from fulmar_bringup.system import Guards, default_hardware, modules_of
 from fulmar_core.errors import ConfigError, FulmarError, UnknownNameError
 from fulmar_core.robot import load_robot
+from fulmar_evaluation.faults.actuator_faults import ACTUATOR_FAULTS
 from fulmar_evaluation.faults.command_faults import CABLE_FAULTS, COMMAND_FAULTS
 from fulmar_evaluation.faults.fault import Fault, FaultResult, Outcome
 from fulmar_evaluation.faults.fault_environment import request_of
 from fulmar_evaluation.faults.hardware_faults import HARDWARE_FAULTS
+from fulmar_evaluation.faults.host_faults import HOST_FAULTS
 from fulmar_evaluation.faults.input_faults import INPUT_FAULTS
 from fulmar_evaluation.faults.launched import LAUNCHERS, RUN, UP
 from fulmar_evaluation.faults.limit_faults import LIMIT_FAULTS
@@ -26,6 +28,7 @@ from fulmar_evaluation.faults.operator_faults import OPERATOR_FAULTS
 from fulmar_evaluation.faults.policy_faults import POLICY_FAULTS
 from fulmar_evaluation.faults.process_faults import PROCESS_FAULTS
 from fulmar_evaluation.faults.satellite_faults import SATELLITE_FAULTS
+from fulmar_evaluation.faults.sensor_faults import SENSOR_FAULTS
 from fulmar_evaluation.faults.two_hosts import ACROSS, TwoHosts, inside, two_hosts
 
 EVERY = (
@@ -38,6 +41,9 @@ EVERY = (
     *POLICY_FAULTS,
     *CABLE_FAULTS,
     *SATELLITE_FAULTS,
+    *SENSOR_FAULTS,
+    *ACTUATOR_FAULTS,
+    *HOST_FAULTS,
 )
 BOTH = "both"  # launchers
 ENDS_S = 4.0  # for a launcher to end after a robot got safe

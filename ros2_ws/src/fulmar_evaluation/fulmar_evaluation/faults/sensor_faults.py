@@ -1,0 +1,159 @@
+"""Sensors that freeze, drift or creep while a robot moves, and a second source of what it follows."""
+
+from __future__ import annotations
+
+import copy
+import math
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import rclpy
+from nav_msgs.msg import Odometry
+
+from fulmar_bags.message_reader import stamp_ns
+from fulmar_core.robot import Robot
+from fulmar_core.topics import MOCAP, ODOMETRY
+from fulmar_evaluation.faults.command_faults import DISCOVERY_S
+from fulmar_evaluation.faults.endurance import DistanceWatch, endured
+from fulmar_evaluation.faults.fault import Fault, Outcome, stopped
+from fulmar_evaluation.faults.fault_environment import ATTITUDE, FaultEnvironment, Injection
+from fulmar_evaluation.faults.input_faults import intercept
+from fulmar_evaluation.faults.live_system import LiveSystem, NothingShown
+from fulmar_evaluation.faults.observer import wait_for
+from fulmar_ros.qos import publisher_qos
+
+NOISE_S = 1.0  # beyond the watchdog: what repeats of a noisy value, or slow drifts, take to tell
+DRIFT_DEG = 0.05  # per second, of a star tracker [deg/s]
+TOLD_S = 20.0  # until a drift that slow has left the noise of gyroscope and wheels
+CREEP = 0.3  # of a position from satellites, with a velocity that knows nothing of it [m/s]
+ASIDE_M = 0.5  # of a second odometry
+STRANGER_S = 0.02  # between its messages
+FIRST_S = 5.0  # for a message that it repeats
+
+
+def frozen() -> Injection:
+    """The first message again and again, each with its own stamp."""
+    kept: list[Any] = []
+
+    def change(message: Any) -> Any:
+        kept.append(kept[0] if kept else copy.deepcopy(message))
+        again = copy.deepcopy(kept[0])
+        again.header.stamp = message.header.stamp
+        return again
+
+    return change
+
+
+def since_first(change: Callable[[Any, float], None]) -> Injection:
+    """Change each message in place by the time since the first of them [s]."""
+    first: list[int] = []
+
+    def changed(message: Any) -> Any:
+        first.append(stamp_ns(message.header.stamp))
+        change(message, (first[-1] - first[0]) / 1e9)
+        del first[1:]
+        return message
+
+    return changed
+
+
+def mocap_frozen(live: LiveSystem) -> Outcome:
+    """Motion capture has lost the robot and goes on with its last pose, under new stamps."""
+    return intercept(live, frozen(), live.watchdog_s + NOISE_S)
+
+
+def star_tracker_frozen(live: LiveSystem) -> Outcome:
+    """The star tracker repeats its last attitude, under new stamps."""
+    return _told(live, frozen(), live.watchdog_s + NOISE_S)
+
+
+def star_tracker_drifts(live: LiveSystem) -> Outcome:
+    """The attitude of the star tracker drifts about the body's z axis."""
+
+    def drift(message: Any, passed_s: float) -> None:
+        turned_by(message, math.radians(DRIFT_DEG) * passed_s)
+
+    return _told(live, since_first(drift), TOLD_S)
+
+
+def turned_by(message: Any, angle: float) -> None:
+    """Turn an attitude about the body's z axis, in place [rad]."""
+    q, c, s = message.quaternion, math.cos(0.5 * angle), math.sin(0.5 * angle)
+    q.x, q.y, q.z, q.w = c * q.x + s * q.y, c * q.y - s * q.x, c * q.z + s * q.w, c * q.w - s * q.z
+
+
+def gnss_creeps(live: LiveSystem) -> Outcome:
+    """A position from satellites creeps away, along y, while the velocity knows nothing of it."""
+
+    def creep(message: Odometry, passed_s: float) -> None:
+        message.pose.pose.position.y += CREEP * passed_s
+
+    return intercept(live, since_first(creep), live.watchdog_s + TOLD_S)
+
+
+def two_odometries(live: LiveSystem) -> Outcome:
+    """A second node publishes odometry, half a metre aside: the controller follows neither, and names both."""
+    newest: list[Odometry] = []
+
+    def listen(message: Odometry) -> Odometry:
+        newest[:] = [copy.deepcopy(message)]
+        return message
+
+    live.injector.change = listen
+    node, over = rclpy.create_node("stranger", namespace=live.plan.namespace), threading.Event()
+    try:
+        since_s = live.until_a_move_is_on_record()
+        if not wait_for(lambda: bool(newest), FIRST_S):
+            raise NothingShown("no odometry came, so a second one would show nothing")
+        publisher = node.create_publisher(Odometry, ODOMETRY.name, publisher_qos(ODOMETRY))
+
+        def talk() -> None:
+            while not over.wait(STRANGER_S):
+                message = copy.deepcopy(newest[0])
+                message.pose.pose.position.y += ASIDE_M
+                publisher.publish(message)
+
+        thread = threading.Thread(target=talk, name="stranger", daemon=True)
+        thread.start()
+        try:
+            outcome = stopped(live, since_s, DISCOVERY_S + live.watchdog_s + live.corrected_s)
+        finally:
+            over.set()
+            thread.join()
+    finally:
+        node.destroy_node()
+    return replace(outcome, passed=outcome.passed and "stranger" in outcome.reaction)
+
+
+def _told(live: LiveSystem, change: Injection, limit_s: float) -> Outcome:
+    """Somebody says it in time; the satellite then stops, or copes by its gyroscope and wheels."""
+    distance = DistanceWatch(live)
+    live.until_it_moves()
+    live.injector.change = change
+    since_s = time.monotonic()
+    return endured(live, since_s, limit_s, distance)
+
+
+def _without_mocap(robot: Robot) -> str:
+    return "it is not seen by motion capture" if robot.actuators.turns_only else ""
+
+
+def _without_stars(robot: Robot) -> str:
+    return "" if robot.actuators.turns_only else "no star tracker is in its loop"
+
+
+def _without_satellites(robot: Robot) -> str:
+    outdoors = robot.flies or robot.hydrodynamics is not None
+    return "" if outdoors else "satellites do not tell it where it is"
+
+
+SENSOR_FAULTS = (
+    Fault(mocap_frozen, FaultEnvironment(estimated=True, intercepted=MOCAP), _without_mocap),
+    Fault(star_tracker_frozen, FaultEnvironment(estimated=True, intercepted=ATTITUDE), _without_stars),
+    Fault(star_tracker_drifts, FaultEnvironment(estimated=True, intercepted=ATTITUDE), _without_stars),
+    Fault(gnss_creeps, why_not=_without_satellites),
+    Fault(two_odometries),
+)
