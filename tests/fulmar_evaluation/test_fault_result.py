@@ -101,3 +101,9 @@ def test_a_bag_that_does_not_open_is_lost_as_a_whole(stamps, tmp_path):
     kept = bag_evidence(tmp_path, received(stamps), None)
     assert (kept.lost, kept.intact) == (len(stamps), False)
     assert str(tmp_path) in kept.words
+
+
+def test_a_recorder_that_was_started_again_may_lack_what_came_meanwhile_and_a_second_before(stamps):
+    observer = received(with_one_more(stamps, 10))
+    assert bag_evidence(BAG, observer, (10.5, 12.0), again=True).intact
+    assert not bag_evidence(BAG, observer, (12.5, 14.0), again=True).intact

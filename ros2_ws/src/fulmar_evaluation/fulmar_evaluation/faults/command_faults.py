@@ -14,7 +14,7 @@ from sensor_msgs.msg import JointState
 from fulmar_core.robot import Robot
 from fulmar_core.topics import VELOCITY_COMMAND, command_wire
 from fulmar_evaluation.faults.fault import STAYS_S, Fault, Outcome, stopped, went_on
-from fulmar_evaluation.faults.fault_environment import FaultEnvironment, delayed
+from fulmar_evaluation.faults.fault_environment import COMMANDS, FaultEnvironment, delayed
 from fulmar_evaluation.faults.live_system import LiveSystem
 from fulmar_evaluation.faults.two_hosts import CUT, LOSSY, why_not
 from fulmar_ros.qos import publisher_qos
@@ -23,7 +23,6 @@ STRANGER_S = 0.02  # between its commands
 # Until nodes on one computer know of a new publisher, and for the look of a tenth of a second
 DISCOVERY_S = 0.3
 DRIVES_S = 8.0  # forty commands at 5 Hz
-COMMANDS = FaultEnvironment(intercepted=None)
 
 
 def commands_not_a_number(live: LiveSystem) -> Outcome:

@@ -28,6 +28,7 @@ class Outcome:
     time_to_safe_s: float | None = None
     limit_s: float | None = None  # None: the robot is to go on [s]
     recorder_away: tuple[float, float] | None = None  # from when to when the fault kept it from its work [s]
+    recorder_again: bool = False  # it died, and was started again
 
 
 @dataclass(frozen=True)
@@ -91,6 +92,7 @@ def went_on(
     reaction: str,
     correct: bool,
     recorder_away: tuple[float, float] | None = None,
+    recorder_again: bool = False,
 ) -> Outcome:
     """Whether a robot went on, without a pause as long as its watchdog, and the right thing was said.
 
@@ -101,6 +103,7 @@ def went_on(
         reaction: What was said.
         correct: Whether that is what had to be said.
         recorder_away: As of `Outcome`.
+        recorder_again: Same.
     """
     statuses = live.observer.statuses_since(since_s - WORDS_S)  # with one from before, to compare with
     trips = {status.values.get("watchdog_trips", "") for status in statuses if status.who == "plant"}
@@ -113,7 +116,9 @@ def went_on(
         else [f"the watchdog tripped (trips reported: {', '.join(sorted(trips)) or 'none'})"]
     )
     said = "; ".join([*wrong, reaction])
-    return Outcome(detected_by, said, correct and not wrong, recorder_away=recorder_away)
+    return Outcome(
+        detected_by, said, correct and not wrong, recorder_away=recorder_away, recorder_again=recorder_again
+    )
 
 
 def possible(_robot: Robot) -> str:

@@ -79,10 +79,10 @@ def delayed(periods: int) -> Injection:
 class FaultInjector:
     """Passes messages on; `change` changes each, or swallows it by returning None."""
 
-    def __init__(self, node: Node, wire: Wire, *, prior: bool = False) -> None:
-        """Begin as if it were not there; `prior`: take the priority of the nodes that it stands between."""
+    def __init__(self, node: Node, wire: Wire) -> None:
+        """Begin as if it were not there, with the priority of the nodes that it stands between."""
         self.change: Injection = unchanged
-        self._waits = prior
+        self._begins = True
         kind, reliable = KINDS[wire], wire.delivery != "best_effort"
         self._publisher = node.create_publisher(kind, wire.name, publisher_qos(wire))
         node.create_subscription(
@@ -90,9 +90,9 @@ class FaultInjector:
         )
 
     def _pass(self, message: Any) -> None:
-        if self._waits:
+        if self._begins:
             take_priority_with_helpers(CONTROL_PRIORITY)
-            self._waits = False
+            self._begins = False
         changed = self.change(message)
         if changed is not None:
             self._publisher.publish(changed)
@@ -121,14 +121,13 @@ TASKS = (
 
 @dataclass(frozen=True)
 class FaultEnvironment:
-    """What is unusual about a system; the usual one has an e-stop, and its odometry may be intercepted."""
+    """What is unusual about a system; the usual one has an e-stop, and is what people start."""
 
     estimated: bool = False  # odometry comes from the robot's default estimator
     has_area: bool = False  # the robot must not leave the surroundings of start and goal
     fallback: str | None = None  # classical controller behind the policy
-    # The wire that passes through the injector; None: the robot's commands.
-    intercepted: Wire | None = ODOMETRY
-    answers_pass: bool = False  # the robot's commands, too, pass through an injector of their own
+    intercepted: Wire | None = None  # passes through an injector
+    answers_pass: bool = False  # the robot's commands pass through an injector of their own
     by_goal_node: bool = False  # a goal node publishes goals from a file
     by_hand: bool = False  # a node for teleoperation runs, and nobody touches it yet
     scenario: str = "nominal"
@@ -164,6 +163,8 @@ class FaultEnvironment:
 
 
 USUAL = FaultEnvironment()
+RELAYED = FaultEnvironment(intercepted=ODOMETRY)
+COMMANDS = FaultEnvironment(answers_pass=True)
 
 
 def task_of(robot: Robot) -> Task:

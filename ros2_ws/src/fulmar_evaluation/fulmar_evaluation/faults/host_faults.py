@@ -39,7 +39,7 @@ def supervisor_stopped(live: LiveSystem) -> Outcome:
         who = status.who if status else ""
         return went_on(live, since_s, detected_by=who, reaction=words, correct=status is not None)
     finally:
-        live.launched.process.send_signal(signal.SIGCONT)
+        live.signal_launcher(signal.SIGCONT)
 
 
 def _of_launcher(words: str) -> bool:

@@ -14,7 +14,7 @@ from nav_msgs.msg import Odometry
 from fulmar_bags.message_reader import stamp_ns
 from fulmar_core.sensors.repetition import FROZEN_AFTER
 from fulmar_evaluation.faults.fault import STAYS_S, Fault, Outcome, stopped
-from fulmar_evaluation.faults.fault_environment import FaultEnvironment, Injection, delayed, lost
+from fulmar_evaluation.faults.fault_environment import RELAYED, Injection, delayed, lost
 from fulmar_evaluation.faults.live_system import LiveSystem
 from fulmar_ros.convert import stamp_of
 
@@ -176,7 +176,7 @@ def _epoch(live: LiveSystem, since_s: float) -> tuple[str, str]:
 
 INPUT_FAULTS = (
     *(
-        Fault(do)
+        Fault(do, RELAYED)
         for do in (
             odometry_silent,
             odometry_late,
@@ -188,5 +188,5 @@ INPUT_FAULTS = (
             odometry_dated_back,
         )
     ),
-    *(Fault(do, FaultEnvironment(answers_pass=True)) for do in (time_jump_forwards, time_jump_backwards)),
+    *(Fault(do, replace(RELAYED, answers_pass=True)) for do in (time_jump_forwards, time_jump_backwards)),
 )

@@ -18,7 +18,14 @@ from fulmar_core.safety.geofence import is_inside
 from fulmar_core.spatial import SpatialState
 from fulmar_core.topics import GOAL_POSE, GOAL_WIRES, SIMULATION_START_NS
 from fulmar_evaluation.faults.fault import STAYS_S, WORDS_S, Fault, Outcome, stopped, went_on
-from fulmar_evaluation.faults.fault_environment import ROOM_M, STAYS, FaultEnvironment, goal_of, task_of
+from fulmar_evaluation.faults.fault_environment import (
+    RELAYED,
+    ROOM_M,
+    STAYS,
+    FaultEnvironment,
+    goal_of,
+    task_of,
+)
 from fulmar_evaluation.faults.input_faults import changing, intercept
 from fulmar_evaluation.faults.live_system import LiveSystem
 from fulmar_evaluation.faults.observer import wait_for
@@ -160,12 +167,11 @@ def _without_attitude(robot: Robot) -> str:
     return f"its policy does '{task.name}', whose goals have no attitude"
 
 
-IN_AN_AREA = FaultEnvironment(has_area=True)
 LIMIT_FAULTS = (
-    Fault(odometry_too_fast),
-    Fault(odometry_turns_too_fast),
-    Fault(odometry_leaves_the_area, IN_AN_AREA),
-    Fault(odometry_leaves_the_geofence, why_not=_without_place),
+    Fault(odometry_too_fast, RELAYED),
+    Fault(odometry_turns_too_fast, RELAYED),
+    Fault(odometry_leaves_the_area, replace(RELAYED, has_area=True)),
+    Fault(odometry_leaves_the_geofence, RELAYED, _without_place),
     Fault(goal_with_a_wrong_quaternion, why_not=_without_attitude),
-    Fault(goal_outside_the_area, IN_AN_AREA),
+    Fault(goal_outside_the_area, FaultEnvironment(has_area=True)),
 )

@@ -52,6 +52,7 @@ MOVING_S = 20.0  # a robot that has far to go moves by then, once its plant runs
 RECORD_S = 1.0  # and the next state that moves it comes
 MATCH_S = 10.0  # for a publisher and its subscribers to find one another
 STOPPED = "stopped by"  # how the reason of an end begins that a person asked for
+ASKED_S = 0.5  # between two requests to end
 MOST_S = 300.0  # of a run: no fault takes as long
 
 
@@ -91,10 +92,11 @@ class LiveSystem:
         self.robot = robot
         self.observer = RunObserver(bystander, robot, DEVICE_STATE if about.emulated else ACTUATORS_STATE)
         self.flight = FlightWatch(bystander, self.plan.frames) if robot.flies else None
-        # The safe controller of an aircraft bridges a pause of 50 ms, which an ordinary thread may have.
         wire = command_wire(robot)
-        self.injector = FaultInjector(bystander, about.intercepted or wire, prior=robot.flies)
-        self._answers = FaultInjector(bystander, wire, prior=robot.flies) if about.answers_pass else None
+        self._answers = FaultInjector(bystander, wire) if about.answers_pass else None
+        self._injector = (
+            self._answers if about.intercepted is None else FaultInjector(bystander, about.intercepted)
+        )
         self.tick_s, self.beat_s = robot.timing.physics_dt, 1.0 / self.plan.control_hz
         self.watchdog_s = default_timeout(self.beat_s)
         actuators = robot.actuators
@@ -118,6 +120,12 @@ class LiveSystem:
         """The clock of a node that may step; there must be one."""
         assert self._clock is not None
         return self._clock
+
+    @property
+    def injector(self) -> FaultInjector:
+        """What the intercepted messages pass through; of a system where nothing else does, its commands."""
+        assert self._injector is not None
+        return self._injector
 
     @property
     def answers(self) -> FaultInjector:
@@ -207,6 +215,11 @@ class LiveSystem:
             raise NothingShown("the robot stopped by itself before the fault; the fault would show nothing")
         return since_s
 
+    def signal_launcher(self, number: signal.Signals) -> None:
+        """Send a signal to the launcher, if it still runs."""
+        if not self.has_ended:
+            self.launched.process.send_signal(number)
+
     def process(self, name: str) -> psutil.Process:
         """Process of a node."""
         with contextlib.suppress(KeyError):
@@ -256,6 +269,10 @@ def live_system(
                 live.others.start(teleop_spec(plan.robot, name=plan.name, keyboard=False))
             yield live
         finally:
+            if live.flight is not None:  # which is flown down first; a second request cuts that short
+                for number in (signal.SIGTERM, signal.SIGINT):
+                    live.signal_launcher(number)
+                    time.sleep(ASKED_S)
             launched.end()
             live.others.stop_all()
     if errors:
@@ -265,7 +282,8 @@ def live_system(
 def _intercepted(plan: RunPlan, about: FaultEnvironment) -> tuple[tuple[str, str, str], ...]:
     """Outputs of nodes that the injectors pass on, as of `RunPlan.intercepted`."""
     commands = command_wire(load_robot(plan.robot))
-    wires = [about.intercepted or commands, *([commands] if about.answers_pass else [])]
+    wires = [about.intercepted] if about.intercepted is not None else []
+    wires += [commands] if about.answers_pass else []
     return tuple((_publisher_of(wire, plan), wire.name, source_of(wire)) for wire in wires)
 
 

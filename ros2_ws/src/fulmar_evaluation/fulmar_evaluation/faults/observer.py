@@ -152,20 +152,23 @@ class BagEvidence:
     words: str = ""  # what is wrong; empty if nothing is
 
 
-def bag_evidence(record: Path, observer: RunObserver, away: tuple[float, float] | None) -> BagEvidence:
+def bag_evidence(
+    record: Path, observer: RunObserver, away: tuple[float, float] | None, *, again: bool = False
+) -> BagEvidence:
     """Compare a bag with what an observer received.
 
     Args:
         record: The bag, as it lies there after everybody has ended.
         observer: Received what actuators did.
         away: From when to when a fault kept the recorder from its work; for ever, where it ended it [s].
+        again: Whether that recorder died, and another one goes on in its bag.
     """
     received_s, received_ns = observer.received()
     from_s, to_s = away or (math.inf, math.inf)
     dead = away is not None and math.isinf(to_s)
     if dead:  # what comes after its end is nobody's loss
         received_s, received_ns = received_s[received_s < from_s], received_ns[received_s < from_s]
-    from_s, to_s = from_s - (TORN_S if dead else IN_FLIGHT_S), to_s + IN_FLIGHT_S
+    from_s, to_s = from_s - (TORN_S if dead or again else IN_FLIGHT_S), to_s + IN_FLIGHT_S
     try:
         bag = open_bag(record)
     except BagError as error:
@@ -180,6 +183,6 @@ def bag_evidence(record: Path, observer: RunObserver, away: tuple[float, float] 
     problems = [
         *([f"lacks {gaps} of {observer.wire.name}"] if gaps else []),
         *([f"its recorder dropped {dropped}"] if dropped and not dead else []),
-        *(() if dead else bag.warnings),
+        *(() if dead or again else bag.warnings),  # of a recorder that died they say just that
     ]
     return BagEvidence(int(np.sum(missing)) + dropped, not problems, "; ".join(problems))

@@ -20,6 +20,8 @@ from fulmar_evaluation.faults.observer import HealthStatus, wait_for
 
 ESTOP_S = TIMEOUT_NS / 1e9
 PAUSE_S = 2.0
+REPORT_S = 0.5  # what a recorder said before it died has come by then
+AGAIN_S = 15.0  # for a recorder to be started again, on a busy computer
 PROBLEM_S = 10.0  # a recorder looks at its disk now and then
 
 
@@ -103,16 +105,28 @@ def goals_killed(live: LiveSystem) -> Outcome:
 
 
 def recorder_killed(live: LiveSystem) -> Outcome:
-    """SIGKILL of the recorder, which is a power cut to the bag: control goes on, and the bag opens."""
+    """SIGKILL of the recorder, a power cut to the bag: control goes on, and another recorder goes on with the bag."""
     since_s = live.until_it_moves()
     time.sleep(PAUSE_S)  # the bag gets something to lose
     live.send("recorder", signal.SIGKILL)
     away_s = time.monotonic()
+    again = wait_for(lambda: _recorder_reports(live, away_s + REPORT_S), AGAIN_S)
+    back_s = time.monotonic()
     time.sleep(PAUSE_S)
     who, reaction = _launcher_on(live, "recorder")
     return went_on(
-        live, since_s, detected_by=who, reaction=reaction, correct=bool(who), recorder_away=(away_s, math.inf)
+        live,
+        since_s,
+        detected_by=who,
+        reaction=reaction,
+        correct=bool(who) and again,
+        recorder_away=(away_s, back_s if again else math.inf),
+        recorder_again=again,
     )
+
+
+def _recorder_reports(live: LiveSystem, since_s: float) -> bool:
+    return any(status.who == "recorder" for status in live.observer.statuses_since(since_s))
 
 
 def recorder_hangs(live: LiveSystem) -> Outcome:

@@ -19,7 +19,7 @@ from fulmar_core.topics import MOCAP, ODOMETRY
 from fulmar_evaluation.faults.command_faults import DISCOVERY_S
 from fulmar_evaluation.faults.endurance import DistanceWatch, endured
 from fulmar_evaluation.faults.fault import Fault, Outcome, stopped
-from fulmar_evaluation.faults.fault_environment import ATTITUDE, FaultEnvironment, Injection
+from fulmar_evaluation.faults.fault_environment import ATTITUDE, RELAYED, FaultEnvironment, Injection
 from fulmar_evaluation.faults.input_faults import intercept
 from fulmar_evaluation.faults.live_system import LiveSystem, NothingShown
 from fulmar_evaluation.faults.observer import wait_for
@@ -154,6 +154,6 @@ SENSOR_FAULTS = (
     Fault(mocap_frozen, FaultEnvironment(estimated=True, intercepted=MOCAP), _without_mocap),
     Fault(star_tracker_frozen, FaultEnvironment(estimated=True, intercepted=ATTITUDE), _without_stars),
     Fault(star_tracker_drifts, FaultEnvironment(estimated=True, intercepted=ATTITUDE), _without_stars),
-    Fault(gnss_creeps, why_not=_without_satellites),
-    Fault(two_odometries),
+    Fault(gnss_creeps, RELAYED, _without_satellites),
+    Fault(two_odometries, RELAYED),
 )

@@ -200,5 +200,6 @@ def _do(robot: str, fault: Fault, launcher: str, folder: Path, hosts: TwoHosts |
         # What stopped a robot may end its launcher; an aircraft is flown down first, which takes long.
         if outcome.time_to_safe_s is not None and live.flight is None:
             wait_for(lambda: live.has_ended, ENDS_S)
-    evidence = bag_evidence(request.record, live.observer, outcome.recorder_away)
+    away, again = outcome.recorder_away, outcome.recorder_again
+    evidence = bag_evidence(request.record, live.observer, away, again=again)
     return _result(fault, live, outcome, evidence)
