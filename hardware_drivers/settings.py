@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal
 
@@ -59,6 +60,18 @@ class Bearing:
 
 
 @dataclass(frozen=True)
+class Supply:
+    """The valve that shuts off what feeds the thrusters, and nothing else: a stuck valve blows no more behind it."""
+
+    line: str  # name of its GPIO line, or its number
+    rest_s: float = 1.0  # it is shut once no valve was to be open for so long [s]
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.rest_s < math.inf:
+            raise ValueError(f"rest_s = {self.rest_s:g} must be a finite number of seconds, at least 0.")
+
+
+@dataclass(frozen=True)
 class GpioValves:
     """Solenoid valves on lines of a GPIO chip, by libgpiod."""
 
@@ -69,19 +82,21 @@ class GpioValves:
     bearing: Bearing | None = None  # None: the robot floats without air
     active_low: bool = True
     min_on_s: float = 0.0  # an opened valve stays open so long, except when all must close [s]
+    supply: Supply | None = None  # None: nothing shuts it off but a hand
 
     def __post_init__(self) -> None:
         every = self.every_line
         if len(set(every)) != len(every):
-            raise ValueError("each valve and the bearing need a line of their own.")
+            raise ValueError("each valve, the bearing and the supply need a line of their own.")
         check_order(self.order, len(self.lines))
         if not 0.0 <= self.min_on_s <= 0.2:
             raise ValueError("min_on_s must be from 0 to 0.2 s.")
 
     @property
     def every_line(self) -> tuple[str, ...]:
-        """Those of the valves, then that of the bearing, if there is one."""
-        return (*self.lines, *([self.bearing.line] if self.bearing else []))
+        """Those of the valves, then those of the bearing and of the supply, if there are any."""
+        others = [part.line for part in (self.bearing, self.supply) if part]
+        return (*self.lines, *others)
 
 
 @dataclass(frozen=True)

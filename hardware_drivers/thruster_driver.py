@@ -18,7 +18,11 @@ STATES = {False: Value.INACTIVE, True: Value.ACTIVE}
 
 
 class ValveDriver(DeviceDriver):
-    """Opens and closes valves by GPIO; measures nothing."""
+    """Opens and closes valves by GPIO; measures nothing.
+
+    A supply with a line of its own is open only while valves are to be: a valve that is stuck open then blows no longer
+    than until the next rest, whether a controller, a watchdog or an e-stop brought it.
+    """
 
     def __init__(self, robot: Robot, settings: GpioValves, *, patience_s: float) -> None:
         """Take the lines, everything closed.
@@ -35,6 +39,7 @@ class ValveDriver(DeviceDriver):
         self._chip = settings.port
         self._written: dict[int | str, Value] = {}  # what each line was set to last
         self._refusal = ""
+        self._supply, self._supply_open, self._opened_ns = settings.supply, False, 0
         self._lock = threading.Lock()
 
     def write(self, command: np.ndarray) -> np.ndarray:
@@ -43,6 +48,7 @@ class ValveDriver(DeviceDriver):
         with self._lock:
             self._read_back()
             applied = self._timing.allowed(command, now_ns)
+            self._feed(bool(applied.any()), now_ns)
             self._set(applied)
             self._note(bool(applied.any()), now_ns)
         return applied
@@ -52,10 +58,10 @@ class ValveDriver(DeviceDriver):
         return self._refusal
 
     def close(self) -> None:
-        """Close the valves and release the lines; see `DeviceDriver`."""
+        """Close the valves, shut the supply and release the lines; see `DeviceDriver`."""
         with self._lock:
             if self._lines is not None:
-                self._set(np.zeros(len(self._valves)))
+                self._rest()
                 self._let_go()
                 self._lines.release()
                 self._lines = None
@@ -85,6 +91,26 @@ class ValveDriver(DeviceDriver):
         ]
         lines_are = f"{self._chip}: line {', '.join(wrong)} is not at the level that was set"
         self._refusal = f"{lines_are}: a short circuit, or another program?" if wrong else ""
+
+    def _rest(self) -> None:
+        """Close every valve and shut the supply; call with the lock held."""
+        self._set(np.zeros(len(self._valves)))
+        self._switch_supply(False)
+
+    def _feed(self, used: bool, now_ns: int) -> None:
+        """Open the supply before a valve opens, and shut it after a rest; call with the lock held."""
+        if self._supply is None:
+            return
+        if used:
+            self._opened_ns = now_ns
+            self._switch_supply(True)
+        elif now_ns - self._opened_ns >= 1e9 * self._supply.rest_s:
+            self._switch_supply(False)
+
+    def _switch_supply(self, on: bool) -> None:
+        if self._supply is not None and self._lines is not None and on != self._supply_open:
+            self._write({line_of(self._supply.line): STATES[on]})
+            self._supply_open = on
 
     def _note(self, used: bool, now_ns: int) -> None:
         """Called after each command, with whether a valve is open and the steady clock [ns], with the lock held."""
@@ -118,7 +144,10 @@ class ThrusterDriver(ValveDriver):
             self.set_bearing(True)
 
     def close(self) -> None:
-        """Switch the bearing off after `linger_s`, and release the lines; see `DeviceDriver`."""
+        """Close the valves, switch the bearing off after `linger_s`, and release the lines; see `DeviceDriver`."""
+        with self._lock:
+            if self._lines is not None:
+                self._rest()
         if self._bearing_on:
             time.sleep(self._settings.linger_s)
         super().close()
@@ -141,7 +170,7 @@ class ThrusterDriver(ValveDriver):
             if self._lines is None:
                 return "the driver has let go of the lines"
             if not on:
-                self._set(np.zeros(len(self._valves)))
+                self._rest()
             self._switch(on)
             self._used_ns = time.monotonic_ns()
         return ""

@@ -62,6 +62,7 @@ class EmulatorSettings(PlantSettings):
     order: tuple[int, ...] = (0, 1, 2, 3, 4, 5, 6, 7)  # which thruster each valve line opens
     active_low: bool = True
     bearing: bool = True  # valves have an air bearing beside them
+    supply: bool = False  # a valve shuts off the supply of the others
     inverted: bool = False  # a valve node opens its valves at 0
     stamped: bool = False  # a base takes TwistStamped
     message: str = "int16"  # of VALVE_MESSAGES, which a valve node takes
@@ -215,8 +216,14 @@ def make_emulator(robot: Robot, backend: MujocoBackend, settings: EmulatorSettin
         ConfigError: The link is of another kind than the device has.
     """
     if settings.device == "valves":
-        path, order, bearing = Path(settings.link), settings.order, settings.bearing
-        return ValveBank(path, robot, order=order, active_low=settings.active_low, bearing=bearing)
+        return ValveBank(
+            Path(settings.link),
+            robot,
+            order=settings.order,
+            active_low=settings.active_low,
+            bearing=settings.bearing,
+            supply=settings.supply,
+        )
     if settings.device == "valve_topic":
         return ValveNode(settings.link, settings.order, inverted=settings.inverted)
     if settings.device == "velocity_topic":

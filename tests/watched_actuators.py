@@ -13,6 +13,7 @@ from fulmar_core.goal import goal_in_float64
 from fulmar_core.health.applied import AppliedHistory
 from fulmar_core.health.fault_monitor import FaultMonitor
 from fulmar_core.robot import load_robot
+from fulmar_core.safety.convergence import ConvergenceMonitor
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.state import RigidBodyState
 from fulmar_core.tasks import load_task
@@ -32,7 +33,9 @@ class Watched:
         dead: When each actuator was first named as dead, by its name [s].
         open: Same as stuck open.
         said: Everything that was said, each once.
-        at_goal_s: When the robot first was at its last target, and then; None if it is not in the end [s].
+        unconverged_s: When it was found not to converge; None if it was not [s].
+        lost: Names of actuators that were dead from the start, as the scenario drew.
+        at_goal_s: Since when the robot is at its target in the end; None if it is not [s].
     """
 
     part: str
@@ -40,7 +43,15 @@ class Watched:
     dead: dict[str, float]
     open: dict[str, float]
     said: tuple[str, ...]
+    unconverged_s: float | None
     at_goal_s: float | None
+    lost: tuple[str, ...] = ()
+
+    @property
+    def stopped_s(self) -> float | None:
+        """When the controller would have stopped, in words; None if it would not [s]."""
+        stops = [*self.open.values(), *([] if self.unconverged_s is None else [self.unconverged_s])]
+        return min(stops, default=None)
 
     def right(self, at: float) -> bool:
         """Whether the part that sticks there was named."""
@@ -48,7 +59,7 @@ class Watched:
 
     def wrong(self, at: float | None) -> list[str]:
         """Names that should not have been named, of a part that sticks there; None: none does."""
-        dead, opened = set(self.dead), set(self.open)
+        dead, opened = set(self.dead) - set(self.lost), set(self.open)
         if at is not None:
             (dead if at == CLOSED else opened).discard(self.part)
         return sorted(dead | opened)
@@ -92,6 +103,7 @@ def watch(
     named: list[tuple[dict[str, float], dict[str, float]]] = [({}, {}) for _ in range(episodes)]
     said: list[dict[str, None]] = [{} for _ in range(episodes)]
     at_goal: list[float | None] = [None] * episodes
+    convergence, unconverged = ConvergenceMonitor(robot, loop.task, loop.dt), [None] * episodes
     for number in range(round(seconds / loop.dt)):
         time_s, stamp_ns = number * loop.dt, round(1e9 * number * loop.dt)
         measured = batch.measured.to_rigid()
@@ -103,13 +115,19 @@ def watch(
                 for name in names:
                     known.setdefault(name, time_s)
             said[i] |= dict.fromkeys(monitor.beliefs.words)
-        step = loop.step(batch.measured, stamp_ns)
+        inputs = loop.inputs(batch.measured, stamp_ns)
+        step = loop.act(inputs)
+        convergence.see(inputs.state, inputs.goal, step.command)
+        suspected = np.array([bool(monitor.beliefs.dead) for monitor in monitors])
+        for i, late in enumerate(convergence.late(suspected)):
+            unconverged[i] = time_s if late and unconverged[i] is None else unconverged[i]
         for history, command in zip(histories, step.command, strict=True):
             history.add(stamp_ns, np.array(command, dtype=float))
         within = loop.task.tolerance.holds(loop.task.errors(batch.truth, loop.goal))
         for i, there in enumerate(np.asarray(within)):
             at_goal[i] = (time_s if at_goal[i] is None else at_goal[i]) if there else None
         batch.move(step.command)
+    alive = np.asarray(batch.world.alive)
     parts = np.asarray(batch.world.stuck_part).astype(int)
     return [
         Watched(
@@ -117,7 +135,9 @@ def watch(
             float(np.asarray(batch.world.stuck_from)[i]),
             *named[i],
             tuple(said[i]),
+            unconverged[i],
             at_goal[i],
+            tuple(name for name, works in zip(robot.actuators.names, alive[:, i], strict=True) if not works),
         )
         for i in range(episodes)
     ]

@@ -17,7 +17,14 @@ class ValveBank:
     """Valves and bearing on the pins of a GPIO chip that is a file; they keep their state when the driver dies."""
 
     def __init__(
-        self, path: Path, robot: Robot, *, order: tuple[int, ...], active_low: bool, bearing: bool = True
+        self,
+        path: Path,
+        robot: Robot,
+        *,
+        order: tuple[int, ...],
+        active_low: bool,
+        bearing: bool = True,
+        supply: bool = False,
     ) -> None:
         """Make the chip, with all pins inactive.
 
@@ -27,20 +34,21 @@ class ValveBank:
             order: Which thruster each pin opens, counted from 0; the bearing's pin comes after them.
             active_low: Whether a valve opens at level 0.
             bearing: Whether there is a bearing; a robot without one floats.
+            supply: Whether a valve shuts off the supply of the others; its pin comes last.
         """
         self._path, self._order, self._open_level = path, np.array(order), int(not active_low)
-        self._count, self._bearing = len(robot.actuators.names), bearing
+        self._count, self._bearing, self._supply = len(robot.actuators.names), bearing, supply
         half_made = path.with_suffix(".new")
-        half_made.write_bytes(bytes([1 - self._open_level]) * (self._count + bearing))
+        half_made.write_bytes(bytes([1 - self._open_level]) * (self._count + bearing + supply))
         half_made.rename(path)  # a driver that waits for it finds all of its pins
         self._file = path.open("rb", buffering=0)
         self.address = f"file://{path}"
 
     def command(self, now_s: float) -> np.ndarray:
-        """See `EmulatedDevice`; without air the platform stands on the floor."""
+        """See `EmulatedDevice`; without air the platform stands on the floor, and without supply no valve blows."""
         levels = self.levels()
         valves = np.zeros(self._count)
-        if not self._bearing or levels[self._count] == self._open_level:
+        if (levels[self._count :] == self._open_level).all():
             valves[self._order] = levels[: self._count] == self._open_level
         return valves
 
@@ -50,9 +58,10 @@ class ValveBank:
         return bool(self.levels()[self._count] == self._open_level)
 
     def levels(self) -> np.ndarray:
-        """Level at the pin of each valve in the order of the wiring, then at the bearing's, shape (n + 1,) or (n,)."""
+        """Level at each valve's pin in the order of the wiring, then of bearing and supply, shape (n + 0 to 2,)."""
         self._file.seek(0)
-        return np.frombuffer(self._file.read(self._count + self._bearing), dtype=np.uint8)
+        pins = self._count + self._bearing + self._supply
+        return np.frombuffer(self._file.read(pins), dtype=np.uint8)
 
     def report(self, sample: Sample, now_s: float) -> None:
         """Valves report nothing."""
@@ -121,7 +130,7 @@ class ValveNode(TopicDevice):
         return bool(self._values[0] > 0.5)
 
     def command(self, now_s: float) -> np.ndarray:
-        """See `EmulatedDevice`; without air the platform stands on the floor."""
+        """See `EmulatedDevice`; without air the platform stands on the floor, and without supply no valve blows."""
         values = super().command(now_s)
         valves = np.zeros(len(self._order))
         if self.air:

@@ -18,7 +18,7 @@ from hardware_drivers.devices import make_device
 from hardware_drivers.driver_backend import DriverBackend, backend_of
 from hardware_drivers.gpio import output_lines
 from hardware_drivers.hardware import Hardware, load_hardware
-from hardware_drivers.settings import Bearing, GpioValves
+from hardware_drivers.settings import Bearing, GpioValves, Supply
 from hardware_drivers.thruster_driver import ThrusterDriver
 from sim_nodes.emulators.outputs import ValveBank
 from tests.hardware_drivers.bench import episode_at
@@ -129,6 +129,49 @@ def test_a_bearing_that_nobody_needs_is_switched_off(rig, monkeypatch):
     assert not driver.bearing_on
 
 
+@pytest.fixture
+def fed(tmp_path, monkeypatch):
+    """A platform whose supply has a valve of its own, with its pins and a clock [ns]."""
+    lab, now = load_hardware("zero_g_lab").driver, [10**12]
+    monkeypatch.setattr("hardware_drivers.thruster_driver.time.monotonic_ns", lambda: now[0])
+    bank = ValveBank(tmp_path / "gpio", ROBOT, order=lab.order, active_low=True, supply=True)
+    bearing = replace(lab.bearing, linger_s=0.0, idle_off_s=0.0)
+    settings = replace(lab, port=bank.address, min_on_s=0.0, bearing=bearing, supply=Supply("PY.00"))
+    yield bank, started(settings), now
+    bank.close()
+
+
+def shut(bank):
+    return bool(bank.levels()[-1])
+
+
+def test_the_supply_is_open_while_valves_are_and_shut_after_a_rest(fed):
+    bank, driver, now = fed
+    assert shut(bank)
+    driver.step(np.eye(8)[3])
+    assert not shut(bank)
+    assert bank.command(0.0).tolist() == np.eye(8)[3].tolist()
+    for passed_s, closed in ((0.0, False), (0.9, False), (1.1, True)):
+        driver.step(np.zeros(8))
+        now[0] += round(1e9 * passed_s)
+        driver.step(np.zeros(8))
+        assert shut(bank) == closed
+        now[0] -= round(1e9 * passed_s)
+    driver.step(np.ones(8))
+    assert not shut(bank)
+
+
+@pytest.mark.parametrize("end", ["close", "no air"])
+def test_the_supply_is_shut_with_the_driver_and_with_the_air(fed, end):
+    bank, driver, _now = fed
+    driver.step(np.ones(8))
+    if end == "close":
+        driver.close()
+    else:
+        driver.set_bearing(False)
+    assert shut(bank)
+
+
 def test_a_driver_that_dies_leaves_its_valves_as_they_were(rig):
     """That is copper, not code: no process can close a valve after its own death."""
     bank, settings = rig
@@ -163,6 +206,7 @@ def test_a_chip_that_is_not_there_is_named_with_what_to_do():
     [
         ({"order": (0, 1, 2, 3, 4, 5, 6, 6)}, "must hold each of 0 to 7 once"),
         ({"lines": ("A",) * 8}, "a line of their own"),
+        ({"supply": Supply("I")}, "a line of their own"),
         ({"min_on_s": 0.5}, "min_on_s must be from 0 to 0.2 s"),
     ],
 )

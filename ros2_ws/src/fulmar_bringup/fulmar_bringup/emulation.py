@@ -71,6 +71,7 @@ def emulation_of(hardware: Hardware, folder: Path) -> Emulation:
             "order": list(driver.order),
             "active_low": driver.active_low,
             "bearing": driver.bearing is not None,
+            "supply": driver.supply is not None,
         }
         return Emulation("valves", str(pins), f"file://{pins}", more)
     if isinstance(driver, XPlane):
