@@ -24,6 +24,7 @@ from fulmar_core.health.hypotheses import Hypotheses, Kind
 from fulmar_core.robot import Robot
 from fulmar_core.state import RigidBodyState
 
+WORST = 25.0  # mean square of one measurement's errors that counts at most [-]
 MOVING, TURNING = 0, 1  # groups of axes, each with a filter and a factor of its own
 
 
@@ -31,19 +32,21 @@ MOVING, TURNING = 0, 1  # groups of axes, each with a filter and a factor of its
 class BankSettings:
     """How far to trust model and measurements; forces as shares of one actuator's thrust, torques of its moment."""
 
-    model: float = 0.09  # what the model leaves out, anew at each step [-]
+    model: float = 0.04  # what the model leaves out, anew at each step [-]
     push: float = 0.3  # push from outside at the beginning [-]
-    drift: float = 0.06  # its change in one second [-]
+    drift: float = 0.03  # its change in one second [-]
     sudden: float = 1.0  # its change in one second where something pushes as it likes, and its beginning [-]
-    position: float = 0.0015  # least error of a measured coordinate [m]
-    heading: float = 0.003  # same [rad]
-    velocity: float = 0.006  # same [m/s]
+    position: float = 0.001  # least error of a measured coordinate [m]
+    heading: float = 0.002  # same [rad]
+    velocity: float = 0.005  # same [m/s]
     yaw_rate: float = 0.01  # same [rad/s]
-    misfit: float = 0.15  # error of the wrench of a command, anew at each step, as a share of it [-]
+    learned_s: float = 2.0  # in which a push is learned, about [s]
+    misfit: float = 0.1  # error of the wrench of a command, anew at each step, as a share of it [-]
     wander: float = 0.05  # change of the factors in one second [-]
     change: float = 2e-3  # chance that what is wrong changes, in one second [-]
     anew: float = 0.2  # share of its chance before anything is seen, below which one begins anew [-]
     surprise: float = 12.0  # largest weight of one measurement against a hypothesis, as log-likelihood [-]
+    first_misfit: float = 2.0  # mean square of the errors of the best hypothesis, before any is seen [-]
     memory_s: float = 4.0  # over which the errors of the best hypothesis are averaged [s]
 
 
@@ -63,6 +66,7 @@ class FaultBank:
         self._tick = robot.timing.physics_dt if robot.body.planar else 0.0
         self._axes = np.array([0, 1, 5] if robot.body.planar else range(6))
         self._moving = int((self._axes < 3).sum())  # how many, the first ones; the others turn
+        self._numbers = 2.0 * np.array([self._moving, len(self._axes) - self._moving])  # measured, of each group
         self._com = np.array(robot.body.com)
         self._inertia = robot.body.inertia_matrix
         self._inverse = np.linalg.inv(self._inertia)
@@ -78,6 +82,8 @@ class FaultBank:
         #: Largest force and moment of one actuator that can move the body [N, N·m].
         self.one_actuator = _one_actuator(robot)
         self._filters = _filters(robot, self._settings, self.one_actuator)
+        #: 1 for hypotheses that go on with the push that is left beside them.
+        self._for_long = np.array([float(each.for_long) for each in self.hypotheses.all])[:, None]
         easy = np.array([each.kind is Kind.PUSHED for each in self.hypotheses.all], dtype=int)
         group = np.array([MOVING] * self._moving + [TURNING] * (len(self._axes) - self._moving))
         self._which = 2 * easy[:, None] + group  # filter of each hypothesis and axis
@@ -93,13 +99,15 @@ class FaultBank:
         self._response = np.zeros((3, count, axes))  # of these to the factors
         self._factor = np.ones((count, 2))
         self._doubt = np.tile(self._spread**2, (count, 1))
-        self._noise = 1.0  # mean square of the best hypothesis' white errors, at least 1
+        self._usual = np.zeros((count, axes))  # mean acceleration by the commands of late
+        # Mean square of the best hypothesis' white errors of each group, at least 1.
+        self._noise = np.full(2, self._settings.first_misfit)
         self._filters.reset()
 
     @property
     def misfit(self) -> float:
         """Mean square of the errors of the likeliest hypothesis, in standard deviations, at least 1."""
-        return self._noise
+        return float(self._noise.max())
 
     def push(self, number: int) -> np.ndarray:
         """Force and torque from outside under a hypothesis, along the world's axes, shape (6,) [N, N·m]."""
@@ -146,6 +154,7 @@ class FaultBank:
         response = _moved(self._response, dt, half)
         response[0] += half * place
         response[1] += dt * speed
+        self._usual += min(1.0, dt / self._settings.learned_s) * (speed - self._usual)
         pose = (np.concatenate((motion.position, self._turned)) - self._begin)[self._axes]
         self._learn(ahead, response, pose - ahead[0], motion.velocity[self._axes] - ahead[1], dt, half)
 
@@ -165,15 +174,15 @@ class FaultBank:
         along = self._by_group((about * about).sum(axis=0))
         common = self._by_group((about * odd).sum(axis=0))
         doubt = self._doubt + s.misfit**2
-        square = (odd * odd).sum(axis=(0, 2)) - (common * common * doubt / (1.0 + doubt * along)).sum(axis=-1)
-        surprise = 0.5 * square / self._noise + 0.5 * np.log1p(doubt * along).sum(axis=-1)
+        square = self._by_group((odd * odd).sum(axis=0)) - common * common * doubt / (1.0 + doubt * along)
+        surprise = 0.5 * (square / self._noise + np.log1p(doubt * along)).sum(axis=-1)
         surprise -= gains.log_white.sum(axis=-1)
         surprise -= surprise.min()
         chance = self.chance * np.exp(-np.minimum(surprise, s.surprise))
         self.chance = chance / chance.sum()
         share = min(1.0, dt / s.memory_s)
-        fresh = min(float(square[np.argmax(self.chance)]) / (2.0 * len(self._axes)), 25.0)
-        self._noise = max(1.0, self._noise + share * (fresh - self._noise))
+        fresh = np.minimum(square[np.argmax(self.chance)] / self._numbers, WORST)
+        self._noise = np.maximum(1.0, self._noise + share * (fresh - self._noise))
         # Two stages: first the factors, then the motion under them.
         left = self._doubt / (1.0 + doubt * along)
         factor = np.clip(self._factor + left * common, *self._factors)
@@ -193,7 +202,9 @@ class FaultBank:
             (self.chance / (self.chance + self._settings.anew * self.hypotheses.prior))[:, None],
             self.chance,
         )
-        self._state = own * state + (1.0 - own) * (chance @ state)[:, None]
+        anew = np.repeat((chance @ state)[:, None], len(chance), axis=1)
+        anew[2] += self._for_long * (chance @ self._usual - self._usual)
+        self._state = own * state + (1.0 - own) * anew
         self._response = own * response + (1.0 - own) * (chance @ response)[:, None]
         self._factor = own * factor + (1.0 - own) * (chance @ factor)
         self._doubt = own * doubt + (1.0 - own) * (chance @ doubt)

@@ -35,11 +35,13 @@ class Hypothesis:
         kind: Its kind.
         stuck: Numbers of the actuators that do not follow their commands.
         level: What these do instead, a share of their full thrust [-].
+        for_long: Since before what is believed of the push was learned; else from a moment on that comes.
     """
 
     kind: Kind
     stuck: tuple[int, ...] = ()
     level: float = 0.0
+    for_long: bool = False
 
 
 def can_monitor(robot: Robot) -> bool:
@@ -59,11 +61,17 @@ class Hypotheses:
         levels = (OPEN,) if robot.actuators.binary else (HALF_OPEN, OPEN)
         pairs = list(itertools.combinations(range(count), 2))
         pairs = pairs if len(pairs) <= MOST_PAIRS else []
+        opened = [
+            Hypothesis(Kind.OPEN, (i,), level, for_long)
+            for for_long in (False, True)
+            for i in range(count)
+            for level in levels
+        ]
         groups = [
             (PUSHED, [Hypothesis(Kind.PUSHED)]),
             (POWERLESS, [Hypothesis(Kind.POWERLESS, tuple(range(count)))]),
             (DEAD, [Hypothesis(Kind.DEAD, (i,)) for i in range(count)]),
-            (STUCK_OPEN, [Hypothesis(Kind.OPEN, (i,), level) for i in range(count) for level in levels]),
+            (STUCK_OPEN, opened),
             (DEAD_PAIR, [Hypothesis(Kind.DEAD, pair) for pair in pairs]),
         ]
         self.all: list[Hypothesis] = [Hypothesis(Kind.SOUND)]
