@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fulmar_core.health.beliefs import BeliefReader
+from fulmar_core.health.beliefs import BeliefReader, Beliefs, joined
 from fulmar_core.health.thruster_health import Health
 from fulmar_core.robot import load_robot
 
@@ -47,3 +47,30 @@ def test_a_torque_beyond_the_robots_own_is_said():
 
 def test_a_robot_that_is_held_is_said():
     assert "held" in READER.read(health(held=True)).words[0]
+
+
+ESTIMATED = Beliefs(
+    ("thruster_6", "thruster_8"),
+    (
+        "valve thruster_6 believed dead (effectiveness 0.12)",
+        "valve thruster_8 believed dead (effectiveness 0.34)",
+        "a push of 1.20 N is believed, beyond what the valves can hold",
+    ),
+)
+
+
+def test_dead_valves_that_only_the_estimator_believes_in_are_not_named():
+    assert joined(ESTIMATED, Beliefs(), suspects=()).dead == ()
+
+
+def test_dead_valves_that_the_monitor_suspects_too_are_named_with_their_effectiveness():
+    believed = joined(ESTIMATED, Beliefs(), suspects=("thruster_8",))
+    assert believed.dead == ("thruster_8",)
+    assert believed.words == ESTIMATED.words[1:]
+    assert believed.warnings == ("valve thruster_8 believed dead",)
+
+
+def test_a_valve_that_is_stuck_open_explains_what_the_estimator_believes():
+    words = ("valve thruster_3 is stuck open",)
+    monitored = Beliefs((), words, ("thruster_3",), words)
+    assert joined(ESTIMATED, monitored, suspects=()) == monitored

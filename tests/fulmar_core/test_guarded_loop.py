@@ -393,6 +393,14 @@ def test_a_robot_that_does_not_converge_stops_in_words_until_it_has_a_new_goal()
     assert bench.step()[0].mode is Mode.ACTIVE
 
 
+def test_what_is_believed_dead_is_named_where_a_robot_does_not_converge():
+    bench = Bench()
+    bench.controller.answer = FAST
+    bench.guard.suspect("valve thruster_3 believed dead")
+    bench.give()
+    assert "valve thruster_3 believed dead" in stand(bench).reason
+
+
 def test_a_goal_that_is_repeated_moves_no_robot_that_does_not_converge():
     bench = Bench()
     bench.controller.answer = FAST

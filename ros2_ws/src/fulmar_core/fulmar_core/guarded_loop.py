@@ -278,6 +278,10 @@ class GuardedLoop:
                 self.set(unconverged=stuck)
         return self._follow_switch(before)
 
+    def suspect(self, actuators: str) -> None:
+        """Give a robot less time to converge, some of whose actuators are believed dead, in words; empty for none."""
+        self._convergence.suspicion = actuators
+
     def fall_back(self, reason: str) -> bool:
         """Let the fallback go on in place of a controller that raised; false if there is none."""
         before = self.switch.current

@@ -19,7 +19,7 @@ from fulmar_core.controllers.controller import Controller, Inputs
 from fulmar_core.errors import FAILED, FulmarError, TaskError
 from fulmar_core.guarded_loop import GuardedLoop
 from fulmar_core.health.applied import AppliedHistory
-from fulmar_core.health.beliefs import Beliefs
+from fulmar_core.health.beliefs import DEAD, Beliefs
 from fulmar_core.robot import load_robot
 from fulmar_core.safety.arbiter import Decision, Mode
 from fulmar_core.safety.estop import EstopMonitor
@@ -372,6 +372,8 @@ class ControllerNode(LifecycleNode):
         self._beliefs = self._actuator_beliefs.of(
             measurement, epoch=guard.epoch, stands=guard.flags.bearing_off
         )
+        dead = [word for word in self._beliefs.warnings if word.endswith(DEAD)]
+        guard.suspect(", ".join(dead))
         if self._beliefs.open and decision.may_act and not guard.flags.latched_fault:
             self._fail(f"{self._beliefs.words[0]}. Close its supply.")
 

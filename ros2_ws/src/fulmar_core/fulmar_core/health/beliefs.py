@@ -14,6 +14,7 @@ from fulmar_core.robot import Robot
 
 # Expected share of its thrust below which a valve counts as dead: that is likelier than not [-]
 DEAD_BELOW = 0.5
+DEAD = "believed dead"
 NO_EFFECT = "the robot does not move, whatever its valves do: it is held, or stands without air"
 
 
@@ -57,7 +58,7 @@ def joined(estimated: Beliefs, monitored: Beliefs, suspects: tuple[str, ...]) ->
 
 def said_dead(noun: str, name: str) -> str:
     """What is said of a dead actuator."""
-    return f"{noun} {name} believed dead"
+    return f"{noun} {name} {DEAD}"
 
 
 class BeliefReader:

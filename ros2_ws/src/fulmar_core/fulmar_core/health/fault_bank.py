@@ -66,7 +66,9 @@ class FaultBank:
         self._tick = robot.timing.physics_dt if robot.body.planar else 0.0
         self._axes = np.array([0, 1, 5] if robot.body.planar else range(6))
         self._moving = int((self._axes < 3).sum())  # how many, the first ones; the others turn
-        self._numbers = 2.0 * np.array([self._moving, len(self._axes) - self._moving])  # measured, of each group
+        self._numbers = 2.0 * np.array(
+            [self._moving, len(self._axes) - self._moving]
+        )  # measured, of each group
         self._com = np.array(robot.body.com)
         self._inertia = robot.body.inertia_matrix
         self._inverse = np.linalg.inv(self._inertia)

@@ -27,6 +27,7 @@ PATIENCE = 3.0  # least times to the goal that are given [-]
 HALF_TURNS = 2.0  # that a robot is given which cannot go sideways [-]
 PROGRESS = 0.02  # share of the least time by which it must fall to count [-]
 UNCONVERGED = "does not converge"
+MAY_BE = "An actuator may have failed, or something holds or pushes it."
 ALIKE = 0.1  # difference of a command and what was applied up to which they count as the same, in full commands [-]
 OWN = 5  # commands of one's own that may be what was applied last: links delay them
 STEEPEST = 0.1  # path of an aircraft that returns to its course, in its speed [-]
@@ -143,7 +144,15 @@ class ConvergenceMonitor:
         self._tries = share >= self._enough
         self.late_s = self._waited + np.maximum(now - self._best, 0.0)
         self.patience_s = self._least_s + PATIENCE * self._anchor
-        return np.asarray(self.late_s > self.patience_s)
+        return self.late(np.zeros(now.shape, dtype=bool))
+
+    def late(self, suspected: np.ndarray) -> np.ndarray:
+        """Which robots do not converge; those of which an actuator is believed dead are given the least time only.
+
+        Args:
+            suspected: Which these are, shape (n,).
+        """
+        return np.asarray(self.late_s > np.where(suspected, self._least_s, self.patience_s))
 
     def _shift(self, state: State, goal: Goal, now: np.ndarray) -> np.ndarray | float:
         """What the target's own motion since the last step adds to the time to it [s]."""
@@ -159,6 +168,7 @@ class ConvergenceWatch:
 
     Attributes:
         problem: How it does not converge, in words; empty while it does.
+        suspicion: Which actuators are believed dead, in words; empty for none.
     """
 
     def __init__(self, robot: Robot, task: Task, control_dt: float, applied: AppliedHistory | None) -> None:
@@ -173,7 +183,7 @@ class ConvergenceWatch:
         self._monitor, self._applied = ConvergenceMonitor(robot, task, control_dt), applied
         self._alike = ALIKE * robot.actuators.scale
         self._own: deque[np.ndarray] = deque(maxlen=OWN)
-        self.problem = ""
+        self.problem = self.suspicion = ""
 
     def reset(self) -> None:
         """Begin anew; see `ConvergenceMonitor.reset`."""
@@ -186,11 +196,13 @@ class ConvergenceWatch:
         if self._is_moved_by_others(inputs):
             self.reset()
         self._own.append(command[0])
-        if bool(self._monitor.see(inputs.state, inputs.goal, command)[0]):
+        self._monitor.see(inputs.state, inputs.goal, command)
+        if bool(self._monitor.late(np.array([bool(self.suspicion)]))[0]):
             late_s = float(self._monitor.late_s[0])
+            cause = f"The {self.suspicion}." if self.suspicion else MAY_BE
             self.problem = (
-                f"{UNCONVERGED}: {late_s:.0f} s of commands have brought the robot no nearer to its goal. An actuator "
-                "may have failed, or something holds or pushes it. Look at it, then give a new goal."
+                f"{UNCONVERGED}: {late_s:.0f} s of commands have brought the robot no nearer to its goal. {cause} "
+                "Look at it, then give a new goal."
             )
 
     def _is_moved_by_others(self, inputs: Inputs) -> bool:
