@@ -222,5 +222,23 @@ def test_velocities_begin_when_their_stamps_say():
     assert reported.distance(at(100.0)) == 0.0
 
 
+@pytest.mark.parametrize("turned_to", [0, 1])
+def test_no_velocity_of_before_an_emergency_stop_comes_back_after_it(turned_to):
+    """Neither the one that goes on, nor one that would begin later, nor one that had only just come."""
+    reported = mission("track_velocities")
+    reported.give(goal_at((0.3, 0.0, 0.0)), S)
+    reported.give(goal_at((0.6, 0.0, 0.0)), 3 * S)
+    if turned_to:
+        reported.turn_to(S)
+        assert reported.lacking == ""
+    reported.drop()
+    for time_ns in (S + 1, 2 * S, 3 * S, 10 * S):
+        reported.turn_to(time_ns)
+        assert reported.lacking == "goal"
+    reported.give(goal_at((-0.1, 0.0, 0.0)), 11 * S)
+    reported.turn_to(11 * S)
+    assert float(reported.observe(at(0.0), 11 * S)[0]) == pytest.approx(-0.1)
+
+
 def test_nothing_is_near_before_everything_is_known():
     assert mission("go_to_pose").distance(at(0.0)) == math.inf
