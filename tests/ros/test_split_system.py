@@ -14,7 +14,8 @@ from sensor_msgs.msg import JointState
 from fulmar_core.errors import BAD_USAGE, DONE, FAILED
 from fulmar_core.safety.watchdog import default_timeout
 from fulmar_core.topics import ACTUATORS_STATE
-from fulmar_evaluation.faults.two_hosts import ACROSS, TwoHosts, inside, two_hosts
+from fulmar_evaluation.faults.two_hosts import TwoHosts, inside, two_hosts
+from fulmar_ros.middleware import STATIC_PEERS, TRANSPORTS, UDP_ONLY
 from fulmar_ros.qos import subscriber_qos
 from fulmar_ros.runtime import ros_node
 from tests.conftest import RosDomain
@@ -25,6 +26,8 @@ from tests.ros.split_parts import Part, in_container
 pytestmark = [pytest.mark.slow, pytest.mark.real_time]
 SYSTEM = "mujoco_lqr"
 PERIOD_S = 1.0 / 50.0  # of the system's commands
+PEER_OF_ROBOT = {TRANSPORTS: UDP_ONLY, STATIC_PEERS: "10.77.0.2"}  # the documented settings of two hosts
+PEER_OF_OTHER = {TRANSPORTS: UDP_ONLY, STATIC_PEERS: "10.77.0.1"}
 ANSWER_S = 0.25  # after the limit: the state is published each tick, and this computer is busy
 
 
@@ -48,14 +51,18 @@ class Containers:
         folder.chmod(0o777)
         command = [*FULMAR, "up", *arguments, "--only", only, "--json"]
         self.parts.append(
-            Part(in_container(host, command, other_user=only == "controller"), self._env, folder)
+            Part(in_container(host, command, other_user=only == "controller"), self._env_on(host), folder)
         )
         return self.parts[-1]
+
+    def _env_on(self, host: str) -> dict[str, str]:
+        return self._env | (PEER_OF_ROBOT if host == self._hosts.robot else PEER_OF_OTHER)
 
     def beside_controller(self, *arguments: str) -> tuple[int, str]:
         """Run a command in the controller's container, as its user; exit code and standard output."""
         command = in_container(self._hosts.other, [*FULMAR, *arguments], other_user=True)
-        done = psutil.Popen(command, env=self._env, cwd="/", stdout=-1, stderr=-1, text=True)
+        env = self._env_on(self._hosts.other)
+        done = psutil.Popen(command, env=env, cwd="/", stdout=-1, stderr=-1, text=True)
         try:
             output, errors = done.communicate(timeout=60.0)
         finally:
@@ -66,7 +73,7 @@ class Containers:
     def start_beside_controller(self, *arguments: str) -> Part:
         """The same in the background."""
         command = in_container(self._hosts.other, [*FULMAR, *arguments], other_user=True)
-        self.parts.append(Part(command, self._env, self._folder))
+        self.parts.append(Part(command, self._env_on(self._hosts.other), self._folder))
         return self.parts[-1]
 
     def on_state(self, message: JointState) -> None:
@@ -82,7 +89,7 @@ def containers(
     ros_domain: RosDomain, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> Iterator[Containers]:
     """Two containers, and an observer of the actuators on the plant's side."""
-    for name, value in ACROSS.items():
+    for name, value in PEER_OF_ROBOT.items():
         monkeypatch.setenv(name, value)
     (tmp_path / "logs").mkdir()
     for folder in (tmp_path, tmp_path / "logs"):
@@ -93,7 +100,7 @@ def containers(
     errors: list[Exception] = []
     with two_hosts() as hosts, inside(hosts.robot), ros_node("observer", errors.append) as node:
         logs = {"ROS_LOG_DIR": str(tmp_path / "logs"), "HOME": str(tmp_path)}  # writable for both users
-        made = Containers(hosts, {**ros_domain.env, **ACROSS, **logs}, tmp_path)
+        made = Containers(hosts, {**ros_domain.env, **logs}, tmp_path)
         topic, qos = f"{NAMESPACE}/{ACTUATORS_STATE.name}", subscriber_qos(ACTUATORS_STATE, depth=50)
         node.create_subscription(JointState, topic, made.on_state, qos)
         try:
