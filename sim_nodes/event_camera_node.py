@@ -25,6 +25,7 @@ from fulmar_core.sky.event_sensor import EventSensor
 from fulmar_core.topics import EVENTS, EVENTS_2, TRUTH
 from fulmar_ros.event_packets import cloud_of_events
 from fulmar_ros.lockstep_answer import LockstepAnswer
+from fulmar_ros.operator_subscription import subscribe_every
 from fulmar_ros.parameters import own_frames, read_parameters
 from fulmar_ros.qos import EVERYTHING, publisher_qos, subscriber_qos
 from fulmar_ros.runtime import RequestExit, run_node
@@ -72,11 +73,12 @@ class EventCameraNode(Node):
         self._before: tuple[int, np.ndarray] | None = None  # stamp [ns] and attitude
         self._period: LockstepAnswer | None = None
         topic = self.resolve_topic_name(TRUTH.name)
-        depth = EVERYTHING if settings.lockstep else 10
-        qos = subscriber_qos(TRUTH, reliable=True, depth=depth, lossless=settings.lockstep)
         self._topic = topic
-        self.create_subscription(Odometry, TRUTH.name, self._on_truth, qos)
-        if settings.lockstep:
+        if not settings.lockstep:
+            subscribe_every(self, Odometry, TRUTH, self._on_truth, depth=10)
+        else:
+            qos = subscriber_qos(TRUTH, reliable=True, depth=EVERYTHING, lossless=True)
+            self.create_subscription(Odometry, TRUTH.name, self._on_truth, qos)
             self._period = LockstepAnswer(
                 self,
                 {topic: "truth"},

@@ -14,7 +14,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from fulmar_bags.contents import open_bag
 from fulmar_core.topics import GOAL_POSE
-from fulmar_ros.operator_subscription import subscribe_operator
+from fulmar_ros.operator_subscription import subscribe_every
 from fulmar_ros.qos import EVERYTHING, publish_patiently, publisher_qos
 from fulmar_ros.runtime import spinning
 from tests.conftest import RosDomain
@@ -82,7 +82,7 @@ def test_a_reader_that_comes_late_ends_with_the_newest_goal_and_nobody_waits_for
             publish_patiently(publisher, message)
         assert time.monotonic() - began < 4.0
         got: list[int] = []
-        subscribe_operator(late, PoseStamped, GOAL_POSE, lambda m: got.append(m.header.stamp.sec))
+        subscribe_every(late, PoseStamped, GOAL_POSE, lambda m: got.append(m.header.stamp.sec))
         with spinning(late, lambda error: pytest.fail(repr(error))):
             until(lambda: got[-1:] == [5999])
             assert publisher.wait_for_all_acked(Duration(seconds=5.0))

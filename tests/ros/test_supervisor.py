@@ -21,7 +21,7 @@ from fulmar_core.goal import goal_at
 from fulmar_core.topics import ESTOP, ESTOP_RELEASED, GOAL_POSE
 from fulmar_ros.controller_node import ControllerNode
 from fulmar_ros.living_plant import TwinRunError
-from fulmar_ros.operator_subscription import subscribe_operator
+from fulmar_ros.operator_subscription import subscribe_every
 from fulmar_ros.qos import publisher_qos
 from fulmar_ros.runtime import spinning
 from tests.conftest import RosDomain
@@ -160,7 +160,7 @@ def test_a_goal_that_a_silent_e_stop_took_away_before_all_were_ready_is_reported
     button.pressed = None
     until(lambda: overseer.controller.values["goal_stamp_ns"] == "0")
     button.pressed = False
-    subscribe_operator(other, PoseStamped, GOAL_POSE, lambda _: None)
+    subscribe_every(other, PoseStamped, GOAL_POSE, lambda _: None)
     giving.join()
     assert not failures
     assert overseer.controller.values["goal_stamp_ns"] == "6"

@@ -14,7 +14,7 @@ from fulmar_core.robot_name import namespace_of
 from fulmar_core.safety.estop import HOLDS, SILENT
 from fulmar_core.safety.watchdog import NO_COMMAND
 from fulmar_core.topics import DIAGNOSTICS, ESTOP_TRIGGER
-from fulmar_ros.qos import subscriber_qos
+from fulmar_ros.operator_subscription import subscribe_every
 from fulmar_ros.runtime import ros_node
 
 SETTLE_S = 0.25  # after the last node was discovered, for others
@@ -88,8 +88,7 @@ class _Look:
         self._reports: dict[tuple[str, str], tuple[DiagnosticStatus, float]] = {}
         self._graph: set[tuple[str, str]] = set()
         self._changed_s = time.monotonic()
-        qos = subscriber_qos(DIAGNOSTICS, reliable=True, depth=50)
-        node.create_subscription(DiagnosticArray, DIAGNOSTICS.name, self._on_diagnostics, qos)
+        subscribe_every(node, DiagnosticArray, DIAGNOSTICS, self._on_diagnostics)
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         stamp_s = message.header.stamp.sec + message.header.stamp.nanosec / 1e9

@@ -73,7 +73,7 @@ class CommandInput:
 
 def command_input(plan: RunPlan) -> CommandInput:
     """The command topic of a plan's robot, or the topic that its adapter takes."""
-    wire, reliable = command_wire(load_robot(plan.robot)), True  # the recorder asks for it
+    wire, reliable = command_wire(load_robot(plan.robot)), plan.lockstep
     topic = dict(plan.remappings).get(wire.name, wire.name)
     if plan.adapter:
         driver = load_hardware(plan.adapter).driver

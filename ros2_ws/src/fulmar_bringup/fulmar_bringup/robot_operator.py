@@ -24,10 +24,11 @@ from fulmar_bringup.estop_robots import (
 )
 from fulmar_core.errors import RunFailed
 from fulmar_core.robot_name import namespace_of
-from fulmar_core.topics import ESTOP_RESET, JOY, STATUS, SWAP, WIRES, Wire
+from fulmar_core.topics import ESTOP_RESET, STATUS, SWAP, WIRES, Wire
 from fulmar_core.wire_check import wire_problems
 from fulmar_ros.graph import full_name, offers_of, robot_namespaces, running_robots_text
-from fulmar_ros.qos import publisher_qos, subscriber_qos
+from fulmar_ros.operator_subscription import subscribe_every
+from fulmar_ros.qos import publisher_qos
 from fulmar_ros.runtime import ros_node
 
 DISCOVER_S = 1.5  # until the nodes of the domain have found this one
@@ -51,8 +52,8 @@ def unfit_publishers(node: Node, spaces: set[str]) -> list[str]:
 
 
 def _of_wire(node: Node, wire: Wire, topic: str) -> list[str]:
-    reliable = wire.source == "operator" and wire is not JOY
-    return wire_problems(wire, topic, offers_of(node, topic), reliable=reliable)
+    """Best effort is no problem here: who refuses it in lock step says so itself."""
+    return wire_problems(wire, topic, offers_of(node, topic), reliable=False)
 
 
 FIND_S = 7.0  # a node whose first announcements are lost announces itself again after 3 s
@@ -154,8 +155,8 @@ class Operator:
             if message.status:
                 status.update({pair.key: pair.value for pair in message.status[0].values})
 
-        qos, space = subscriber_qos(STATUS, reliable=True), namespace_of(robot)
-        self._node.create_subscription(DiagnosticArray, f"{space}/{STATUS.name}", read, qos)
+        space = namespace_of(robot)
+        subscribe_every(self._node, DiagnosticArray, STATUS, read, topic=f"{space}/{STATUS.name}")
         publisher = self._node.create_publisher(String, f"{space}/{SWAP.name}", publisher_qos(SWAP))
         until = time.monotonic() + find_s
         while not (status and self._takes_swaps(space)):

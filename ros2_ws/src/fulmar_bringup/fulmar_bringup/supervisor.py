@@ -28,8 +28,8 @@ from fulmar_core.wire_check import Offer
 from fulmar_ros.goal_messages import TYPES, GoalMessage, goal_message, obstacles_message
 from fulmar_ros.graph import offers_of
 from fulmar_ros.living_plant import refuse_living_plant, refuse_twins, sees_living_plant
-from fulmar_ros.operator_subscription import SUBSCRIPTIONS, LateSubscribers
-from fulmar_ros.qos import publisher_qos, subscriber_qos
+from fulmar_ros.operator_subscription import SUBSCRIPTIONS, LateSubscribers, subscribe_every
+from fulmar_ros.qos import publisher_qos
 from fulmar_ros.runtime import ros_node
 
 START_TIMEOUT_S = 30.0
@@ -77,13 +77,8 @@ class Supervisor:
         self._sent_obstacles: list[MarkerArray] = []
         if self._obstacles is not None:
             LateSubscribers(node, self._obstacles, lambda: list(self._sent_obstacles))
-        node.create_subscription(
-            DiagnosticArray,
-            DIAGNOSTICS.name,
-            self._on_diagnostics,
-            subscriber_qos(DIAGNOSTICS, reliable=True, depth=10),
-        )
-        node.create_subscription(DiagnosticArray, STATUS.name, self._on_diagnostics, subscriber_qos(STATUS))
+        for wire in (DIAGNOSTICS, STATUS):
+            subscribe_every(node, DiagnosticArray, wire, self._on_diagnostics)
         self._plant_service = node.create_client(ChangeState, "plant/change_state")
 
     def sees_living_plant(self) -> bool:

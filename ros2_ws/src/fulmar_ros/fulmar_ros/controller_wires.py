@@ -11,6 +11,7 @@ from geometry_msgs.msg import PoseStamped, TwistStamped
 from nav_msgs.msg import Odometry
 from rclpy.lifecycle import LifecycleNode
 from rclpy.publisher import Publisher
+from rclpy.subscription import Subscription
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, String
 from visualization_msgs.msg import MarkerArray
@@ -33,13 +34,14 @@ from fulmar_core.topics import (
     STATUS,
     SWAP,
     VELOCITY_COMMAND,
+    Wire,
     command_wire,
     goal_wires,
 )
 from fulmar_ros.convert import TwistWriter, VectorWriter
 from fulmar_ros.goal_messages import TYPES, GoalMessage
 from fulmar_ros.health import Health
-from fulmar_ros.operator_subscription import subscribe_operator
+from fulmar_ros.operator_subscription import destroy_all, subscribe_every
 from fulmar_ros.parameters import name_of, own_frames
 from fulmar_ros.qos import FLUSH_S, LAST_WORDS_S, flush, publish_patiently, publisher_qos, subscriber_qos
 
@@ -111,36 +113,42 @@ class ControllerWires:
         self._write_health = VectorWriter(robot.actuators.names)
         self._write_observation = VectorWriter(observation_names, "position")
         odometry_qos = subscriber_qos(ODOMETRY, reliable=lockstep)
-        released = subscriber_qos(ESTOP_RELEASED, reliable=True)
         self._node = node
-        self._subscriptions = []
+        self._subscriptions: list[list[Subscription]] = []
+        # The wires that are subscribed; the values say whether a best-effort publisher is refused.
+        self.subscribed: dict[Wire, bool] = {ODOMETRY: lockstep}
         # Before the odometry: of two messages that wait, an executor takes that of the older subscription first.
         if on_bearing is not None:
-            self._subscriptions += subscribe_operator(node, Bool, AIR_BEARING, on_bearing)
+            self._every(Bool, AIR_BEARING, on_bearing)
         if can_monitor(robot):
             applied = subscriber_qos(ACTUATORS_STATE, reliable=lockstep, depth=APPLIED_DEPTH)
-            self._subscriptions.append(
-                node.create_subscription(JointState, ACTUATORS_STATE.name, on_applied, applied, raw=True)
-            )
-        self._subscriptions += [
-            node.create_subscription(Odometry, ODOMETRY.name, on_odometry, odometry_qos, raw=True),
-            *subscribe_operator(node, Bool, ESTOP, on_estop),
-            node.create_subscription(String, ESTOP_RELEASED.name, on_estop_released, released),
-            node.create_subscription(String, SWAP.name, on_swap, subscriber_qos(SWAP, reliable=True)),
-        ]
+            made = node.create_subscription(JointState, ACTUATORS_STATE.name, on_applied, applied, raw=True)
+            self._subscriptions.append([made])
+            self.subscribed[ACTUATORS_STATE] = lockstep
+        self._odometry = node.create_subscription(
+            Odometry, ODOMETRY.name, on_odometry, odometry_qos, raw=True
+        )
+        self._subscriptions.append([self._odometry])
+        self._every(Bool, ESTOP, on_estop)
+        self._every(String, ESTOP_RELEASED, on_estop_released)
+        self._every(String, SWAP, on_swap)
         for goal in goal_wires(task.goal_topic):
-            self._subscriptions += subscribe_operator(node, TYPES[goal.name], goal, on_goal, with_info=True)
-        reliably = [ESTOP, ESTOP_RELEASED, SWAP, *goal_wires(task.goal_topic)]
+            self._every(TYPES[goal.name], goal, on_goal, with_info=True)
         if task.sees_obstacles:
-            self._subscriptions += subscribe_operator(node, MarkerArray, OBSTACLES, on_obstacles)
-            reliably.append(OBSTACLES)
-        self.subscribed = {ODOMETRY: lockstep, **dict.fromkeys(reliably, True)}  # and whether reliably
+            self._every(MarkerArray, OBSTACLES, on_obstacles)
         for thing in task.things:
             stream = subscriber_qos(thing.wire, reliable=lockstep)
             on_pose = partial(on_thing, thing.name)
-            self._subscriptions.append(
-                node.create_subscription(PoseStamped, thing.wire.name, on_pose, stream)
-            )
+            made = node.create_subscription(PoseStamped, thing.wire.name, on_pose, stream)
+            self._subscriptions.append([made])
+            self.subscribed[thing.wire] = lockstep
+
+    def _every(
+        self, kind: type, wire: Wire, callback: Callable[..., None], *, with_info: bool = False
+    ) -> None:
+        """Subscribe a wire of which every message counts."""
+        self._subscriptions.append(subscribe_every(self._node, kind, wire, callback, with_info=with_info))
+        self.subscribed[wire] = False
 
     def _command_writer(self) -> TwistWriter | VectorWriter:
         return TwistWriter(self._frames) if self._by_velocity else VectorWriter(self._actuators.names)
@@ -173,8 +181,7 @@ class ControllerWires:
 
     def destroy(self, node: LifecycleNode) -> None:
         """Destroy every endpoint."""
-        for subscription in self._subscriptions:
-            node.destroy_subscription(subscription)
+        destroy_all(node, self._subscriptions)
         for publisher in self._publishers:
             node.destroy_publisher(publisher)
 

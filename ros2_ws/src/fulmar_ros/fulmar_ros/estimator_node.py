@@ -29,11 +29,14 @@ from fulmar_core.process import CONTROL_PRIORITY, take_priority_with_helpers
 from fulmar_core.robot import load_robot
 from fulmar_core.sensors.reading import Reading
 from fulmar_core.topics import ODOMETRY, Wire
+from fulmar_core.wire_check import BETWEEN, WIRE_WARNINGS
 from fulmar_ros.deadline import Spread
 from fulmar_ros.estimator_wires import READERS, WRITERS, Read, Write
 from fulmar_ros.frame_wires import odometry_transform
+from fulmar_ros.graph import WireWatch
 from fulmar_ros.health import Health
 from fulmar_ros.lockstep_answer import LockstepAnswer
+from fulmar_ros.operator_subscription import subscribe_every
 from fulmar_ros.parameters import name_of, own_frames, read_parameters
 from fulmar_ros.qos import EVERYTHING, LAST_WORDS_S, publisher_qos, subscriber_qos
 from fulmar_ros.runtime import RequestExit, run_node
@@ -97,6 +100,7 @@ class EstimatorNode(Node):
         if kind.status is not None:
             more.append(self.create_publisher(DiagnosticArray, kind.status.name, publisher_qos(kind.status)))
         self._health = Health(self, f"{name_of(self, robot)}: {self.get_name()}", *more)
+        self._wire_watch = WireWatch(self, dict.fromkeys(kind.readings.values(), settings.lockstep))
         self._period: LockstepAnswer | None = None
         topics = {}
         for name, wire in kind.readings.items():
@@ -122,9 +126,12 @@ class EstimatorNode(Node):
     def _subscribe(self, name: str, wire: Wire, *, lockstep: bool) -> None:
         kind, read = READERS[wire]
         depth = EVERYTHING if lockstep else DEPTHS[wire.delivery]
-        qos = subscriber_qos(wire, reliable=True, depth=depth, lossless=lockstep)
-        topic = self.resolve_topic_name(wire.name)
-        self.create_subscription(kind, wire.name, partial(self._on_message, name, topic, read), qos)
+        receive = partial(self._on_message, name, self.resolve_topic_name(wire.name), read)
+        if lockstep:
+            qos = subscriber_qos(wire, reliable=True, depth=depth, lossless=True)
+            self.create_subscription(kind, wire.name, receive, qos)
+        else:
+            subscribe_every(self, kind, wire, receive, depth=depth)
 
     def _on_message(self, name: str, topic: str, read: Read, message: Any) -> None:
         reading = self._unbroken(name, read, message, self._frames)
@@ -207,7 +214,8 @@ class EstimatorNode(Node):
         silent_s = time.monotonic() - self._received_s
         stale = f"nothing usable comes for {silent_s:.1f} s" if silent_s > self._bridge_s else ""
         problem = self._problem or stale
-        warnings = self._estimator.warnings()
+        unfit = self._wire_watch.look()
+        warnings = (*self._estimator.warnings(), *unfit)
         key = (problem[:16], warnings, self._estimator.epoch, self._refused > 0)
         if key == self._said and time.monotonic() - self._said_s < STATUS_PERIOD_S:
             return
@@ -219,6 +227,7 @@ class EstimatorNode(Node):
             "last_refusal": self._refusal,
             "epoch": str(self._estimator.epoch),
             "stale": str(bool(problem)).lower(),
+            WIRE_WARNINGS: BETWEEN.join(unfit),
             **self._computation_ms.percentiles("computation_ms"),
         }
         values |= self._estimator.status()

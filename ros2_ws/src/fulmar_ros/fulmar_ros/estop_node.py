@@ -29,7 +29,7 @@ from fulmar_core.topics import (
     command_wire,
 )
 from fulmar_ros.health import Health
-from fulmar_ros.operator_subscription import subscribe_operator
+from fulmar_ros.operator_subscription import subscribe_every
 from fulmar_ros.parameters import name_of, read_parameters
 from fulmar_ros.qos import LAST_WORDS_S, publisher_qos, subscriber_qos
 from fulmar_ros.runtime import RequestExit, run_node
@@ -67,7 +67,7 @@ class EstopNode(Node):
         self._own: deque[tuple[int, int, int]] = deque(maxlen=OWN_MESSAGES)  # number, and sent between [ns]
         self._publisher = self.create_publisher(Bool, ESTOP.name, publisher_qos(ESTOP))
         self._released = self.create_publisher(String, ESTOP_RELEASED.name, publisher_qos(ESTOP_RELEASED))
-        subscribe_operator(self, Bool, ESTOP, self._on_estop, with_info=True)
+        subscribe_every(self, Bool, ESTOP, self._on_estop, with_info=True)
         self._health = Health(self, f"{name_of(self, robot)}: estop")
         wire = command_wire(robot)
         if wire is VELOCITY_COMMAND:

@@ -32,9 +32,9 @@ from fulmar_core.topics import GOAL_PATH, GOAL_WIRES, ODOMETRY, STATUS
 from fulmar_ros.goal_messages import TYPES, GoalMessage, goal_message
 from fulmar_ros.graph import UNNAMED_NODE, running_robots_text
 from fulmar_ros.health import Health
-from fulmar_ros.operator_subscription import LateSubscribers
+from fulmar_ros.operator_subscription import LateSubscribers, subscribe_every
 from fulmar_ros.parameters import name_of, own_frames, read_parameters
-from fulmar_ros.qos import EVERYTHING, publish_patiently, publisher_qos, subscriber_qos
+from fulmar_ros.qos import EVERYTHING, publish_patiently, publisher_qos
 from fulmar_ros.runtime import RequestExit, run_node
 
 PATIENCE_S = 3.0  # for the first odometry and the first subscriber, before a warning
@@ -129,13 +129,9 @@ class GoalNode(Node):
         if not self._settings.lockstep:  # there a goal comes with each odometry
             LateSubscribers(self, self._publisher, lambda: [self._message] if self._message else [])
         self._health = Health(self, f"{name}: goals")
-        self.create_subscription(
-            Odometry, ODOMETRY.name, self._on_odometry, subscriber_qos(ODOMETRY, reliable=True, depth=10)
-        )
+        subscribe_every(self, Odometry, ODOMETRY, self._on_odometry, depth=10)
         if not self._settings.stay:
-            self.create_subscription(
-                DiagnosticArray, STATUS.name, self._on_status, subscriber_qos(STATUS, reliable=True)
-            )
+            subscribe_every(self, DiagnosticArray, STATUS, self._on_status)
         self.create_timer(WATCH_S, self._watch, clock=Clock(clock_type=ClockType.STEADY_TIME))
         if not self._single:
             self.get_logger().info(f"{goals.title}: goals for {name} on {self._publisher.topic_name}")

@@ -47,7 +47,7 @@ class WireWatch:
     """Looks at most every 2 s at the publishers of the wires that a node subscribes."""
 
     def __init__(self, node: Node, wires: Mapping[Wire, bool]) -> None:
-        """Watch wires of a node; the values say whether it subscribes them reliably."""
+        """Watch wires of a node; the values say whether it receives nothing from a best-effort publisher."""
         self._node = node
         self._wires = {
             wire: (node.resolve_topic_name(wire.name), reliable) for wire, reliable in wires.items()

@@ -16,7 +16,7 @@ from rclpy.node import Node
 from fulmar_core.errors import ConfigError
 from fulmar_core.topics import ACTUATORS_STATE, DIAGNOSTICS
 from fulmar_ros.graph import full_name
-from fulmar_ros.qos import subscriber_qos
+from fulmar_ros.operator_subscription import destroy_all, subscribe_every
 
 PLANT = "plant"  # name of the node
 # From the creation of a node until it knows the others on a computer that is not overloaded: 0.11 to 0.62 s measured.
@@ -119,9 +119,7 @@ def _where(node: Node, namespace: str, *, spins: bool) -> str:
     def read(message: DiagnosticArray) -> None:
         words.extend(place for _, place in others_in(message, f"{namespace.rstrip('/')}/{PLANT}"))
 
-    subscription = node.create_subscription(
-        DiagnosticArray, DIAGNOSTICS.name, read, subscriber_qos(DIAGNOSTICS, reliable=True, depth=10)
-    )
+    subscriptions = subscribe_every(node, DiagnosticArray, DIAGNOSTICS, read)
     try:
         with _serving(node, spins=spins) as pause:
             until_s = time.monotonic() + WORDS_S
@@ -131,7 +129,7 @@ def _where(node: Node, namespace: str, *, spins: bool) -> str:
                 pause()
         return words[0] if words else ""
     finally:
-        node.destroy_subscription(subscription)
+        destroy_all(node, [subscriptions])
 
 
 def others_in(message: DiagnosticArray, name: str) -> list[tuple[int, str]]:

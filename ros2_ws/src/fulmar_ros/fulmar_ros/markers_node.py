@@ -32,7 +32,7 @@ from fulmar_core.topics import (
 from fulmar_ros.goal_messages import TYPES, GoalMessage
 from fulmar_ros.health import Health
 from fulmar_ros.marker_messages import scene_message
-from fulmar_ros.operator_subscription import LateSubscribers, subscribe_operator
+from fulmar_ros.operator_subscription import LateSubscribers, subscribe_every
 from fulmar_ros.parameters import name_of, own_frames, read_parameters
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.runtime import RequestExit, run_node
@@ -103,11 +103,11 @@ class MarkersNode(Node):
 
     def _subscribe(self) -> None:
         for wire in goal_wires(self._topic):
-            subscribe_operator(self, TYPES[wire.name], wire, self._on_goal)
-        subscribe_operator(self, MarkerArray, OBSTACLES, self._on_obstacles)
+            subscribe_every(self, TYPES[wire.name], wire, self._on_goal)
+        subscribe_every(self, MarkerArray, OBSTACLES, self._on_obstacles)
         applied = subscriber_qos(ACTUATORS_STATE, depth=10)
         self.create_subscription(JointState, ACTUATORS_STATE.name, self._on_applied, applied)
-        self.create_subscription(DiagnosticArray, STATUS.name, self._on_status, subscriber_qos(STATUS))
+        subscribe_every(self, DiagnosticArray, STATUS, self._on_status)
 
     def _on_goal(self, message: GoalMessage) -> None:
         targets, self._problem = goal_of(message, self._frames)

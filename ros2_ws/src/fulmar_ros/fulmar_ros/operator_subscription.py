@@ -1,10 +1,11 @@
-"""Latched wires of operators, for volatile and latched publishers and subscribers alike."""
+"""Wires of which every message counts, for publishers and subscribers of every quality of service."""
 
 from __future__ import annotations
 
 import inspect
+import threading
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 from rclpy.clock import Clock, ClockType
@@ -15,16 +16,16 @@ from rclpy.qos import DurabilityPolicy
 from rclpy.subscription import Subscription
 
 from fulmar_core.topics import Wire
-from fulmar_ros.qos import STREAM_DEPTH, subscriber_qos
+from fulmar_ros.qos import AT_ONCE, STREAM_DEPTH, subscriber_qos
 
 # Asks rclpy for message info.
 _WITH_INFO = inspect.signature(lambda message, info: None)
-SUBSCRIPTIONS = 2  # of one latched wire, as its publishers count them
+SUBSCRIPTIONS = 2  # of one latched wire, as its reliable publishers count them
 # Messages by which a second delivery is recognised; the middleware keeps no more for a reader
 REMEMBERED = 5000
 
 
-def subscribe_operator(
+def subscribe_every(
     node: Node,
     kind: type,
     wire: Wire,
@@ -34,41 +35,62 @@ def subscribe_operator(
     depth: int | None = None,
     raw: bool = False,
     with_info: bool = False,
+    lossless: bool = False,
 ) -> list[Subscription]:
-    """Subscribe a latched wire to publishers of either durability.
+    """Subscribe a wire to publishers of either reliability and durability; each message comes once.
 
     A publisher with default settings is volatile and never matches a transient-local subscription; a volatile
-    subscription misses what a latched publisher sent before. Both together receive everything, and the second delivery
-    of a message is dropped.
+    subscription misses what a latched publisher sent before. A best-effort publisher matches no reliable subscription;
+    a best-effort subscription does not get again what was lost. All of them together receive everything, and the second
+    delivery of a message is dropped. The best-effort one is made with the first publisher that needs it.
 
     Args:
         node: Owner of the subscriptions.
         kind: Message class of the wire.
-        wire: A latched wire.
+        wire: The wire.
         callback: Called with each message once, and, if asked for, with its info.
         topic: Name of the topic, where it is another than the wire's.
         depth: Messages that may wait for the callback; as of `subscriber_qos`. By default enough that the message of
             one publisher does not overwrite that of another.
         raw: Deliver serialized messages.
         with_info: Call back with the message info too.
+        lossless: As of `subscriber_qos`.
 
     Returns:
-        The subscriptions, for `Node.destroy_subscription`.
+        The subscriptions, for `destroy_all`; a later one joins the list.
     """
     depth = max(wire.latest, STREAM_DEPTH) if depth is None else depth
-    once = _Once(callback, with_info=with_info)
-    return [
-        node.create_subscription(
-            kind,
-            topic or wire.name,
-            with_message_info(once.pass_on),
-            subscriber_qos(wire, reliable=True, depth=depth, latched=latched),
-            raw=raw,
-            # A volatile publisher does not match the latched subscription, which is no fault.
-            event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=not latched),
-        )
-        for latched in (False, True)
-    ]
+    receive = with_message_info(_Once(callback, with_info=with_info).pass_on)
+    made: list[Subscription] = []
+    lock = threading.Lock()
+
+    def add(*, reliable: bool, latched: bool, events: SubscriptionEventCallbacks) -> None:
+        qos = subscriber_qos(wire, reliable=reliable, depth=depth, latched=latched, lossless=lossless)
+        name = topic or wire.name
+        made.append(node.create_subscription(kind, name, receive, qos, raw=raw, event_callbacks=events))
+
+    def add_best_effort(_event: Any = None) -> None:
+        with lock:
+            if len(made) == reliables:
+                add(reliable=False, latched=False, events=SubscriptionEventCallbacks())
+
+    durabilities = (False, True) if wire.delivery == "latched" else (False,)
+    reliables = len(durabilities)
+    for latched in durabilities:
+        # A volatile publisher does not match the latched subscription, which is no fault.
+        quiet = SubscriptionEventCallbacks(use_default_callbacks=False)
+        events = quiet if latched else SubscriptionEventCallbacks(incompatible_qos=add_best_effort)
+        add(reliable=True, latched=latched, events=events)
+    if wire in AT_ONCE:
+        add_best_effort()
+    return made
+
+
+def destroy_all(node: Node, subscriptions: Iterable[list[Subscription]]) -> None:
+    """Destroy subscriptions that were made by `subscribe_every`."""
+    for made in subscriptions:
+        for subscription in made:
+            node.destroy_subscription(subscription)
 
 
 def with_message_info(callback: Callable[[Any, dict[str, int]], None]) -> Callable[..., None]:

@@ -25,13 +25,14 @@ from fulmar_ros.lifecycle_requests import refuse_impossible_transitions
 from fulmar_ros.living_plant import BRIEFLY_S, LATE_S, others_in, refuse_living_plant
 from fulmar_ros.motion_capture import MakeCapture, capture_maker
 from fulmar_ros.node_identity import identity_of
+from fulmar_ros.operator_subscription import destroy_all, subscribe_every
 from fulmar_ros.parameters import name_of, read_parameters
 from fulmar_ros.plant_clock import SimulatedTime, WallTime, other_clocks
 from fulmar_ros.plant_health import PlantHealth
 from fulmar_ros.plant_loops import ChainLoop, LockstepLoop, OnStep, RealtimeLoop, UnansweredLoop
 from fulmar_ros.plant_settings import PlantSettings, first_episode
 from fulmar_ros.plant_wires import PlantWires
-from fulmar_ros.qos import SAFE_REPEATS, subscriber_qos
+from fulmar_ros.qos import SAFE_REPEATS
 from fulmar_ros.runtime import RequestExit, settle_memory
 
 MakeBackend = Callable[[Robot, PlantSettings], Backend]
@@ -112,10 +113,7 @@ class PlantNode(LifecycleNode):
                 if transition() != DONE:
                     name = name_of(self, self.robot)
                     raise FulmarError(f"plant of '{name}' could not start: {self.health.reason}")
-            qos = subscriber_qos(DIAGNOSTICS, reliable=True, depth=10)
-            self._twin_reports = self.create_subscription(
-                DiagnosticArray, DIAGNOSTICS.name, self._yield_to_older, qos
-            )
+            self._twin_reports = subscribe_every(self, DiagnosticArray, DIAGNOSTICS, self._yield_to_older)
             self._twin_timer = self.create_timer(LATE_S, self._end_watch)
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -309,7 +307,7 @@ class PlantNode(LifecycleNode):
     def _end_watch(self) -> None:
         """Look for older plants no more."""
         self._twin_timer.cancel()
-        self.destroy_subscription(self._twin_reports)
+        destroy_all(self, [self._twin_reports])
 
     def _count(self, dt: float) -> int | None:
         """Number of steps of `dt` [s] within the duration; None for no end."""

@@ -50,7 +50,7 @@ from fulmar_ros.deadline import Spread
 from fulmar_ros.frame_wires import ModelWires, odometry_transform
 from fulmar_ros.graph import writers_of
 from fulmar_ros.motion_capture import MakeCapture
-from fulmar_ros.operator_subscription import subscribe_operator
+from fulmar_ros.operator_subscription import destroy_all, subscribe_every
 from fulmar_ros.parameters import own_frames
 from fulmar_ros.plant_clock import SimulatedTime
 from fulmar_ros.plant_period import PlantPeriod
@@ -153,28 +153,21 @@ class PlantWires:
         self._commands = node.create_subscription(
             TwistStamped if by_velocity else JointState, wire.name, self._on_command, commands, raw=True
         )
-        released = subscriber_qos(ESTOP_RELEASED, reliable=True)
         self._operator = [
-            *subscribe_operator(node, Bool, ESTOP, self._on_estop),
-            node.create_subscription(String, ESTOP_RELEASED.name, self._on_estop_released, released),
+            subscribe_every(node, Bool, ESTOP, self._on_estop),
+            subscribe_every(node, String, ESTOP_RELEASED, self._on_estop_released),
         ]
+        # The wires that are subscribed; the values say whether a best-effort publisher is refused.
+        self.subscribed = {wire: lockstep, ESTOP: False, ESTOP_RELEASED: False}
         if not lockstep:
-            teleop = subscriber_qos(TELEOP, reliable=True)
-            self._operator.append(node.create_subscription(JointState, TELEOP.name, self._on_teleop, teleop))
-        # What it subscribes, and whether reliably.
-        self.subscribed = {
-            wire: lockstep,
-            ESTOP: True,
-            ESTOP_RELEASED: True,
-            **({} if lockstep else {TELEOP: True}),
-        }
+            self._operator.append(subscribe_every(node, JointState, TELEOP, self._on_teleop))
+            self.subscribed[TELEOP] = False
         self._give_back = node.create_service(Trigger, GIVE_BACK, self._on_give_back)
 
     def destroy(self, node: LifecycleNode) -> None:
         """Destroy every endpoint."""
         self.end_capture()
-        for subscription in (self._commands, *self._operator):
-            node.destroy_subscription(subscription)
+        destroy_all(node, ([self._commands], *self._operator))
         if self._period is not None:
             node.destroy_subscription(self._period.answers)
         node.destroy_service(self._give_back)

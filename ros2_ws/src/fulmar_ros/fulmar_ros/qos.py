@@ -1,6 +1,16 @@
 """Quality of service of each wire, and waiting for its readers.
 
-QoS follows `Wire.delivery`. No deadline is requested anywhere: a publisher that offers none would never match.
+Publishers follow `Wire.delivery`. No deadline is requested anywhere: a publisher that offers none would never match.
+
+Subscribers receive from publishers of every kind, best effort and reliable, volatile and latched, in one of two ways:
+
+- The newest value counts (odometry of a controller, commands, poses, a gamepad): `subscriber_qos(wire)`, best effort
+  and volatile, which every publisher matches.
+- Every message counts (readings of an estimator, operators, goals, diagnostics, a recorder):
+  `operator_subscription.subscribe_every`, reliable, with a best-effort subscription beside it.
+
+Where lock step counts messages, a reading is asked for reliably alone: a lost one would hold up the run. A best-effort
+publisher is named in the node's diagnostics then, see `graph.WireWatch`.
 """
 
 from __future__ import annotations
@@ -16,8 +26,11 @@ from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
 from fulmar_core.errors import LockstepError
-from fulmar_core.topics import Wire
+from fulmar_core.topics import ESTOP, ESTOP_RELEASED, Wire
 
+# Subscribed best effort from the start; others as soon as a publisher offers nothing better, which takes a tenth of a
+# second: a stop does not wait for it.
+AT_ONCE = frozenset({ESTOP, ESTOP_RELEASED})
 STREAM_DEPTH = 50  # a recorder that the machine holds up for as many steps still gets them all
 EVERYTHING = 0  # as depth: whatever has not been taken yet; the middleware sets an end to it at 5000
 

@@ -32,9 +32,9 @@ from fulmar_core.topics import (
     thing_wire,
 )
 from fulmar_ros.message_class import message_class
-from fulmar_ros.operator_subscription import subscribe_operator, with_message_info
+from fulmar_ros.operator_subscription import subscribe_every
 from fulmar_ros.parameters import read_parameters
-from fulmar_ros.qos import EVERYTHING, subscriber_qos
+from fulmar_ros.qos import EVERYTHING
 from fulmar_ros.recorder_health import RecorderHealth
 from fulmar_ros.recorder_settings import RecorderSettings
 from fulmar_ros.runtime import RequestExit, run_node
@@ -81,19 +81,21 @@ class RecorderNode(Node):
         self._thread = BagThread(self._ring or whole(), on_error=self.get_logger().error)
         self._provenance = threading.Thread(target=self._attach_provenance, name="provenance", daemon=True)
         self._provenance.start()
-        commands: list[Subscription] = []
+        commands: list[list[Subscription]] = []
         for wire, topic in self._topics.items():
-            if wire.source == "operator" and wire.delivery == "latched":
-                subscribe_operator(
-                    self, classes[wire], wire, self._keep(topic), depth=EVERYTHING, raw=True, with_info=True
-                )
-                continue
-            qos = subscriber_qos(wire, reliable=True, depth=EVERYTHING, lossless=settings.lossless)
             put = self._keep(topic)
             if settings.lossless and wire in REPEATED:
                 put = once(put, REPEATED[wire])
-            keep = with_message_info(put)
-            made = self.create_subscription(classes[wire], wire.name, keep, qos, raw=True)
+            made = subscribe_every(
+                self,
+                classes[wire],
+                wire,
+                put,
+                depth=EVERYTHING,
+                raw=True,
+                with_info=True,
+                lossless=settings.lossless,
+            )
             commands += [made] if wire in (COMMAND, VELOCITY_COMMAND) else []
         self._health = RecorderHealth(
             self,
@@ -101,7 +103,7 @@ class RecorderNode(Node):
             self._directory,
             self._thread.account,
             lambda: self._mode,
-            lambda: sum(each.get_publisher_count() for each in commands),
+            lambda: sum(max(each.get_publisher_count() for each in made) for made in commands),
         )
         doing = "recording to" if self._ring is None else f"keeping {settings.before_fault_s:g} s for"
         sys.stdout.write(f"{doing} {self._directory}\n")

@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from geometry_msgs.msg import InertiaStamped
 from rclpy.node import Node
+from rclpy.subscription import Subscription
 from sensor_msgs.msg import JointState
 
 from fulmar_bags.message_reader import reading_of, stamp_ns
@@ -16,6 +17,7 @@ from fulmar_core.inertia_estimation.momentum_balance import is_body
 from fulmar_core.robot import Robot
 from fulmar_core.sensors.table import SENSORS
 from fulmar_core.topics import INERTIA, SENSOR_WIRES
+from fulmar_ros.operator_subscription import destroy_all, subscribe_every
 from fulmar_ros.qos import subscriber_qos
 
 WHEELS_LAST_NS = 1_000_000_000  # older speeds are not used [ns]
@@ -47,7 +49,8 @@ class SatelliteInputs:
         self._waits = False
         self._wheels: tuple[int, np.ndarray] | None = None  # stamp [ns], and speeds, shape (1, count)
         self._inertia: tuple[int, np.ndarray] | None = None
-        self._on_wheels, self._subscriptions = on_wheels, []
+        self._on_wheels = on_wheels
+        self._subscriptions: list[list[Subscription]] = []
         self.refused, self.refusal = 0, ""
         if not isinstance(robot.actuators, ReactionWheels):
             return
@@ -56,18 +59,13 @@ class SatelliteInputs:
             self._waits = lockstep and not robot.sensors.specs["wheels"].rate_hz
             wire = SENSOR_WIRES["wheels"]
             qos = subscriber_qos(wire, reliable=lockstep)
-            self._subscriptions.append(
-                node.create_subscription(JointState, wire.name, self._take_wheels, qos)
-            )
-        qos = subscriber_qos(INERTIA, reliable=True)
-        self._subscriptions.append(
-            node.create_subscription(InertiaStamped, INERTIA.name, self._take_inertia, qos)
-        )
+            made = node.create_subscription(JointState, wire.name, self._take_wheels, qos)
+            self._subscriptions.append([made])
+        self._subscriptions.append(subscribe_every(node, InertiaStamped, INERTIA, self._take_inertia))
 
     def destroy(self, node: Node) -> None:
         """Destroy the subscriptions."""
-        for subscription in self._subscriptions:
-            node.destroy_subscription(subscription)
+        destroy_all(node, self._subscriptions)
 
     def lacks_something_of(self, time_ns: int) -> bool:
         """Whether a step of lock step waits for the speeds of its time [ns]."""

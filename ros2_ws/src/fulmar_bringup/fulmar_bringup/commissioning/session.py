@@ -31,6 +31,7 @@ from fulmar_core.topics import (
     command_wire,
 )
 from fulmar_ros.convert import TwistWriter, VectorWriter
+from fulmar_ros.operator_subscription import subscribe_every
 from fulmar_ros.parameters import name_of, own_frames
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 
@@ -76,13 +77,12 @@ class Session:
         poses = MOCAP if from_outside else ODOMETRY
         pose_kind = PoseStamped if from_outside else Odometry
         node.create_subscription(pose_kind, poses.name, self._on_pose, subscriber_qos(poses, depth=50))
-        state = subscriber_qos(ACTUATORS_STATE, reliable=True, depth=50)
-        node.create_subscription(JointState, ACTUATORS_STATE.name, self._on_applied, state)
+        subscribe_every(node, JointState, ACTUATORS_STATE, self._on_applied)
         node.create_subscription(
             DiagnosticArray, DIAGNOSTICS.name, self._on_diagnostics, subscriber_qos(DIAGNOSTICS, depth=10)
         )
         if bearing:
-            node.create_subscription(Bool, AIR_BEARING.name, self._on_air, subscriber_qos(AIR_BEARING))
+            subscribe_every(node, Bool, AIR_BEARING, self._on_air)
 
     def until_ready(self) -> None:
         """Wait for the driver, its air and poses, with the safe command.
