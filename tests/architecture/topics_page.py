@@ -32,10 +32,10 @@ Every topic is recorded in the bag of a run, except {UNRECORDED}.
 | best_effort | best effort, volatile, keeps the last 50; in lock step with estimators as stream |
 
 Subscribers of Fulmar receive every topic from publishers of each quality of service, reliable and best effort, volatile
-and latched: readings of a usual driver (best effort), goals of a plain rclpy node (volatile). Only in lock step, which counts
-messages, odometry, commands and readings have to be reliable; a publisher that is not is named in `warnings` of the
-node that refuses it. In lock step
-`fulmar run --goals` publishes a goal with each odometry; but for `goal_path`, its publisher keeps, beyond what is
+and latched: readings of a usual driver (best effort), goals of a plain rclpy node (volatile). Only in lock step, which
+counts messages, odometry, commands and readings have to be reliable; a publisher that is not is named in `warnings` of
+the node that refuses it. There `fulmar run --goals` publishes a goal with each odometry; but for `goal_path`, its
+publisher keeps, beyond what is
 stated, all that a reliable subscriber has not received, and up to 5000 earlier ones: the stamps tell them apart.
 
 Services: `{ESTOP_TRIGGER}`, `{ESTOP_RESET}` and `{GIVE_BACK}` (std_srvs/Trigger); `air_bearing/enable`
