@@ -126,6 +126,20 @@ def test_odometry_that_is_refused_stops_the_controller_until_the_next_that_is_no
     assert bench.step()[1] == list(GENTLE)
 
 
+def test_an_input_of_two_nodes_stops_the_controller_which_begins_anew_when_one_is_gone():
+    bench = Bench()
+    bench.give()
+    bench.step()
+    before, words = bench.controller.resets, "2 nodes publish odom, and only one may: /a, /b"
+    bench.guard.contest(words)
+    decision, command = bench.step()
+    assert (decision.mode, decision.reason, command) == (Mode.ARMED, words, None)
+    bench.guard.contest("")
+    assert bench.step(2.0 * JUMP_M)[1] == list(GENTLE)  # from wherever the one that is left says that it is
+    assert bench.controller.resets == before + 1
+    assert bench.guard.epoch == 0
+
+
 def test_odometry_that_stays_away_stops_the_controller():
     bench = Bench()
     bench.give()

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 import numpy as np
+import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped, TwistStamped
 from nav_msgs.msg import Odometry
+from rclpy.context import Context
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool
@@ -27,9 +30,11 @@ from fulmar_core.topics import (
     OBSTACLES,
     ODOMETRY,
     VELOCITY_COMMAND,
+    Wire,
 )
 from fulmar_ros.convert import OdometryWriter, VectorWriter
 from fulmar_ros.goal_messages import goal_message
+from fulmar_ros.message_class import message_class
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 from tests.states import planar_state
 
@@ -99,6 +104,10 @@ class Neighbour:
         """Command no more: another node is to."""
         self.node.destroy_publisher(self._command)
 
+    def withdraw_odometry(self) -> None:
+        """Measure no more: a plant is to."""
+        self.node.destroy_publisher(self._odometry)
+
     def command(self, values: list[float], names: list[str] | None = None, stamp_ns: int = 0) -> None:
         """Send one command, an answer to the observation of a stamp or to none."""
         writer = VectorWriter(names or self.robot.actuators.names)
@@ -127,6 +136,18 @@ class Neighbour:
         message = OdometryWriter(self.robot.sensors.odometry).write(planar_state(x, 0.0, 0.0), stamp_ns)
         spoil(message)
         self._odometry.publish(message)
+
+
+@contextmanager
+def second_publisher(domain: int, wire: Wire) -> Iterator[None]:
+    """A publisher of the neighbour's name, in another process as far as DDS knows; it need not say a word."""
+    context = Context()
+    rclpy.init(context=context, domain_id=domain)
+    twin = rclpy.create_node("neighbour", namespace=NAMESPACE, context=context)
+    twin.create_publisher(message_class(wire), wire.name, publisher_qos(wire))
+    yield
+    twin.destroy_node()
+    rclpy.shutdown(context=context)
 
 
 def until(condition: Callable[[], bool], timeout_s: float = 8.0) -> None:

@@ -14,14 +14,14 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu
 
 from fulmar_core.errors import ConfigError
-from fulmar_core.topics import IMU, MOCAP, ODOMETRY
+from fulmar_core.topics import IMU, MOCAP, ODOMETRY, Wire
 from fulmar_ros.convert import PoseWriter, stamp_of
 from fulmar_ros.estimator_node import EstimatorNode
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.runtime import spinning
 from tests.conftest import RosDomain
 from tests.ros.cli import json_of, run_in_real_time
-from tests.ros.neighbour import NAMESPACE, Neighbour, until
+from tests.ros.neighbour import NAMESPACE, Neighbour, second_publisher, until
 from tests.states import planar_state
 
 pytestmark = pytest.mark.real_time
@@ -93,6 +93,30 @@ def test_odometry_has_frames_the_stamp_of_what_it_is_about_and_covariances(sourc
     assert 0.0 < covariance[0, 0] < 0.15**2
     assert 0.0 < np.array(message.pose.covariance).reshape(6, 6)[5, 5] < 0.1
     assert abs(message.twist.twist.linear.x) < 0.2
+
+
+@pytest.mark.parametrize("wire", [MOCAP, IMU], ids=lambda wire: wire.name)
+def test_readings_of_two_nodes_make_no_odometry_and_both_nodes_are_named_until_one_is_gone(
+    sources: Sources, ros_domain: RosDomain, wire: Wire
+) -> None:
+    sources.until_odometry()
+    name = f"{NAMESPACE}/neighbour"
+    words = f"2 nodes publish {wire.name}, and only one may: {name}, {name}"
+
+    def silent() -> bool:
+        before = len(sources.odometry)
+        for _ in range(10):
+            sources.tick()
+            time.sleep(0.01)
+        return len(sources.odometry) == before
+
+    with second_publisher(ros_domain.id, wire):
+        until(silent)
+        until(lambda: silent() and sources.said[1].get("warnings", "").startswith(words))
+        assert sources.said[0] == words
+        assert sources.said[1]["last_refusal"] == words
+        assert sources.said[1]["stale"] == "true"
+    sources.until_odometry()
 
 
 def test_a_gap_is_bridged_and_then_silence_says_that_it_is_stale(sources: Sources) -> None:

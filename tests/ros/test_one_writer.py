@@ -6,24 +6,22 @@ import socket
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import psutil
 import pytest
-import rclpy
-from rclpy.context import Context
-from sensor_msgs.msg import JointState
 
 from fulmar_bringup.launch_check import refuse_living_plants
 from fulmar_bringup.run_plan import NodeSpec
 from fulmar_core.errors import ConfigError
-from fulmar_core.topics import COMMAND
+from fulmar_core.topics import AIR_BEARING, COMMAND, ODOMETRY, Wire
+from fulmar_ros.controller_node import ControllerNode
 from fulmar_ros.plant_node import PlantNode
-from fulmar_ros.qos import publisher_qos
 from tests.conftest import RosDomain
 from tests.ros.cli import FULMAR, fulmar, json_of
-from tests.ros.neighbour import NAMESPACE, ROBOT, Neighbour, open_valves, until
+from tests.ros.neighbour import NAMESPACE, ROBOT, Neighbour, open_valves, second_publisher, until
 
 pytestmark = pytest.mark.real_time
 
@@ -64,19 +62,41 @@ def opened(neighbour: Neighbour) -> bool:
 def test_a_second_node_that_commands_closes_the_valves_until_it_is_gone(
     neighbour: Neighbour, plant: PlantNode, commands: Commands, ros_domain: RosDomain
 ) -> None:
-    """Of the same name, in another process as far as DDS knows; it need not say a word. Both are named."""
+    """Both are named."""
     until(lambda: opened(neighbour))
-    context = Context()
-    rclpy.init(context=context, domain_id=ros_domain.id)
-    twin = rclpy.create_node(neighbour.node.get_name(), namespace=NAMESPACE, context=context)
-    twin.create_publisher(JointState, COMMAND.name, publisher_qos(COMMAND))
-    until(lambda: not opened(neighbour))
-    name = f"{NAMESPACE}/neighbour"
-    until(lambda: f"2 nodes publish commands, and only one may: {name}, {name}" in neighbour.said["plant"][0])
-    twin.destroy_node()
-    rclpy.shutdown(context=context)
+    with second_publisher(ros_domain.id, COMMAND):
+        until(lambda: not opened(neighbour))
+        name = f"{NAMESPACE}/neighbour"
+        until(
+            lambda: (
+                f"2 nodes publish commands, and only one may: {name}, {name}" in neighbour.said["plant"][0]
+            )
+        )
     until(lambda: opened(neighbour))
     assert plant.guard.watchdog.trips == 0  # the commands went on all the time
+
+
+@pytest.mark.parametrize("wire", [ODOMETRY, AIR_BEARING], ids=lambda wire: wire.name)
+def test_a_controller_follows_no_input_of_two_nodes_names_both_and_goes_on_when_one_is_gone(
+    neighbour: Neighbour, controller: ControllerNode, ros_domain: RosDomain, wire: Wire
+) -> None:
+    def acts() -> bool:
+        neighbour.odometry(time.time_ns())
+        time.sleep(0.02)
+        return bool(neighbour.commands) and bool(neighbour.commands[-1].any())
+
+    until(lambda: neighbour.goal_publisher.get_subscription_count() > 0)
+    neighbour.give_goal()
+    until(acts)
+    name = f"{NAMESPACE}/neighbour"
+    words = f"2 nodes publish {wire.name}, and only one may: {name}, {name}"
+    with second_publisher(ros_domain.id, wire):
+        until(lambda: not acts())
+        until(lambda: not acts() and neighbour.said["controller"][1].get("warnings") == words)
+        message, values = neighbour.said["controller"]
+        assert message == values["reason"] == words
+        assert values["mode"] == "armed"
+    until(acts)
 
 
 @pytest.mark.slow
@@ -84,6 +104,7 @@ def test_a_run_ends_where_another_node_commands_its_robot_and_its_result_names_b
     neighbour: Neighbour, ros_domain: RosDomain, tmp_path: Path
 ) -> None:
     """The neighbour has a publisher of commands, and never uses it."""
+    neighbour.withdraw_odometry()
     asked = ("--controller", "lqr", "--goal", "1,0,0", "--record", "bag", "--json")
     done = fulmar("run", ROBOT, *asked, env=ros_domain.env, cwd=tmp_path)
     assert done.returncode == 1

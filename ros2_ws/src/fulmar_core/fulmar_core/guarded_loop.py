@@ -206,9 +206,19 @@ class GuardedLoop:
             self.mission.see_thing(name, self.loop.task.state_type.targets_of(pose), stamp_ns)
             self._follow_mission()
 
+    def contest(self, reason: str) -> None:
+        """Take no odometry while more than one node publishes an input, for a reason; with none, begin anew."""
+        with self._lock:
+            self._change(contested=reason)
+            if not reason:
+                self._anew = True
+                self._gate.forget()
+
     def take(self, measurement: Measurement, now_ns: int) -> bool:
         """Take odometry; returns whether it is usable. If not, `decide` says why."""
         with self._lock:
+            if self._flags.contested:
+                return False
             problem = self._gate.problem(measurement) or ""
             if problem:
                 self._change(input_problem=problem)

@@ -34,7 +34,7 @@ from fulmar_ros.convert import OdometryReader, VectorReader
 from fulmar_ros.deadline import ControlBeat
 from fulmar_ros.fallback import MakeController, PolicySwap, controllers_of, load_other
 from fulmar_ros.goal_messages import GoalMessage
-from fulmar_ros.graph import WireWatch
+from fulmar_ros.graph import WireWatch, WriterWatch
 from fulmar_ros.mission_inputs import MissionInputs
 from fulmar_ros.node_identity import identity_of
 from fulmar_ros.parameters import own_frames, read_parameters
@@ -141,6 +141,7 @@ class ControllerNode(LifecycleNode):
         self._satellite = SatelliteInputs(self, self.robot, self._go_on, lockstep=self.settings.lockstep)
         self.wires.publish_metadata(switch.current.metadata)
         self._wire_watch = WireWatch(self, self.wires.subscribed)
+        self._writer_watch = WriterWatch(self, self.wires.followed | self._satellite.followed)
         # Lock step has no beat of its own; a wall-clock timer keeps the status alive between messages.
         self._status_timer = self.create_timer(PERIOD_S / 4, self._publish_idle_status)
         return DONE
@@ -277,6 +278,7 @@ class ControllerNode(LifecycleNode):
         if lockstep and measurement.stamp_ns == guard.loop.answered_ns:
             self.wires.publish_command(guard.loop.previous[0], measurement.stamp_ns)  # the answer got lost
             return
+        self._see_writers()
         usable = guard.take(measurement, time.monotonic_ns())
         if lockstep:
             self._control(measurement)
@@ -397,10 +399,18 @@ class ControllerNode(LifecycleNode):
     def _publish_idle_status(self) -> None:
         """Publish the status where no control step does it."""
         self._status.wire_problems = self._wire_watch.look()
+        self._see_writers()
         self._status.inputs_refused = self._satellite.refused, self._satellite.refusal
         flags = self._guarded.flags
         if self.settings.lockstep or not flags.activated or flags.latched_fault:
             self._publish_status()
+
+    def _see_writers(self) -> None:
+        """Follow no odometry while more than one node publishes an input."""
+        contested = self._writer_watch.look(time.monotonic_ns())
+        self._status.contested = self._writer_watch.alarm
+        if contested != self._guarded.flags.contested:
+            self._guarded.contest(contested)
 
     def _publish_status(self, decision: Decision | None = None) -> None:
         guard = self._guarded

@@ -23,6 +23,7 @@ class ControllerStatus:
         steps: Control steps so far.
         inference_ms: Time that the controller took to act.
         wire_problems: Publishers from which nothing arrives, in words.
+        contested: Which nodes publish one input, where more than one does, in words.
         inputs_refused: How many readings beside the odometry were refused, and why the newest of them was; empty if it
             was not.
     """
@@ -33,6 +34,7 @@ class ControllerStatus:
         self.steps = 0
         self.inference_ms = Spread()
         self.wire_problems: list[str] = []
+        self.contested = ""
         self.inputs_refused = 0, ""
         self._said: tuple[object, ...] = ()
         self._said_at = 0.0
@@ -72,6 +74,7 @@ class ControllerStatus:
             beliefs.open,
             len(beliefs.words),
             guard.flags.unconverged,
+            self.contested,
             self._swap.requests,
         )
         now = time.monotonic()
@@ -80,7 +83,7 @@ class ControllerStatus:
         self._said, self._said_at = changed, now
         unconverged = guard.flags.unconverged
         level = {Mode.ACTIVE: "ok", Mode.FAULT: "error"}.get(decision.mode, "warn")
-        level = "error" if unconverged else level
+        level = "error" if unconverged or self.contested else level
         doubtful = switch.fell_back or self.wire_problems or beliefs.words or self.inputs_refused[1]
         level = "warn" if level == "ok" and doubtful else level
         age_ms = (time.monotonic_ns() - last_input_ns) / 1e6 if last_input_ns else 0.0
@@ -119,5 +122,5 @@ class ControllerStatus:
         }
         warnings = BETWEEN.join([*self.wire_problems, *beliefs.words])
         message = decision.reason or warnings or decision.mode.value
-        warned = [*beliefs.warnings, *([unconverged] if unconverged else [])]
+        warned = [*beliefs.warnings, *(words for words in (unconverged, self.contested) if words)]
         health.publish(level, message, values, warnings=warned)

@@ -116,19 +116,18 @@ class ControllerWires:
         self._node = node
         self._subscriptions: list[list[Subscription]] = []
         # The wires that are subscribed; the values say whether a best-effort publisher is refused.
-        self.subscribed: dict[Wire, bool] = {ODOMETRY: lockstep}
+        self.subscribed: dict[Wire, bool] = {}
+        # Subscriptions of what the controller follows, which one node alone may publish.
+        self.followed: dict[str, list[Subscription]] = {}
         # Before the odometry: of two messages that wait, an executor takes that of the older subscription first.
         if on_bearing is not None:
-            self._every(Bool, AIR_BEARING, on_bearing)
+            self.followed[AIR_BEARING.name] = self._every(Bool, AIR_BEARING, on_bearing)
         if can_monitor(robot):
             applied = subscriber_qos(ACTUATORS_STATE, reliable=lockstep, depth=APPLIED_DEPTH)
             made = node.create_subscription(JointState, ACTUATORS_STATE.name, on_applied, applied, raw=True)
-            self._subscriptions.append([made])
-            self.subscribed[ACTUATORS_STATE] = lockstep
-        self._odometry = node.create_subscription(
-            Odometry, ODOMETRY.name, on_odometry, odometry_qos, raw=True
-        )
-        self._subscriptions.append([self._odometry])
+            self._follow(ACTUATORS_STATE, made, lockstep=lockstep)
+        made = node.create_subscription(Odometry, ODOMETRY.name, on_odometry, odometry_qos, raw=True)
+        self._follow(ODOMETRY, made, lockstep=lockstep)
         self._every(Bool, ESTOP, on_estop)
         self._every(String, ESTOP_RELEASED, on_estop_released)
         self._every(String, SWAP, on_swap)
@@ -140,15 +139,21 @@ class ControllerWires:
             stream = subscriber_qos(thing.wire, reliable=lockstep)
             on_pose = partial(on_thing, thing.name)
             made = node.create_subscription(PoseStamped, thing.wire.name, on_pose, stream)
-            self._subscriptions.append([made])
-            self.subscribed[thing.wire] = lockstep
+            self._follow(thing.wire, made, lockstep=lockstep)
 
     def _every(
         self, kind: type, wire: Wire, callback: Callable[..., None], *, with_info: bool = False
-    ) -> None:
+    ) -> list[Subscription]:
         """Subscribe a wire of which every message counts."""
-        self._subscriptions.append(subscribe_every(self._node, kind, wire, callback, with_info=with_info))
+        made = subscribe_every(self._node, kind, wire, callback, with_info=with_info)
+        self._subscriptions.append(made)
         self.subscribed[wire] = False
+        return made
+
+    def _follow(self, wire: Wire, made: Subscription, *, lockstep: bool) -> None:
+        self._subscriptions.append([made])
+        self.subscribed[wire] = lockstep
+        self.followed[wire.name] = [made]
 
     def _command_writer(self) -> TwistWriter | VectorWriter:
         return TwistWriter(self._frames) if self._by_velocity else VectorWriter(self._actuators.names)

@@ -19,6 +19,7 @@ from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.publisher import Publisher
+from rclpy.subscription import Subscription
 
 from fulmar_bags.message_reader import stamp_ns
 from fulmar_core.errors import shortened
@@ -33,7 +34,7 @@ from fulmar_core.wire_check import BETWEEN, WIRE_WARNINGS
 from fulmar_ros.deadline import Spread
 from fulmar_ros.estimator_wires import READERS, WRITERS, Read, Write
 from fulmar_ros.frame_wires import odometry_transform
-from fulmar_ros.graph import WireWatch
+from fulmar_ros.graph import WireWatch, WriterWatch
 from fulmar_ros.health import Health
 from fulmar_ros.lockstep_answer import LockstepAnswer
 from fulmar_ros.operator_subscription import subscribe_every
@@ -102,10 +103,12 @@ class EstimatorNode(Node):
         self._health = Health(self, f"{name_of(self, robot)}: {self.get_name()}", *more)
         self._wire_watch = WireWatch(self, dict.fromkeys(kind.readings.values(), settings.lockstep))
         self._period: LockstepAnswer | None = None
-        topics = {}
+        topics, followed = {}, {}
         for name, wire in kind.readings.items():
             topics[self.resolve_topic_name(wire.name)] = name
-            self._subscribe(name, wire, lockstep=settings.lockstep)
+            followed[wire.name] = self._subscribe(name, wire, lockstep=settings.lockstep)
+        self._writer_watch = WriterWatch(self, followed)
+        self._contested = ""
         if settings.lockstep:
             self._period = LockstepAnswer(
                 self,
@@ -123,15 +126,14 @@ class EstimatorNode(Node):
             self._frames
         )
 
-    def _subscribe(self, name: str, wire: Wire, *, lockstep: bool) -> None:
+    def _subscribe(self, name: str, wire: Wire, *, lockstep: bool) -> list[Subscription]:
         kind, read = READERS[wire]
         depth = EVERYTHING if lockstep else DEPTHS[wire.delivery]
         receive = partial(self._on_message, name, self.resolve_topic_name(wire.name), read)
         if lockstep:
             qos = subscriber_qos(wire, reliable=True, depth=depth, lossless=True)
-            self.create_subscription(kind, wire.name, receive, qos)
-        else:
-            subscribe_every(self, kind, wire, receive, depth=depth)
+            return [self.create_subscription(kind, wire.name, receive, qos)]
+        return subscribe_every(self, kind, wire, receive, depth=depth)
 
     def _on_message(self, name: str, topic: str, read: Read, message: Any) -> None:
         reading = self._unbroken(name, read, message, self._frames)
@@ -147,7 +149,7 @@ class EstimatorNode(Node):
             self._prior = True
         begun_s = time.perf_counter()
         words: str | None = reading if isinstance(reading, str) else None
-        refusal = words or self._unbroken(name, self._refusal_of, name, reading)
+        refusal = self._see_writers() or words or self._unbroken(name, self._refusal_of, name, reading)
         self._computation_ms.add(1e3 * (time.perf_counter() - begun_s))
         if refusal is not None:
             self._refused += 1
@@ -155,6 +157,14 @@ class EstimatorNode(Node):
             return False
         self._received_s = time.monotonic()
         return True
+
+    def _see_writers(self) -> str:
+        """Why no reading is taken: one of them comes from two nodes, and an estimate of both is of no use."""
+        contested = self._writer_watch.look(time.monotonic_ns())
+        if contested != self._contested:
+            self._contested = contested
+            self._estimator.reset()
+        return contested
 
     def _unbroken(self, name: str, use: Callable[..., Any], *given: Any) -> Any:
         """What a function makes of a message; where it raises, its error in words, and the estimator begins anew.
@@ -186,7 +196,7 @@ class EstimatorNode(Node):
             if reading is not None:
                 self._take(name, reading)
         estimate = self._estimate(period_ns)
-        if estimate is None or not self._is_new(estimate):
+        if self._contested or estimate is None or not self._is_new(estimate):
             return []
         self._note(estimate)
         return [(publisher, write(estimate)) for publisher, write in self._outputs]
@@ -213,9 +223,9 @@ class EstimatorNode(Node):
     def _publish_status(self) -> None:
         silent_s = time.monotonic() - self._received_s
         stale = f"nothing usable comes for {silent_s:.1f} s" if silent_s > self._bridge_s else ""
-        problem = self._problem or stale
-        unfit = self._wire_watch.look()
-        warnings = (*self._estimator.warnings(), *unfit)
+        problem = self._see_writers() or self._problem or stale
+        unfit, contested = self._wire_watch.look(), self._writer_watch.alarm
+        warnings = (*([contested] if contested else []), *self._estimator.warnings(), *unfit)
         key = (problem[:16], warnings, self._estimator.epoch, self._refused > 0)
         if key == self._said and time.monotonic() - self._said_s < STATUS_PERIOD_S:
             return
@@ -233,7 +243,7 @@ class EstimatorNode(Node):
         values |= self._estimator.status()
         lacks = values.get("lacks", LACKS_NOTHING)
         estimating = "estimating" if lacks == LACKS_NOTHING else f"estimating without {lacks}"
-        level = "warn" if problem or warnings else "ok"
+        level = "error" if contested else "warn" if problem or warnings else "ok"
         message = problem or "; ".join(warnings) or estimating
         self._health.publish(level, message, values, warnings=warnings)
 

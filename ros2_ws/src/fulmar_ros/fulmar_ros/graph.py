@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 from rclpy.subscription import Subscription
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
+from fulmar_core.safety.command_gate import OneWriter
 from fulmar_core.topics import Wire
 from fulmar_core.wire_check import Offer, wire_problems
 
@@ -20,6 +21,7 @@ UNNAMED_NODE = (
 )
 UNNAMED = "a node of unknown name"
 ROBOT_NODES = {"plant", "controller"}
+NAMING_NS = 1_000_000_000  # in which discovery reports the name of a node whose publisher is known
 LOOK_S = 2.0  # between two looks of a watch; each takes well under a millisecond a topic
 
 
@@ -41,6 +43,35 @@ def writers_of(node: Node, subscription: Subscription) -> list[str]:
     infos = node.get_publishers_info_by_topic(subscription.topic_name)
     processes = {(bytes(info.endpoint_gid[:PARTICIPANT_BYTES]), full_name(info)) for info in infos}
     return sorted(name for _, name in processes)
+
+
+class WriterWatch:
+    """Looks whether more than one node publishes an input that is followed: which of them is right, nobody knows."""
+
+    def __init__(self, node: Node, inputs: Mapping[str, Iterable[Subscription]]) -> None:
+        """Watch inputs by the names that people know them by, each with its subscriptions."""
+        self._node = node
+        self._inputs = [(subscriptions, OneWriter(name)) for name, subscriptions in inputs.items()]
+        self._unnamed_since_ns: int | None = None
+        self.alarm = ""
+
+    def look(self, now_ns: int) -> str:
+        """Why no input is followed at a time of a steady clock; empty if all may be; takes 2 us [ns].
+
+        `alarm` has the same words for reports. It waits a second for the name of a node that discovery has not told.
+        """
+        reason = ""
+        for subscriptions, writers in self._inputs:
+            for subscription in subscriptions:
+                writers.see(writers_of(self._node, subscription), now_ns)
+            reason = reason or writers.reason(now_ns)
+        if UNNAMED not in reason:
+            self._unnamed_since_ns, self.alarm = None, reason
+        elif self._unnamed_since_ns is None:
+            self._unnamed_since_ns = now_ns
+        elif now_ns - self._unnamed_since_ns > NAMING_NS:
+            self.alarm = reason
+        return reason
 
 
 class WireWatch:

@@ -50,7 +50,7 @@ class SatelliteInputs:
         self._wheels: tuple[int, np.ndarray] | None = None  # stamp [ns], and speeds, shape (1, count)
         self._inertia: tuple[int, np.ndarray] | None = None
         self._on_wheels = on_wheels
-        self._subscriptions: list[list[Subscription]] = []
+        self.followed: dict[str, list[Subscription]] = {}  # by topic
         self.refused, self.refusal = 0, ""
         if not isinstance(robot.actuators, ReactionWheels):
             return
@@ -60,12 +60,12 @@ class SatelliteInputs:
             wire = SENSOR_WIRES["wheels"]
             qos = subscriber_qos(wire, reliable=lockstep)
             made = node.create_subscription(JointState, wire.name, self._take_wheels, qos)
-            self._subscriptions.append([made])
-        self._subscriptions.append(subscribe_every(node, InertiaStamped, INERTIA, self._take_inertia))
+            self.followed[wire.name] = [made]
+        self.followed[INERTIA.name] = subscribe_every(node, InertiaStamped, INERTIA, self._take_inertia)
 
     def destroy(self, node: Node) -> None:
         """Destroy the subscriptions."""
-        destroy_all(node, self._subscriptions)
+        destroy_all(node, self.followed.values())
 
     def lacks_something_of(self, time_ns: int) -> bool:
         """Whether a step of lock step waits for the speeds of its time [ns]."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from fulmar_core.actuators.family import Actuators
 from fulmar_core.actuators.refuge import Refuge
-from fulmar_core.safety.command_gate import CommandPublishers, command_problem, name_problem
+from fulmar_core.safety.command_gate import OneWriter, command_problem, name_problem
 from fulmar_core.safety.estop import EstopMonitor
 from fulmar_core.safety.watchdog import Watchdog
 from fulmar_core.state import RigidBodyState
@@ -62,7 +62,7 @@ class ActuatorGuard:
         """
         self._actuators, self.watchdog = actuators, watchdog
         self.estop = estop or EstopMonitor(required=False)
-        self.publishers = CommandPublishers()
+        self.publishers = OneWriter()
         self._control_dt, self._lockstep = control_dt, lockstep
         self.refuge = refuge or actuators.refuge
         self._steers = math.isinf(self.refuge.longest_s)

@@ -34,6 +34,7 @@ class Flags:
     lacking: str = "goal"  # what there is none of yet, where `has_goal` is false
     estop: str = ""  # why the emergency stop holds, empty if it does not
     outside: str = ""  # how the robot left the area that it may be in, empty if it did not
+    contested: str = ""  # which nodes publish one of the inputs, where more than one does
     unconverged: str = ""  # why the robot came no nearer to its goal, empty if it does
     bearing_off: bool = False  # the robot has an air bearing that is not known to be on
     active_s: float = 0.0  # how long it has been acting [s]
@@ -61,6 +62,8 @@ def arbitrate(flags: Flags, now_ns: int) -> Decision:
         return Decision(Mode.ARMED, False, flags.estop)
     if 0.0 < flags.max_run_time_s < flags.active_s:
         return Decision(Mode.ARMED, False, f"max_run_time of {flags.max_run_time_s:g} s is over")
+    if flags.contested:
+        return Decision(Mode.ARMED, False, flags.contested)
     if flags.last_input_ns is None:
         return Decision(Mode.ARMED, False, flags.input_problem or "no odom yet. Is the plant running?")
     age_ns = now_ns - flags.last_input_ns

@@ -53,25 +53,26 @@ class Rejections:
 SETTLE_NS = 1_000_000_000  # the safe state lasts this long after one of two publishers is gone
 
 
-class CommandPublishers:
-    """Reports why commands are not carried out, from the nodes that publish them. No clock, no ROS.
+class OneWriter:
+    """Reports why a topic is not followed, from the nodes that publish it. No clock, no ROS.
 
-    The hold is not latched. A controller that is started again overlaps for some seconds with the one that has died,
-    until discovery misses the dead one; no person is needed to go on after that.
+    The hold is not latched. A node that is started again overlaps for some seconds with the one that has died, until
+    discovery misses the dead one; no person is needed to go on after that.
     """
 
-    def __init__(self, *, settle_ns: int = SETTLE_NS) -> None:
+    def __init__(self, what: str = "commands", *, settle_ns: int = SETTLE_NS) -> None:
         """Begin without a publisher.
 
         Args:
+            what: Is published, for people.
             settle_ns: How long the hold lasts after the second publisher is gone, >= 0 [ns].
         """
-        self._settle_ns = settle_ns
+        self._what, self._settle_ns = what, settle_ns
         self._names: tuple[str, ...] = ()
         self._seen_ns: int | None = None
 
     def see(self, names: Sequence[str], now_ns: int) -> None:
-        """Note which nodes publish commands now.
+        """Note which nodes publish it now.
 
         Args:
             names: Full name of each node; the same name twice where two processes have it.
@@ -81,7 +82,7 @@ class CommandPublishers:
             self._names, self._seen_ns = tuple(names), now_ns
 
     def reason(self, now_ns: int) -> str:
-        """Why commands are not carried out at this time of the same clock; empty if they are [ns]."""
+        """Why it is not followed at this time of the same clock; empty if it is [ns]."""
         if self._seen_ns is None or now_ns - self._seen_ns > self._settle_ns:
             return ""
-        return f"{len(self._names)} nodes publish commands, and only one may: {', '.join(self._names)}"
+        return f"{len(self._names)} nodes publish {self._what}, and only one may: {', '.join(self._names)}"
