@@ -7,10 +7,11 @@ import re
 import subprocess
 import tomllib
 import zipfile
+from pathlib import Path
 
 import pytest
 
-from fulmar_ros.middleware import LOOPBACK, LOOPBACK_UDP, NETWORK
+from fulmar_ros.middleware import OWN_PROFILES
 
 SOURCES = "ros2_ws/src/"
 IN_SOURCES = ("core", "bags", "ros", "bringup", "evaluation", "benchmarks", "cli")
@@ -53,7 +54,7 @@ def test_it_has_every_file_of_every_package_and_nothing_else(repository, content
         if path.startswith(source) and (repository / path).is_file()
     }
     named = {"sim_nodes/sim_node.py", "fulmar_core/configs/policies.yaml"}
-    assert named | {f"fulmar_ros/{profile.name}" for profile in (NETWORK, LOOPBACK, LOOPBACK_UDP)} <= wanted
+    assert named | {f"fulmar_ros/{Path(profile).name}" for profile in OWN_PROFILES} <= wanted
     assert content == wanted
 
 

@@ -94,11 +94,12 @@ def test_a_run_refuses_options_of_the_controller_node(choice, words, tmp_path):
 @pytest.mark.parametrize(
     ("changes", "topic", "kind", "reliable"),
     [
-        ({}, "/turtlebot2/cmd_vel", "geometry_msgs/msg/TwistStamped", True),
-        ({"remappings": (("cmd_vel", "/raw"),)}, "/raw", "geometry_msgs/msg/TwistStamped", True),
+        ({}, "/turtlebot2/cmd_vel", "geometry_msgs/msg/TwistStamped", False),
+        ({"lockstep": True}, "/turtlebot2/cmd_vel", "geometry_msgs/msg/TwistStamped", True),
+        ({"remappings": (("cmd_vel", "/raw"),)}, "/raw", "geometry_msgs/msg/TwistStamped", False),
         ({"adapter": KOBUKI}, "/commands/velocity", "geometry_msgs/msg/Twist", False),
         ({"adapter": KOBUKI, "adapter_topic": "raw"}, "/turtlebot2/raw", "geometry_msgs/msg/Twist", False),
-        ({"robot": "kingfisher"}, "/kingfisher/actuators/command", "sensor_msgs/msg/JointState", True),
+        ({"robot": "kingfisher"}, "/kingfisher/actuators/command", "sensor_msgs/msg/JointState", False),
         ({"robot": "kingfisher", "adapter": "kingfisher_action"}, "/action", "std_msgs/msg/Float32MultiArray", False),
     ],
 )  # fmt: skip
@@ -123,11 +124,11 @@ class Overseer:
             alive()
 
 
-def wait(monkeypatch, *looks: list[Offer], recorded: str = "1") -> None:
+def wait(monkeypatch, *looks: list[Offer], recorded: str = "1", plan: RunPlan = PLAN) -> None:
     times = iter(range(1000))
     monkeypatch.setattr(readiness, "time", SimpleNamespace(monotonic=lambda: float(next(times))))
     monkeypatch.setenv("ROS_DOMAIN_ID", "7")
-    wait_for_publisher(PLAN, Overseer(*looks, recorded=recorded), lambda: None)
+    wait_for_publisher(plan, Overseer(*looks, recorded=recorded), lambda: None)
 
 
 def test_a_run_is_ready_once_a_fitting_publisher_is_there(monkeypatch, capsys):
@@ -151,7 +152,7 @@ def test_a_run_is_ready_once_a_fitting_publisher_is_there(monkeypatch, capsys):
 )  # fmt: skip
 def test_without_a_fitting_publisher_a_run_fails_with_one_line(offer, recorded, why, monkeypatch):
     with pytest.raises(RunFailed) as caught:
-        wait(monkeypatch, [offer] if offer else [], recorded=recorded)
+        wait(monkeypatch, [offer] if offer else [], recorded=recorded, plan=replace(PLAN, lockstep=True))
     text = str(caught.value)
     assert text.startswith(f"no publisher on /turtlebot2/cmd_vel within 20 s.{why}")
     assert "Start your controller, in ROS domain 7" in text

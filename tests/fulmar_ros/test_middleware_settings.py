@@ -12,6 +12,7 @@ from fulmar_ros.middleware import (
     LOOPBACK,
     LOOPBACK_UDP,
     NETWORK,
+    PEERS_UDP,
     PROFILES,
     STATIC_PEERS,
     TRANSPORTS,
@@ -42,7 +43,7 @@ def environment(monkeypatch):
         (SUBNET, NETWORK, False),
         (SUBNET | UDP | PEERS, NETWORK, False),
         (PEERS, NETWORK, True),
-        (PEERS | UDP, NETWORK, True),
+        (PEERS | UDP, PEERS_UDP, True),
     ],
 )
 def test_nodes_listen_on_the_network_only_where_range_or_peers_ask_for_it(variables, profile, filtered):
@@ -76,7 +77,11 @@ def test_rclpy_leaves_the_transports_to_a_profile_that_is_bound_to_loopback_alon
     assert seen() == "SYSTEM_DEFAULT LOCALHOST"
     environment.setenv(STATIC_PEERS, "10.0.0.2")
     assert seen() == "LOCALHOST LOCALHOST"
+    environment.setenv(TRANSPORTS, "UDPv4")
+    environment.setattr(middleware, "_loaded", [str(PEERS_UDP)])
+    assert seen() == "SUBNET LOCALHOST"
     environment.delenv(STATIC_PEERS)
+    environment.delenv(TRANSPORTS)
     environment.setattr(middleware, "_loaded", [str(NETWORK)])  # of this process, and read but once
     assert seen() == "LOCALHOST LOCALHOST"
 
@@ -93,4 +98,4 @@ def test_the_profiles_differ_in_their_transports_only():
                     parent.remove(child)
         return [(element.tag, element.attrib, (element.text or "").strip()) for element in root.iter()]
 
-    assert rest(NETWORK) == rest(LOOPBACK) == rest(LOOPBACK_UDP)
+    assert rest(NETWORK) == rest(LOOPBACK) == rest(LOOPBACK_UDP) == rest(PEERS_UDP)

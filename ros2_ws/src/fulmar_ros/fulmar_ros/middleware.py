@@ -15,12 +15,16 @@ TRANSPORTS, UDP_ONLY = (
 )  # between containers or users: without shared memory
 # Jazzy's name of the file, and that of later ones.
 PROFILES = ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE")
-# All announce nodes early, and resend lost messages early. The others listen on 127.0.0.1 alone.
+# All announce nodes early, and resend lost messages early. Two of them listen on 127.0.0.1 alone.
 NETWORK = Path(__file__).with_name("fast_dds.xml")
 LOOPBACK = Path(__file__).with_name("fast_dds_loopback.xml")
 LOOPBACK_UDP = Path(__file__).with_name("fast_dds_loopback_udp.xml")
-OWN_PROFILES = {str(profile) for profile in (NETWORK, LOOPBACK, LOOPBACK_UDP)}
-PROFILE_DECIDES = "SYSTEM_DEFAULT"  # the range with which rmw leaves all to the profile
+PEERS_UDP = Path(__file__).with_name("fast_dds_peers_udp.xml")
+OWN_PROFILES = {str(profile) for profile in (NETWORK, LOOPBACK, LOOPBACK_UDP, PEERS_UDP)}
+# With LOCALHOST rmw_fastrtps adds transports of its own to those of a profile: they send on every interface, and deliver
+# through shared memory, twice or where there is none. These profiles have all that is needed: they go with ranges at
+# which rmw adds nothing, or, at SUBNET, the static peers alone.
+RANGE_OF = {str(LOOPBACK): "SYSTEM_DEFAULT", str(LOOPBACK_UDP): "SYSTEM_DEFAULT", str(PEERS_UDP): "SUBNET"}
 _loaded: list[str] = []  # the profile of this process; Fast DDS reads it once
 
 
@@ -42,9 +46,12 @@ def foreign_profile(environment: Mapping[str, str]) -> str:
 
 def own_profile(environment: Mapping[str, str]) -> Path:
     """The profile for the range, peers and transports of an environment."""
-    if discovery_range(environment) not in (OWN_HOST, "OFF") or static_peers(environment):
+    if discovery_range(environment) not in (OWN_HOST, "OFF"):
         return NETWORK
-    return LOOPBACK_UDP if environment.get(TRANSPORTS) == UDP_ONLY else LOOPBACK
+    by_udp = environment.get(TRANSPORTS) == UDP_ONLY
+    if static_peers(environment):
+        return PEERS_UDP if by_udp else NETWORK
+    return LOOPBACK_UDP if by_udp else LOOPBACK
 
 
 def middleware_environment() -> dict[str, str]:
@@ -62,16 +69,13 @@ def set_up_middleware() -> None:
 
 @contextlib.contextmanager
 def range_for_rclpy() -> Iterator[None]:
-    """The discovery range that `rclpy.init` shall read.
-
-    With LOCALHOST rmw_fastrtps adds transports of its own to those of a profile, which send on every interface and
-    deliver through shared memory twice. A profile that is bound to loopback needs neither.
-    """
+    """Set the discovery range that `rclpy.init` shall read, see `RANGE_OF`."""
     if not _loaded:
         _loaded.append(os.environ.get(PROFILES[0], ""))
     wanted = discovery_range(os.environ)
-    bound = _loaded[0] == os.environ.get(PROFILES[0]) and _loaded[0] in (str(LOOPBACK), str(LOOPBACK_UDP))
-    os.environ[DISCOVERY_RANGE] = PROFILE_DECIDES if bound and wanted == OWN_HOST else wanted
+    chosen = os.environ.get(PROFILES[0], "")
+    known = wanted == OWN_HOST and chosen == _loaded[0]
+    os.environ[DISCOVERY_RANGE] = RANGE_OF.get(chosen, wanted) if known else wanted
     try:
         yield
     finally:
