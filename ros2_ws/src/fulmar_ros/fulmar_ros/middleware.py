@@ -21,9 +21,9 @@ LOOPBACK = Path(__file__).with_name("fast_dds_loopback.xml")
 LOOPBACK_UDP = Path(__file__).with_name("fast_dds_loopback_udp.xml")
 PEERS_UDP = Path(__file__).with_name("fast_dds_peers_udp.xml")
 OWN_PROFILES = {str(profile) for profile in (NETWORK, LOOPBACK, LOOPBACK_UDP, PEERS_UDP)}
-# With LOCALHOST rmw_fastrtps adds transports of its own to those of a profile: they send on every interface, and deliver
-# through shared memory, twice or where there is none. These profiles have all that is needed: they go with ranges at
-# which rmw adds nothing, or, at SUBNET, the static peers alone.
+# With LOCALHOST rmw_fastrtps adds transports of its own to those of a profile: they send on every interface, and
+# deliver through shared memory, twice or where there is none. These profiles have all that is needed: they go with
+# ranges at which rmw adds nothing, or, at SUBNET, the static peers alone.
 RANGE_OF = {str(LOOPBACK): "SYSTEM_DEFAULT", str(LOOPBACK_UDP): "SYSTEM_DEFAULT", str(PEERS_UDP): "SUBNET"}
 _loaded: list[str] = []  # the profile of this process; Fast DDS reads it once
 
