@@ -36,7 +36,7 @@ def turned(estimator, sample, *, seconds=2.0):
 @pytest.mark.parametrize("lacks", [LACKS_NOTHING, "accelerometer", "gyroscope"])
 def test_an_estimate_of_motion_goes_on_with_what_the_inertial_unit_has(name, lacks):
     robot, rest = ROBOTS[name]
-    estimator = make_estimator(name, load_robot(robot))
+    estimator = make_estimator(name, load_robot(robot), exact_sensors=True)
     sample = ImuSample(NONE if lacks == "accelerometer" else rest, NONE if lacks == "gyroscope" else TURNING)
     estimate = estimator.estimate(turned(estimator, sample))
     assert estimate is not None, estimator.problem
@@ -50,7 +50,7 @@ def test_a_gyroscope_alone_makes_the_turn_rate_better_than_poses_do(name):
     robot, rest = ROBOTS[name]
     spread = {}
     for what, sample in {"gyroscope": ImuSample(NONE, TURNING), "force": ImuSample(rest, NONE)}.items():
-        estimator = make_estimator(name, load_robot(robot))
+        estimator = make_estimator(name, load_robot(robot), exact_sensors=True)
         spread[what] = estimator.estimate(turned(estimator, sample)).covariance[11, 11]
     assert spread["gyroscope"] < 0.2 * spread["force"]
 
@@ -65,7 +65,7 @@ def test_a_gyroscope_alone_makes_the_turn_rate_better_than_poses_do(name):
     ],
 )
 def test_a_unit_that_reports_nothing_or_nonsense_is_refused_in_words(name, sample, said):
-    estimator = make_estimator(name, load_robot(ROBOTS[name][0]))
+    estimator = make_estimator(name, load_robot(ROBOTS[name][0]), exact_sensors=True)
     assert said in estimator.take("imu", Reading(sample, 1000 * MS))
 
 

@@ -16,8 +16,12 @@ from typing import Any, ClassVar, Generic, TypeVar
 import numpy as np
 
 from fulmar_core.estimation.estimator import LACKS_NOTHING, Estimate
+from fulmar_core.estimation.filter import ATTITUDE, IMU, POSE, Filter, Placed
+from fulmar_core.estimation.frozen import EXACT, FrozenSources, Noise
+from fulmar_core.estimation.inertial_prediction import InertialPredictions
 from fulmar_core.estimation.reading_times import ReadingTimes
 from fulmar_core.estimation.settings import MotionSettings
+from fulmar_core.estimation.strangers import AGAIN_NS, TO_BEGIN_ANEW_NS, Stranger, Strangers
 from fulmar_core.robot import Limits
 from fulmar_core.sensors.reading import Reading
 
@@ -25,11 +29,18 @@ S = TypeVar("S", bound=MotionSettings)
 
 KEPT_NS = 1_000_000_000  # how far back an estimate can be corrected
 READING_LASTS_NS = 60_000_000  # how long after it an inertial reading still stands for what happens
-TO_BEGIN_ANEW = 10  # outliers in a row that agree with one another: then it is the estimate that is wrong
-IMU, POSE, ATTITUDE = range(
-    3
-)  # kinds of events; of one time the inertial reading first, which moves the robot there
 WHAT = {IMU: "inertial reading", POSE: "pose", ATTITUDE: "attitude"}  # for people
+LATELY_NS = (
+    10_000_000_000  # how long after it began anew an estimator asks more of poses that it does not expect
+)
+LATE_STD_S = 0.05  # by how much the latency of poses may differ from that of the settings [s]
+SEPARATION = (
+    100.0  # squared distance of estimate and inertial readings that is none of noise: 10 standard deviations
+)
+CONTRADICTION = (
+    "motion capture and inertial readings contradict each other: neither is trusted until they agree on a motion. "
+    "Turn the robot by hand, or restart the estimator"
+)
 NO_POSE = "no pose yet. Is the motion capture running, and does it see the robot?"
 
 
@@ -46,34 +57,6 @@ class Event:
     def key(self) -> tuple[int, int]:
         """Order: by time, then by kind."""
         return self.stamp_ns, self.kind
-
-
-class Filter(ABC):
-    """A filter that can go back; values of events are of its own types."""
-
-    @abstractmethod
-    def move_on(self, seconds: float, inertial: Any) -> None:
-        """Predict by a time step [s] from an inertial reading; None: there is none."""
-
-    @abstractmethod
-    def correct(self, kind: int, value: Any) -> None:
-        """Correct by an event."""
-
-    @abstractmethod
-    def distance2(self, kind: int, value: Any) -> float:
-        """Squared Mahalanobis distance of an event from what is expected [-]."""
-
-    @abstractmethod
-    def snapshot(self) -> Any:
-        """Everything that it believes, to go back to."""
-
-    @abstractmethod
-    def restore(self, snapshot: Any) -> None:
-        """Go back."""
-
-    @abstractmethod
-    def speed_std(self) -> float:
-        """Largest standard deviation of the velocity's components [m/s]."""
 
 
 class HistoryEstimator(ABC, Generic[S]):
@@ -93,6 +76,7 @@ class HistoryEstimator(ABC, Generic[S]):
         limits: Limits,
         *,
         gyroscope_range: float = math.inf,
+        noise: Noise = EXACT,
     ) -> None:
         """Begin without an estimate.
 
@@ -100,12 +84,22 @@ class HistoryEstimator(ABC, Generic[S]):
             settings: What to believe of the sensors.
             limits: What the robot can possibly do.
             gyroscope_range: Largest turn rate about an axis that inertial readings have [rad/s].
+            noise: Which sources have any, and so never repeat a value.
         """
         self._gyroscope_range = gyroscope_range
         self._settings: S = settings
         self._limits = limits
         self._gate, self._bridge_s = settings.gate, settings.bridge_s
         self._slack = 10.0 * settings.position_std  # distance between two poses that their noise explains [m]
+        self._frozen = FrozenSources(noise, bridge_s=settings.bridge_s)
+        self._strangers = Strangers(
+            speed=limits.speed, slack=self._slack, turn_slack=10.0 * settings.pose_turn_std
+        )
+        self._predictions = InertialPredictions(
+            lambda: self._new_filter(self._first_pose),
+            gap_ns=READING_LASTS_NS,
+            late_std_s=LATE_STD_S + noise.pose_late_s,
+        )
         self._latency_ns = round(1e9 * settings.latency_s)  # from capture of a pose to its stamp
         self._kinds: Mapping[str, tuple[int, Callable[[Reading], Any]]] = {
             "mocap": (POSE, self._pose),
@@ -131,8 +125,8 @@ class HistoryEstimator(ABC, Generic[S]):
         """A filter that begins at a pose, knowing little else."""
 
     @abstractmethod
-    def _place(self, pose: Any) -> np.ndarray:
-        """Where a pose is [m]."""
+    def _placed(self, pose: Any) -> Placed:
+        """Position and attitude of a pose."""
 
     @abstractmethod
     def _value(self) -> tuple[Any, np.ndarray]:
@@ -169,7 +163,15 @@ class HistoryEstimator(ABC, Generic[S]):
             self._lacks = reading.value.lacks
         if problem or saturated:
             return problem or saturated
+        if repetition := self._repetition(kind, reading, stamp_ns):
+            return repetition
         return self._see(Event(stamp_ns, kind, None), value_of, reading) or None
+
+    def _repetition(self, kind: int, reading: Reading, stamp_ns: int) -> str:
+        """Why a reading is none, as its source only repeats itself; empty if it is one."""
+        if kind == POSE:
+            return self._frozen.pose_problem(reading.value, stamp_ns)
+        return self._frozen.inertial_problem(reading.value, stamp_ns) if kind == IMU else ""
 
     def _see(self, event: Event, value_of: Callable[[Reading], Any], reading: Reading) -> str:
         if self._filter is None:
@@ -181,9 +183,12 @@ class HistoryEstimator(ABC, Generic[S]):
         event.value = value_of(reading)
         if event.kind == IMU:
             self._insert(event)
+            self._predictions.move(event.stamp_ns, event.value)
             return ""
         if not self._believe(event):
-            return f"{WHAT[event.kind]} lies beyond the gate: {self.outliers} outliers so far"
+            return self._contradiction or (
+                f"{WHAT[event.kind]} lies beyond the gate: {self.outliers} outliers so far"
+            )
         if event.kind == POSE:
             self._trust(event, reading)
         return ""
@@ -224,8 +229,9 @@ class HistoryEstimator(ABC, Generic[S]):
         )
 
     def warnings(self) -> tuple[str, ...]:
-        """None; see `Estimator.warnings`."""
-        return ()
+        """Sources that are not trusted; see `Estimator.warnings`."""
+        found = (*self._frozen.words(), self._contradiction, self._bias_problem())
+        return tuple(words for words in found if words)
 
     def status(self) -> dict[str, str]:
         """What the newest inertial reading lacks; see `Estimator`."""
@@ -248,13 +254,33 @@ class HistoryEstimator(ABC, Generic[S]):
     def _staleness(self, stamp_ns: int) -> str:
         if self._filter is None:
             return NO_POSE
-        if self._saturated:
-            return self._saturated
+        if (
+            problem := self._saturated
+            or self._frozen.pose_words
+            or self._contradiction
+            or self._bias_problem()
+        ):
+            return problem
         gap_s = (stamp_ns - self._believed_ns) / 1e9
         if gap_s > self._bridge_s:
             return f"no believable pose for {gap_s:.2f} s (limit {self._bridge_s:g} s)"
         if self._filter.speed_std() > self.KNOWN_SPEED_STD:
             return "the velocity is not known well enough yet"
+        return ""
+
+    def _bias_problem(self) -> str:
+        """Which bias no sound sensor has; empty if both are possible."""
+        if self._filter is None:
+            return ""
+        for name, bias, most, unit in zip(
+            ("accelerometer", "gyroscope"),
+            self._filter.biases(),
+            (self._settings.accelerometer_bias, self._settings.gyroscope_bias),
+            ("m/s²", "rad/s"),
+            strict=True,
+        ):
+            if bias > most:
+                return f"the bias of the {name} is beyond the possible {most:g} {unit}: it drifts"
         return ""
 
     def _forget(self) -> None:
@@ -264,13 +290,21 @@ class HistoryEstimator(ABC, Generic[S]):
         self._history: list[Event] = []
         self._times: ReadingTimes = ReadingTimes(self._begin_epoch)
         self._believed_ns = 0
-        self._strangers: list[Event] = []
+        self._contradiction = ""
+        self._anew_ns = -LATELY_NS  # when unexpected poses were believed in the end
+        self._strangers.forget()
+        self._predictions.forget()
+        self._frozen.forget()
         self.problem = NO_POSE
 
     def _begin(self, event: Event) -> None:
+        self._first_pose = event.value
         self._filter = self._new_filter(event.value)
         event.after = self._filter.snapshot()
-        self._history, self._strangers = [event], []
+        self._history = [event]
+        self._contradiction = ""
+        self._strangers.forget()
+        self._predictions.forget()
 
     def _begin_epoch(self) -> None:
         self._forget()
@@ -280,33 +314,68 @@ class HistoryEstimator(ABC, Generic[S]):
         """Insert a pose or an attitude if it is no outlier."""
         assert self._filter is not None
         at = bisect.bisect_right(self._history, event.key, key=lambda past: past.key)
-        if at == 0:
-            return True  # captured before everything that is remembered: too late to matter, but no lie
+        if at == 0:  # captured before everything that is remembered: too late to matter, but no lie
+            return not self._contradiction
         self._rewind(at)
         self._move_on(at, event.stamp_ns)
-        if self._filter.distance2(event.kind, event.value) <= self._gate:
-            if event.kind == POSE:
-                self._strangers = []
+        is_pose = event.kind == POSE
+        if not (is_pose and self._contradiction) and (
+            self._filter.distance2(event.kind, event.value) <= self._gate
+        ):
             self._insert(event)
-            return True
+            return not is_pose or self._is_consistent()
         self.outliers += 1
+        stranger = self._stranger(event) if is_pose else None
         self._replay(at)
-        return event.kind == POSE and self._meet_stranger(event)
+        return stranger is not None and self._meet(stranger, event)
 
-    def _meet_stranger(self, event: Event) -> bool:
-        """Begin anew where outliers agree with one another for long enough."""
-        if self._strangers:
-            last = self._strangers[-1]
-            seconds = (event.stamp_ns - last.stamp_ns) / 1e9
-            apart = math.dist(self._place(event.value), self._place(last.value))
-            if apart > self._limits.speed * seconds + self._slack:
-                self._strangers = []
-        self._strangers.append(event)
-        if len(self._strangers) < TO_BEGIN_ANEW:
+    def _stranger(self, event: Event) -> Stranger:
+        """An unexpected pose, beside what the filter believes of its time."""
+        assert self._filter is not None
+        f = self._filter
+        seen = self._placed(event.value)
+        return Stranger(event.stamp_ns, seen, f.placed(), f.speed_std(), f.rate_std())
+
+    def _meet(self, stranger: Stranger, event: Event) -> bool:
+        """Whether to begin anew at an unexpected pose, as those before it move as the inertial readings say."""
+        lately = event.stamp_ns - self._anew_ns < LATELY_NS
+        agreement = self._strangers.meet(stranger, for_ns=AGAIN_NS if lately else TO_BEGIN_ANEW_NS)
+        if agreement is None:
             return False
+        if not (agreement.closely if lately else agreement.agrees):
+            self._contradiction = CONTRADICTION
+        if self._contradiction and not agreement.proves:
+            return False
+        before = None if self._contradiction else self._filter
         self._begin(event)
+        if before is not None:
+            assert self._filter is not None
+            self._filter.keep_biases(before)
+            self._history[0].after = self._filter.snapshot()
+        self._anew_ns = event.stamp_ns
         self.epoch += 1
         return True
+
+    def _is_consistent(self) -> bool:
+        """Whether poses and inertial readings of the last seconds go together; if not, neither is trusted."""
+        assert self._filter is not None
+        self._strangers.forget()
+        now_ns = self._history[-1].stamp_ns
+        if self._predictions.separation2(self._filter, now_ns) <= SEPARATION:
+            self._predictions.renew(self._filter, now_ns)
+            return True
+        self._contradiction = CONTRADICTION
+        self._go_on_by_inertial_readings()
+        return False
+
+    def _go_on_by_inertial_readings(self) -> None:
+        """Go back to before the poses that cannot be true, as far as inertial readings were moved on without them."""
+        prediction = self._predictions.oldest
+        assert prediction is not None and self._filter is not None
+        after = prediction.filter.snapshot()
+        self._filter.restore(after)
+        self._history = [Event(prediction.stamp_ns, IMU, prediction.inertial, after)]
+        self._predictions.forget()
 
     def _insert(self, event: Event) -> None:
         at = bisect.bisect_right(self._history, event.key, key=lambda past: past.key)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from fulmar_core.config import line_of, load_config
 from fulmar_core.errors import ConfigError, did_you_mean
@@ -15,6 +15,7 @@ from fulmar_core.estimation.settings import (
     EstimatorSettings,
     EventRateSettings,
     InertiaSettings,
+    MotionSettings,
     PlanarMotionSettings,
     SpatialMotionSettings,
 )
@@ -39,6 +40,9 @@ from fulmar_core.topics import (
     Wire,
 )
 
+Motion = TypeVar("Motion", bound=MotionSettings)
+
+FAR_ABOVE = 2.0  # times the noise of the settings: their poses would be outliers
 DEFAULT_KIND = "planar_motion"  # of a file that names none
 # Files of configs/estimators that make odometry of motion capture and inertial readings.
 DEFAULT_FILES: Mapping[type[State], str] = {PlanarState: "mocap_imu", SpatialState: "mocap_imu_3d"}
@@ -66,16 +70,37 @@ class EstimatorKind:
         return {**self.takes, **self.takes_if_there}
 
 
+def _fitted(settings: Motion, robot: Robot) -> Motion:
+    """Settings whose poses have the noise of a robot's file, where that is far above theirs."""
+    odometry = robot.sensors.odometry
+    turn = "heading_std" if isinstance(settings, PlanarMotionSettings) else "attitude_std"
+    theirs = {"position_std": odometry.position.std, turn: odometry.heading.std}
+    more = {name: std for name, std in theirs.items() if std > FAR_ABOVE * getattr(settings, name)}
+    return replace(settings, **more) if more else settings  # type: ignore[arg-type]
+
+
 def _planar_motion(settings: PlanarMotionSettings, robot: Robot) -> Estimator:
+    from fulmar_core.estimation.frozen import noise_of
     from fulmar_core.estimation.planar_motion import PlanarMotionEstimator
 
-    return PlanarMotionEstimator(settings, robot.limits, gyroscope_range=robot.sensors.imu.gyroscope_range)
+    return PlanarMotionEstimator(
+        _fitted(settings, robot),
+        robot.limits,
+        gyroscope_range=robot.sensors.imu.gyroscope_range,
+        noise=noise_of(robot.sensors),
+    )
 
 
 def _spatial_motion(settings: SpatialMotionSettings, robot: Robot) -> Estimator:
+    from fulmar_core.estimation.frozen import noise_of
     from fulmar_core.estimation.spatial_motion import SpatialMotionEstimator
 
-    return SpatialMotionEstimator(settings, robot.limits, gyroscope_range=robot.sensors.imu.gyroscope_range)
+    return SpatialMotionEstimator(
+        _fitted(settings, robot),
+        robot.limits,
+        gyroscope_range=robot.sensors.imu.gyroscope_range,
+        noise=noise_of(robot.sensors),
+    )
 
 
 def _attitude(settings: AttitudeSettings, robot: Robot) -> Estimator:

@@ -13,13 +13,16 @@ from typing import Any
 import numpy as np
 from filterpy.kalman import ExtendedKalmanFilter
 
-from fulmar_core.estimation import history as events
-from fulmar_core.estimation.history import Filter
+from fulmar_core.estimation import filter as events
+from fulmar_core.estimation.filter import Filter, Placed
 from fulmar_core.estimation.settings import PlanarMotionSettings
+from fulmar_core.rotation import from_yaw
 
 STATES = 9
 X, Y, YAW, VX, VY, RATE, BIAS_X, BIAS_Y, BIAS_RATE = range(STATES)
 POSE, MOTION = [X, Y, YAW], [VX, VY, RATE]
+BIASES = [BIAS_X, BIAS_Y, BIAS_RATE]
+COMPARED = [X, Y, VX, VY, YAW]
 SPREAD_AT_START = (1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.05, 0.05, 0.02)  # m, rad, m/s, rad/s, m/s², rad/s
 _POSE_ROWS, _GYRO_ROW = np.eye(STATES)[POSE], np.eye(STATES)[[RATE]] + np.eye(STATES)[[BIAS_RATE]]
 
@@ -104,6 +107,37 @@ class MotionFilter(ExtendedKalmanFilter, Filter):  # type: ignore[misc]
     def speed_std(self) -> float:
         """See `Filter.speed_std`."""
         return math.sqrt(max(self.P[VX, VX], self.P[VY, VY]))
+
+    def rate_std(self) -> float:
+        """See `Filter.rate_std`."""
+        return math.sqrt(self.P[RATE, RATE])
+
+    def placed(self) -> Placed:
+        """See `Filter.placed`."""
+        return np.array([self.x[X], self.x[Y], 0.0]), np.asarray(from_yaw(np.asarray(self.x[YAW])))
+
+    def biases(self) -> tuple[float, float]:
+        """See `Filter.biases`."""
+        return math.hypot(self.x[BIAS_X], self.x[BIAS_Y]), abs(float(self.x[BIAS_RATE]))
+
+    def keep_biases(self, other: MotionFilter) -> None:
+        """See `Filter.keep_biases`."""
+        x, P = self.x.copy(), self.P.copy()
+        x[BIASES], P[np.ix_(BIASES, BIASES)] = other.x[BIASES], other.P[np.ix_(BIASES, BIASES)]
+        self.x, self.P = x, P
+
+    def velocity(self) -> np.ndarray:
+        """See `Filter.velocity`."""
+        return np.asarray(self.x[[VX, VY]])
+
+    def turn_rate(self) -> float:
+        """See `Filter.turn_rate`."""
+        return abs(float(self.x[RATE]))
+
+    def separation(self, other: MotionFilter) -> tuple[np.ndarray, np.ndarray]:
+        """See `Filter.separation`."""
+        error = self._pose_error(self.x.copy(), other.x)
+        return error[COMPARED], other.P[np.ix_(COMPARED, COMPARED)]
 
     def snapshot(self) -> Snapshot:
         """State and covariance, to go back to."""

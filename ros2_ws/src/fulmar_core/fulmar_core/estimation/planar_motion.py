@@ -13,6 +13,7 @@ import math
 import numpy as np
 
 from fulmar_core.dynamics.hydrodynamics import GRAVITY
+from fulmar_core.estimation.filter import Placed
 from fulmar_core.estimation.history import HistoryEstimator
 from fulmar_core.estimation.motion_filter import MOTION, POSE, RATE, VX, VY, YAW, Inertial, MotionFilter, X, Y
 from fulmar_core.estimation.settings import PlanarMotionSettings
@@ -63,8 +64,8 @@ class PlanarMotionEstimator(HistoryEstimator[PlanarMotionSettings]):
     def _new_filter(self, pose: np.ndarray) -> MotionFilter:
         return MotionFilter(self._settings, pose)
 
-    def _place(self, pose: np.ndarray) -> np.ndarray:
-        return pose[:2]
+    def _placed(self, pose: np.ndarray) -> Placed:
+        return np.array([*pose[:2], 0.0]), np.asarray(from_yaw(np.asarray(pose[2])))
 
     def _value(self) -> tuple[RigidBodyState, np.ndarray]:
         """State, and covariance of shape (12, 12)."""

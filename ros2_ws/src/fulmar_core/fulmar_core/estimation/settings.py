@@ -44,12 +44,21 @@ class MotionSettings(EstimatorSettings):
     spin: float  # how fast the turn rate may change; in space only without an inertial unit [rad/s²/√Hz]
     accelerometer_drift: float  # of its bias [m/s²/√s]
     gyroscope_drift: float  # of its bias [rad/s/√s]
+    # Largest bias that a sound accelerometer may have, with what it is mounted askew [m/s²].
+    accelerometer_bias: float = 0.5
+    gyroscope_bias: float = 0.2  # largest bias that a sound gyroscope may have [rad/s]
     # Squared Mahalanobis distance of a pose beyond which it is an outlier; of 3 degrees of freedom, in space 6 [-].
     gate: float
 
     POSITIVE: ClassVar[tuple[str, ...]] = (
         "position_std", "star_tracker_std", "gyroscope_std", "acceleration_noise", "manoeuvre", "spin", "gate",
+        "accelerometer_bias", "gyroscope_bias",
     )  # fmt: skip
+
+    @property
+    def pose_turn_std(self) -> float:
+        """Of the angles of a pose [rad]."""
+        raise NotImplementedError
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -66,6 +75,11 @@ class PlanarMotionSettings(MotionSettings):
 
     POSITIVE = (*MotionSettings.POSITIVE, "heading_std")
 
+    @property
+    def pose_turn_std(self) -> float:
+        """Of the angles of a pose [rad]."""
+        return self.heading_std
+
 
 @dataclass(frozen=True, kw_only=True)
 class SpatialMotionSettings(MotionSettings):
@@ -76,6 +90,11 @@ class SpatialMotionSettings(MotionSettings):
     gyroscope_noise: float  # density of a gyroscope's reading [rad/s/√Hz]
 
     POSITIVE = (*MotionSettings.POSITIVE, "attitude_std", "gyroscope_noise")
+
+    @property
+    def pose_turn_std(self) -> float:
+        """Of the angles of a pose [rad]."""
+        return self.attitude_std
 
 
 @dataclass(frozen=True, kw_only=True)

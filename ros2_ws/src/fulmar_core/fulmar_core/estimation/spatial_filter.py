@@ -15,8 +15,8 @@ import numpy as np
 from filterpy.kalman import ExtendedKalmanFilter
 
 from fulmar_core.attitude import exponential, normalised, product, rotation_error
-from fulmar_core.estimation import history as events
-from fulmar_core.estimation.history import Filter
+from fulmar_core.estimation import filter as events
+from fulmar_core.estimation.filter import Filter, Placed
 from fulmar_core.estimation.settings import SpatialMotionSettings
 from fulmar_core.rotation import rotate
 from fulmar_core.sensors.imu import ImuSample
@@ -144,6 +144,45 @@ class SpatialFilter(ExtendedKalmanFilter, Filter):  # type: ignore[misc]
     def speed_std(self) -> float:
         """See `Filter.speed_std`."""
         return math.sqrt(float(np.diag(self.P)[VELOCITY].max()))
+
+    def rate_std(self) -> float:
+        """See `Filter.rate_std`."""
+        return math.sqrt(float(np.diag(self.P)[RATE_BIAS].max()))
+
+    def placed(self) -> Placed:
+        """See `Filter.placed`."""
+        return self.belief.position, self.belief.quat_xyzw
+
+    def biases(self) -> tuple[float, float]:
+        """See `Filter.biases`."""
+        return float(np.linalg.norm(self.belief.force_bias)), float(np.linalg.norm(self.belief.rate_bias))
+
+    def keep_biases(self, other: SpatialFilter) -> None:
+        """See `Filter.keep_biases`; the turn rate, too, which has the error of the gyroscope's bias."""
+        theirs, P, biases = other.belief, self.P.copy(), slice(FORCE_BIAS.start, RATE_BIAS.stop)
+        P[biases, biases] = other.P[biases, biases]
+        self.belief = replace(
+            self.belief,
+            force_bias=theirs.force_bias,
+            rate_bias=theirs.rate_bias,
+            rate=theirs.rate,
+            measured=theirs.measured,
+        )
+        self.P = P
+
+    def velocity(self) -> np.ndarray:
+        """See `Filter.velocity`."""
+        return self.belief.velocity
+
+    def turn_rate(self) -> float:
+        """See `Filter.turn_rate`."""
+        return float(np.linalg.norm(self.belief.rate))
+
+    def separation(self, other: SpatialFilter) -> tuple[np.ndarray, np.ndarray]:
+        """See `Filter.separation`."""
+        a, b = self.belief, other.belief
+        turn = rotation_error(tuple(b.quat_xyzw), tuple(a.quat_xyzw))
+        return np.concatenate((a.position - b.position, a.velocity - b.velocity, turn)), other.P[:9, :9]
 
     def _residual(self, kind: int, value: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Measured less expected, the rows of the errors that it shows, and its noise."""

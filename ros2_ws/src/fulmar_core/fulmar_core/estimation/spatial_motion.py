@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from fulmar_core.estimation.filter import Placed
 from fulmar_core.estimation.history import HistoryEstimator
 from fulmar_core.estimation.settings import SpatialMotionSettings
 from fulmar_core.estimation.spatial_filter import PLACE, RATE_BIAS, TURN, VELOCITY, SpatialFilter
@@ -45,8 +46,8 @@ class SpatialMotionEstimator(HistoryEstimator[SpatialMotionSettings]):
     def _new_filter(self, pose: np.ndarray) -> SpatialFilter:
         return SpatialFilter(self._settings, pose)
 
-    def _place(self, pose: np.ndarray) -> np.ndarray:
-        return pose[:3]
+    def _placed(self, pose: np.ndarray) -> Placed:
+        return pose[:3], pose[3:] / np.linalg.norm(pose[3:])
 
     def _value(self) -> tuple[RigidBodyState, np.ndarray]:
         """State, and covariance of shape (12, 12)."""

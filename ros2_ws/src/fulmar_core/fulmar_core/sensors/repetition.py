@@ -28,14 +28,15 @@ class RepetitionCheck:
         frozen: Whether the source is stuck.
     """
 
-    def __init__(self, *, after: int = FROZEN_AFTER, after_s: float = math.inf) -> None:
+    def __init__(self, *, after: int = FROZEN_AFTER, after_s: float = math.inf, held_s: float = 0.0) -> None:
         """Begin without a value.
 
         Args:
             after: Repeats after which the source is frozen; 0: it never is, as for sources without noise.
             after_s: Time that `FEWEST` or more repeats may last; for sources whose `after` repeats take too long [s].
+            held_s: Time for which a sound source holds a value, as one that is published faster than it measures [s].
         """
-        self._after, self._after_ns = after, 1e9 * after_s
+        self._after, self._after_ns, self._held_ns = after, 1e9 * after_s, 1e9 * held_s
         self.forget()
 
     def forget(self) -> None:
@@ -60,8 +61,9 @@ class RepetitionCheck:
             self.repeats += 1
         else:
             self._last, self._since_ns, self.repeats = value, stamp_ns, 0
-        lasting = self.repeats >= FEWEST and stamp_ns - self._since_ns > self._after_ns
-        self.frozen = self.repeats >= self._after or lasting
+        lasts_ns = stamp_ns - self._since_ns
+        many = self.repeats >= self._after or (self.repeats >= FEWEST and lasts_ns > self._after_ns)
+        self.frozen = many and lasts_ns > self._held_ns
         return self.frozen
 
 
