@@ -29,13 +29,13 @@ from fulmar_core.errors import BAD_USAGE, DONE, FAILED, FulmarError
 from fulmar_core.process import end_with
 from fulmar_ros.middleware import range_for_rclpy, set_up_middleware, static_peers, strangers_can_send
 from fulmar_ros.peer_filter import PeerFilter
+from fulmar_ros.private_memory import PRIVATE, keep_memory_private
 
 # A thread that waits for the interpreter gets it after this long; Python's own 5 ms is a lot of 20 ms.
 SWITCH_INTERVAL_S = 0.0005
 
 ENDS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 SPIN_S = 60.0
-PRIVATE = 0o077  # rights that group and others do not get
 RCLPY = os.path.dirname(rclpy.__file__) + os.sep
 EXECUTOR = "FULMAR_EXECUTOR"  # environment variable: default, or events
 
@@ -91,7 +91,7 @@ def run_node(make_node: Callable[[RequestExit], Node], argv: Sequence[str] | Non
 
 
 def keep_private() -> None:
-    """Let other users read nothing that this process writes: bags, logs, and the shared memory of its messages."""
+    """Let other users read nothing that this process writes, such as bags and logs."""
     os.umask(os.umask(PRIVATE) | PRIVATE)
 
 
@@ -160,6 +160,7 @@ def spinning(node: Node, on_error: Callable[[Exception], None]) -> Iterator[None
         node: The node.
         on_error: Called in that thread with what a callback raised; no further callback is served then.
     """
+    keep_memory_private()
     executor, over = _executor(), Future()
     executor.add_node(node)
 
