@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import io
 import math
 import pickle
 import re
+import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,9 +15,10 @@ from typing import Any, Literal
 import numpy as np
 import onnx
 import torch
-import yaml
 from torch import nn
 
+from fulmar_core import yaml_text
+from fulmar_core.bounded_file import CONFIG_BYTES, IMPORTED_BYTES, check_unpacked, read_bounded
 from fulmar_core.errors import ConfigError, did_you_mean
 from training.onnx_graph import Graph, Tensor
 
@@ -143,8 +146,11 @@ def read_checkpoint(path: Path, wanted: Format | None = None) -> Checkpoint:
 
 def _load(path: Path) -> Any:
     try:
+        content = read_bounded(path, IMPORTED_BYTES)
+        if zipfile.is_zipfile(io.BytesIO(content)):
+            check_unpacked(content, IMPORTED_BYTES)
         with torch.serialization.safe_globals(NUMBERS):
-            return torch.load(path, weights_only=True, map_location="cpu")
+            return torch.load(io.BytesIO(content), weights_only=True, map_location="cpu")
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read: {error.strerror or error}.") from error
     except pickle.UnpicklingError as error:
@@ -207,6 +213,12 @@ def _tensors(content: Any, path: Path, key: str) -> State:
         for name, value in content.items()
     ):
         raise ConfigError(f"{path}: '{key}' must hold a state dictionary of dense tensors.")
+    for name, value in content.items():
+        if value.numel() * value.element_size() > value.untyped_storage().nbytes():
+            raise ConfigError(
+                f"{path}: '{name}' is expanded to shape {list(value.shape)} from fewer numbers than that, which no "
+                "weights are. Save it by `.contiguous()`, if it should be."
+            )
     return content
 
 
@@ -353,8 +365,8 @@ def _agent_config(checkpoint: Path) -> tuple[Path, Any] | None:
         for path in (folder / "params" / "agent.yaml", folder / "agent.yaml"):
             if path.is_file():
                 try:
-                    return path, yaml.safe_load(path.read_text(encoding="utf-8"))
-                except (yaml.YAMLError, UnicodeDecodeError) as error:
+                    return path, yaml_text.load(read_bounded(path, CONFIG_BYTES).decode())
+                except (yaml_text.YamlError, UnicodeDecodeError, OSError) as error:
                     raise ConfigError(
                         f"{path}: cannot be read as YAML: {str(error).splitlines()[0]}. "
                         "Give --activation and --output-activation instead."

@@ -9,6 +9,7 @@ import onnx
 import onnxruntime
 from onnx import compose, version_converter
 
+from fulmar_core.bounded_file import read_bounded
 from fulmar_core.errors import ConfigError
 from fulmar_core.policy_bundle import MAX_BYTES
 from training.onnx_graph import IR_VERSION, OLDEST_OPSET, OPSET, ROWS, Graph, Tensor, open_model
@@ -32,11 +33,9 @@ class ForeignOnnx:
             ConfigError: Not readable, too large, with weights in other files, or not of one input (rows, terms).
         """
         try:
-            content = path.read_bytes()
+            content = read_bounded(path, MAX_BYTES)
         except OSError as error:
             raise ConfigError(f"{path}: cannot be read: {error.strerror or error}.") from error
-        if len(content) > MAX_BYTES:
-            raise ConfigError(f"{path}: {len(content)} bytes, at most {MAX_BYTES} are accepted.")
         self._path = path
         try:
             model = onnx.load_model_from_string(content)

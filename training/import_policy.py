@@ -10,6 +10,7 @@ import numpy as np
 import onnx
 import torch
 
+from fulmar_core.bounded_file import IMPORTED_BYTES, read_bounded
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.errors import ConfigError
 from fulmar_core.observation import Observer
@@ -70,7 +71,7 @@ def import_policy(
     except ValueError as error:
         raise ConfigError(f"robot '{robot.name}': {error}") from error
     try:
-        digest = hashlib.sha256(path.read_bytes()).hexdigest()
+        digest = hashlib.sha256(read_bounded(path, IMPORTED_BYTES)).hexdigest()
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read: {error.strerror or error}.") from error
     if wanted == "onnx" or (wanted is None and path.suffix == ".onnx"):

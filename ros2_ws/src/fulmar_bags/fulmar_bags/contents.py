@@ -28,6 +28,7 @@ from fulmar_bags.message_types import unreadable
 from fulmar_bags.ring import FAULTS
 from fulmar_bags.writer import RUN_KEY, RUN_RECORD
 from fulmar_bags.writer_thread import RECORDING
+from fulmar_bags.metadata import metadata_refusal
 from fulmar_core.errors import BagError, UnknownNameError
 from fulmar_core.robot_name import PLAIN, Frames, namespace_of
 from fulmar_core.topics import ODOMETRY, TRUTH, WIRES, Wire
@@ -218,6 +219,7 @@ def open_bag(path: Path) -> Bag:
     if info and beside and json.dumps(info, sort_keys=True) != json.dumps(beside, sort_keys=True):
         # A metadata record of MCAP has no checksum.
         problems.append(f"the record '{RUN_RECORD}' and metadata.yaml differ: one of them is damaged.")
+    problems += [refusal] if (refusal := metadata_refusal(path if path.is_dir() else path.parent)) else []
     problems += [f"{name}: the file is missing; metadata.yaml lists it." for name in missing_files(path)]
     return Bag(
         path=path,

@@ -5,12 +5,14 @@ Needs no index and no footer: damage costs the chunk it is in, and a torn end co
 
 from __future__ import annotations
 
+import mmap
+import os
 import struct
 import zlib
 from collections.abc import Callable, Iterator
 from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import zstandard
 from mcap.data_stream import ReadDataStream
@@ -21,6 +23,7 @@ from mcap.writer import MCAP0_MAGIC
 
 from fulmar_bags.mcap_file import BEGUN
 from fulmar_bags.metadata import read_custom, read_information
+from fulmar_core.bounded_file import ENDLESS, bounded_file
 from fulmar_core.errors import BagError
 
 Record = Schema | Channel | Message | Metadata | Attachment
@@ -28,6 +31,9 @@ Record = Schema | Channel | Message | Metadata | Attachment
 PACKED = ".zstd"  # ending of files that rosbag2 compressed as a whole
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 UNPACK_BYTES = 1 << 20  # at once
+# Recorded messages shrink to a tenth, and a camera in the dark to a hundredth: beyond this it is a trap.
+UNPACK_RATIO, UNPACK_LEAST = 500, 1 << 26
+INVALID = 0  # opcode that no record has (MCAP specification, "Records")
 
 _HEAD = struct.Struct("<BQ")  # opcode and length of every record
 _CHECKSUM = struct.Struct("<I")  # at the end of an attachment
@@ -93,7 +99,7 @@ def read_records(path: Path, damage: list[str]) -> Iterator[Record]:
         start, offset = offset, offset + _HEAD.size + length
         if opcode == Opcode.DATA_END:
             return
-        if offset > len(data):
+        if offset > len(data) or opcode == INVALID:
             damage.append(
                 f"{path.name}: the record at byte {start} is torn off or damaged; nothing after it counts."
             )
@@ -103,34 +109,56 @@ def read_records(path: Path, damage: list[str]) -> Iterator[Record]:
             yield from _parse(opcode, body, f"{path.name}: the record at byte {start}", damage)
 
 
-def file_bytes(path: Path, damage: list[str]) -> bytes:
+def file_bytes(path: Path, damage: list[str]) -> bytes | mmap.mmap:
     """Bytes of a file, unpacked if it is packed as a whole; `damage` grows by a line where that fails on the way.
 
+    What is not packed stays on the disk until it is looked at.
+
     Raises:
-        BagError: It cannot be opened.
+        BagError: It cannot be opened, or unpacks to more than bags do.
     """
     try:
-        data = path.read_bytes()
+        with bounded_file(path, ENDLESS) as file:
+            if path.suffix == PACKED:
+                return _unpacked(file, path, damage)
+            size = os.fstat(file.fileno()).st_size
+            return mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) if size else b""
     except OSError as error:
         raise BagError(f"{path}: {error.strerror}.") from error
-    if path.suffix != PACKED:
-        return data
-    pieces: list[bytes] = []
-    reader = zstandard.ZstdDecompressor().stream_reader(data, read_across_frames=True)
+
+
+def _unpacked(file: BinaryIO, path: Path, damage: list[str]) -> bytes:
+    """The content of a file that is packed as a whole, as far as bags unpack."""
+    most = unpacks_to(os.fstat(file.fileno()).st_size)
+    pieces, length = list[bytes](), 0
+    reader = zstandard.ZstdDecompressor().stream_reader(file, read_across_frames=True)
     try:
         while piece := reader.read(UNPACK_BYTES):
+            length += len(piece)
+            if length > most:
+                raise BagError(
+                    f"{path}: unpacks to more than {most} bytes, {UNPACK_RATIO} times its size, which no bag does. "
+                    "If you trust it, unpack it by `zstd -d`."
+                )
             pieces.append(piece)
     except zstandard.ZstdError as error:
         damage.append(f"{path.name}: the rest cannot be unpacked ({error}).")
     return b"".join(pieces)
 
 
+def unpacks_to(packed: int) -> int:
+    """How much so many packed bytes unpack to at most [bytes]."""
+    return max(UNPACK_LEAST, UNPACK_RATIO * packed)
+
+
 def unpack(data: bytes) -> bytes:
     """One message that was compressed by itself; as it is where that fails, which is no message then."""
+    most = unpacks_to(len(data))
     try:
-        return zstandard.ZstdDecompressor().decompressobj().decompress(data)
+        plain: bytes = zstandard.ZstdDecompressor().stream_reader(data).read(most + 1)
     except zstandard.ZstdError:
         return data
+    return plain if len(plain) <= most else data
 
 
 def _attachment(body: bytes) -> Attachment:
@@ -156,6 +184,10 @@ def _parse(opcode: int, body: bytes, where: str, damage: list[str]) -> list[Any]
 
 def _records_of(chunk: Chunk) -> list[Any]:
     """What `mcap.stream_reader.breakup_chunk` gives, several times as fast: most of a bag are messages."""
+    if chunk.compression == "zstd":
+        said = zstandard.frame_content_size(chunk.data)
+        if max(said, chunk.uncompressed_size) > unpacks_to(len(chunk.data)):
+            raise ValueError(f"unpacks to {max(said, chunk.uncompressed_size)} bytes.")
     stream, size = get_chunk_data_stream(chunk, validate_crc=True)
     data = stream.read(size)
     records: list[Any] = []

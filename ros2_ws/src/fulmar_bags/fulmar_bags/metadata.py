@@ -12,6 +12,7 @@ import yaml
 
 from fulmar_core import yaml_text
 from fulmar_core.atomic_write import write_whole
+from fulmar_core.bounded_file import RECORD_BYTES, RefusedFileError, read_bounded
 
 METADATA_FILE = "metadata.yaml"
 # Ten times as fast, where PyYAML was built with it; this runs twice a second beside everything that controls.
@@ -83,10 +84,23 @@ def write_metadata(
 def read_information(directory: Path) -> dict[str, Any]:
     """Content of the `metadata.yaml` of a folder, empty where there is none that can be read."""
     try:
-        found = yaml_text.load((directory / METADATA_FILE).read_text())["rosbag2_bagfile_information"]
+        found = yaml_text.load(read_bounded(directory / METADATA_FILE, RECORD_BYTES).decode())[
+            "rosbag2_bagfile_information"
+        ]
     except (OSError, UnicodeDecodeError, yaml_text.YamlError, KeyError, TypeError, ValueError):
         return {}
     return found if isinstance(found, dict) else {}
+
+
+def metadata_refusal(directory: Path) -> str:
+    """Why the `metadata.yaml` of a folder is not read at all; empty where it is, or where there is none."""
+    try:
+        read_bounded(directory / METADATA_FILE, RECORD_BYTES)
+    except RefusedFileError as error:
+        return f"{METADATA_FILE} is not read: {error.strerror}."
+    except OSError:
+        return ""
+    return ""
 
 
 def read_custom(directory: Path) -> dict[str, str]:

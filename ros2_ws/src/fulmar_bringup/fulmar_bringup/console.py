@@ -5,20 +5,41 @@ from __future__ import annotations
 import contextlib
 import json
 import logging
+import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from rich.console import Console
+from rich.text import Text
 
 if TYPE_CHECKING:
     from rich.table import Table
 
 Result = TypeVar("Result", bound=dict[str, Any])
 
+# What steers a terminal: everything of C0 and C1 but the end of a line and the tabulator.
+_STEERS = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")
+
+
+def printable(text: str) -> str:
+    """A text without the characters that steer a terminal: each stands as Python writes it, as in `\\x1b`.
+
+    Names and descriptions come out of files and messages of strangers.
+    """
+    return _STEERS.sub(lambda found: repr(found[0])[1:-1], text)
+
+
+class _PrintableConsole(Console):
+    """A console that prints every text `printable`, also in tables."""
+
+    def render_str(self, text: str, **options: Any) -> Text:
+        return super().render_str(printable(text), **options)
+
+
 # Without emoji: `robot.yaml:100: ...` would come out with a symbol in place of its line.
-console = Console(stderr=True, highlight=False, emoji=False)
-output = Console(highlight=False, emoji=False)
+console = _PrintableConsole(stderr=True, highlight=False, emoji=False)
+output = _PrintableConsole(highlight=False, emoji=False)
 
 
 def print_json(value: dict[str, Any]) -> None:

@@ -17,7 +17,7 @@ from typing import IO
 
 import psutil
 
-from fulmar_bringup.console import log_line
+from fulmar_bringup.console import log_line, printable
 from fulmar_bringup.run_plan import NodeSpec, Parameter
 from fulmar_ros.middleware import middleware_environment
 
@@ -165,7 +165,7 @@ class _Relay(threading.Thread):
 
     def run(self) -> None:
         for line in self._stream:
-            text = line.decode(errors="replace").rstrip()
+            text = printable(line.decode(errors="replace").rstrip())
             if not text:
                 continue
             self.last_line = text

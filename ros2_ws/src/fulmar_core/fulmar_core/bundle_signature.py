@@ -10,6 +10,7 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from fulmar_core.bounded_file import KEY_BYTES, read_bounded
 from fulmar_core.errors import BundleError, ConfigError
 from fulmar_core.policy_bundle import SIGNATURE, Bundle, read_bundle
 
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
 
 DOMAIN = b"fulmar policy bundle 1\n"  # a signature for something else is none for a bundle
-MOST_BYTES = 100_000  # of a key file, of a signature
 
 
 def make_keys(private: Path, public: Path) -> None:
@@ -101,9 +101,7 @@ def _signature(folder: Path) -> bytes:
             f"Sign it: fulmar bundle sign {folder} --key FILE"
         )
     try:
-        if path.stat().st_size > MOST_BYTES:
-            raise ValueError("it is too large")
-        values = json.loads(path.read_text(encoding="utf-8"))
+        values = json.loads(read_bounded(path, KEY_BYTES))
         return base64.b64decode(values["signature"], validate=True)
     except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
         raise BundleError(f"{path}: cannot be read: {error}. Sign the bundle again.") from error
@@ -130,8 +128,6 @@ def _public_keys(trusted: Path) -> dict[str, Ed25519PublicKey]:
 
 def _read(path: Path) -> bytes:
     try:
-        if path.stat().st_size > MOST_BYTES:
-            raise ConfigError(f"{path}: {path.stat().st_size} bytes are too many for a key.")
-        return path.read_bytes()
+        return read_bounded(path, KEY_BYTES)
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read ({error.strerror}).") from error

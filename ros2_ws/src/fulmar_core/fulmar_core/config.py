@@ -21,12 +21,13 @@ from typing import Any, TypeVar
 
 from yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
+from fulmar_core.bounded_file import CONFIG_BYTES, read_bounded
 from fulmar_core.errors import ConfigError, ImplausibleError, did_you_mean
 from fulmar_core.own_class import EXAMPLE, SEPARATOR
 from fulmar_core.yaml_text import YamlError, compose, plain
 
 T = TypeVar("T")
-MOST_BYTES, MOST_VALUES = 1_000_000, 100_000  # of a file; anything beyond is no configuration
+MOST_VALUES = 100_000  # of a file; anything beyond is no configuration
 
 
 @dataclasses.dataclass(frozen=True)
@@ -85,9 +86,7 @@ def line_of(path: Path, keys: Sequence[str]) -> int:
 
 def _compose(path: Path) -> Node:
     try:
-        if path.stat().st_size > MOST_BYTES:
-            raise ConfigError(f"{path}: {path.stat().st_size} bytes, at most {MOST_BYTES} are read.")
-        text = path.read_text(encoding="utf-8")
+        text = read_bounded(path, CONFIG_BYTES).decode("utf-8")
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read ({error.strerror or error}).") from error
     except UnicodeDecodeError as error:

@@ -19,6 +19,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+from fulmar_core.bounded_file import CONFIG_BYTES, read_bounded
 from fulmar_core.errors import ConfigError, FulmarError, did_you_mean, shortened
 from fulmar_core.yaml_text import YamlError, load
 
@@ -113,7 +114,7 @@ def settings_beside(cls: type[Any]) -> dict[str, Any]:
     if not path.exists():
         return {}
     try:
-        values = load(path.read_text(encoding="utf-8"))
+        values = load(read_bounded(path, CONFIG_BYTES).decode("utf-8"))
     except YamlError as error:
         raise ConfigError(f"{path}:{error.line}: {error}.") from error
     except (OSError, UnicodeDecodeError) as error:

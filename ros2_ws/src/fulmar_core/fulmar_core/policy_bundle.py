@@ -15,8 +15,6 @@ import difflib
 import hashlib
 import io
 import json
-import os
-import zipfile
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
@@ -25,6 +23,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from fulmar_core.atomic_write import write_whole
+from fulmar_core.bounded_file import WEIGHTS_BYTES, load_arrays, read_bounded
 from fulmar_core.controllers.disturbance_inputs import disturbance_terms
 from fulmar_core.errors import BundleError, did_you_mean
 from fulmar_core.observation import Observer
@@ -38,7 +37,7 @@ PASSPORT = "passport.json"
 SIGNATURE = "signature.json"
 EXPORT = "Export one with `fulmar export RUN --out DIR`"
 MOST_OFFERED = 3  # bundles, in place of one that does not exist
-MAX_BYTES = 50_000_000  # a file beyond this is no policy of ours, and is not read
+MAX_BYTES = WEIGHTS_BYTES  # a file beyond this is no policy of ours, and is not read
 
 Action = Literal["on_off", "continuous"]
 
@@ -311,20 +310,16 @@ def _content(folder: Path, name: str) -> bytes:
     if not path.is_file():
         raise BundleError(f"policy '{folder}' has no {name}. {EXPORT}.")
     try:
-        with path.open("rb") as file:
-            size = os.fstat(file.fileno()).st_size
-            if size > MAX_BYTES:
-                raise BundleError(f"{path}: {size} bytes, at most {MAX_BYTES} are accepted.")
-            return file.read(MAX_BYTES)
+        return read_bounded(path, MAX_BYTES)
     except OSError as error:
         raise BundleError(f"{path}: cannot be read: {error.strerror}. Export the policy again.") from error
 
 
 def _golden_of(content: bytes, path: Path) -> Golden:
     try:
-        with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
-            return Golden(**{f.name: arrays[f.name] for f in fields(Golden)})
-    except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile) as error:
+        arrays = load_arrays(content, MAX_BYTES, names=[f.name for f in fields(Golden)])
+        return Golden(**arrays)
+    except ValueError as error:
         raise BundleError(f"{path}: cannot be read: {error}. Export the policy again.") from error
 
 

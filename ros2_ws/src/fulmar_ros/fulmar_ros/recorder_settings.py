@@ -9,6 +9,7 @@ from typing import Any
 
 import yaml
 
+from fulmar_core.bounded_file import WEIGHTS_BYTES, read_bounded
 from fulmar_core.errors import BagError, ConfigError
 from fulmar_core.recording import Recording
 
@@ -48,9 +49,9 @@ class RecorderSettings(Recording):
 
 
 def _content(what: str | dict[str, Any]) -> bytes:
-    return (
-        yaml.safe_dump(what, sort_keys=False).encode() if isinstance(what, dict) else Path(what).read_bytes()
-    )
+    if isinstance(what, dict):
+        return yaml.safe_dump(what, sort_keys=False).encode()
+    return read_bounded(Path(what), WEIGHTS_BYTES)
 
 
 def _json_object(parameter: str, text: str) -> dict[str, Any]:

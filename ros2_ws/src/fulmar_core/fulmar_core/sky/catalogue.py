@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from fulmar_core.bounded_file import CATALOGUE_BYTES, load_arrays
 from fulmar_core.errors import ConfigError
 
 FILE = Path("tetra3/data/default_database.npz")
@@ -46,10 +47,11 @@ def load_stars() -> Stars:
     path = catalogue_path()
     if path is None:
         raise ConfigError("the star catalogue is not installed. Run: fulmar install-stars")
-    with np.load(path, allow_pickle=False) as file:
-        table = np.asarray(
-            file["star_table"], dtype=float
-        )  # right ascension, declination, x, y, z, magnitude
+    try:
+        table = load_arrays(path, CATALOGUE_BYTES, names=["star_table"])["star_table"].astype(float)
+    except (OSError, ValueError) as error:
+        raise ConfigError(f"{path}: cannot be read: {error}. Run: fulmar install-stars") from error
+    # Columns: right ascension, declination, x, y, z, magnitude.
     order = np.argsort(table[:, 5], kind="stable")
     directions = table[order, 2:5]
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
