@@ -26,6 +26,7 @@ from fulmar_core.policy_bundle import (
 )
 from fulmar_core.robot import Robot
 from fulmar_core.tasks import Task
+from policy_server.inference import open_network
 
 # Of the logits: float32 sums in another order on another processor differ by about 1e-6.
 GOLDEN_TOLERANCE = 1e-4
@@ -96,11 +97,8 @@ class Policy:
 
 
 def _open(bundle: Bundle) -> onnxruntime.InferenceSession:
-    options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads = options.inter_op_num_threads = 1
-    options.log_severity_level = 4
     try:
-        return onnxruntime.InferenceSession(bundle.network, options, providers=["CPUExecutionProvider"])
+        return open_network(bundle.network)
     except Exception as error:
         reason = str(error).splitlines()[0]
         raise BundleError(

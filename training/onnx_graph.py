@@ -10,6 +10,8 @@ import onnx
 import onnxruntime
 from onnx import TensorProto, helper, numpy_helper
 
+from policy_server.inference import open_network
+
 OLDEST_OPSET = 13  # every operator used here means the same from there on
 OPSET = 18
 IR_VERSION = 10  # the newest that every onnxruntime since 1.18 reads
@@ -100,12 +102,7 @@ class Graph:
 
 def open_model(model: onnx.ModelProto) -> onnxruntime.InferenceSession:
     """Load a model for inference in this thread."""
-    options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads = options.inter_op_num_threads = 1
-    options.log_severity_level = 4
-    return onnxruntime.InferenceSession(
-        model.SerializeToString(), options, providers=["CPUExecutionProvider"]
-    )
+    return open_network(model.SerializeToString())
 
 
 def _rows_of(name: str, width: int) -> onnx.ValueInfoProto:

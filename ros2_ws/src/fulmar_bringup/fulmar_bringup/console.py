@@ -23,7 +23,7 @@ _STEERS = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")
 
 
 def printable(text: str) -> str:
-    """A text without the characters that steer a terminal: each stands as Python writes it, as in `\\x1b`.
+    """A text without the characters that steer a terminal: each stands as Python writes it.
 
     Names and descriptions come out of files and messages of strangers.
     """
