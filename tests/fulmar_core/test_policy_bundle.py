@@ -191,7 +191,7 @@ def test_a_passport_of_an_older_format_is_reported_as_one_and_not_by_what_it_lac
 def test_a_file_beyond_the_size_limit_is_not_read(folder, name, monkeypatch):
     monkeypatch.setattr(policy_bundle, "MAX_BYTES", 10_000)
     (folder / name).write_bytes(b"0" * 10_001)
-    with pytest.raises(BundleError, match=f"{name}: 10001 bytes, at most 10000"):
+    with pytest.raises(BundleError, match=f"{name}: cannot be read: 10001 bytes, at most 10000"):
         read_passport(folder)
 
 

@@ -106,8 +106,10 @@ def load_arrays(
         check_unpacked(content, most)
         with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
             return {name: np.asarray(arrays[name]) for name in (arrays.files if names is None else names)}
+    except KeyError as error:
+        raise ValueError(f"lacks an array: {error.args[0] if error.args else error}") from error
     # Headers of its parts may lie in every way.
-    except (zipfile.BadZipFile, EOFError, KeyError, SyntaxError, TypeError, RuntimeError) as error:
+    except (zipfile.BadZipFile, EOFError, SyntaxError, TypeError, RuntimeError) as error:
         raise ValueError(f"is no .npz file, or a damaged one ({type(error).__name__})") from error
     except (MemoryError, NotImplementedError, OverflowError, OSError) as error:
         raise ValueError(f"is damaged ({type(error).__name__})") from error
