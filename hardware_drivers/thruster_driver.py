@@ -38,7 +38,8 @@ class ValveDriver(DeviceDriver):
         self._timing = ValveTiming(len(self._valves), settings.min_on_s)
         self._chip = settings.port
         self._written: dict[int | str, Value] = {}  # what each line was set to last
-        self._refusal = ""
+        self._proven: set[tuple[int | str, Value]] = set()  # lines and states that the chip has read back
+        self._refusal = self._unread = ""
         self._supply, self._supply_open, self._opened_ns = settings.supply, False, 0
         self._lock = threading.Lock()
 
@@ -52,6 +53,10 @@ class ValveDriver(DeviceDriver):
             self._set(applied)
             self._note(bool(applied.any()), now_ns)
         return applied
+
+    def health(self) -> dict[str, str]:
+        """Lines that do not read as they were set; see `DeviceDriver`."""
+        return {"warning": self._unread}
 
     def refusal(self) -> str:
         """Whether a line is not as it was set; see `Answering`."""
@@ -86,11 +91,18 @@ class ValveDriver(DeviceDriver):
             found = self._lines.get_values(lines)
         except OSError:  # a chip that does not read its outputs
             return
-        wrong = [
-            str(line) for line, value in zip(lines, found, strict=True) if value is not self._written[line]
-        ]
-        lines_are = f"{self._chip}: line {', '.join(wrong)} is not at the level that was set"
-        self._refusal = f"{lines_are}: a short circuit, or another program?" if wrong else ""
+        states = [(line, self._written[line], value) for line, value in zip(lines, found, strict=True)]
+        self._proven |= {(line, value) for line, written, value in states if value is written}
+        wrong = [line for line, written, value in states if value is not written]
+        # Of a chip that does not read its outputs, a line never shows both states: that is no fault of the valve.
+        off = [line for line in wrong if all((line, state) in self._proven for state in STATES.values())]
+        self._refusal = self._named(
+            off, "not at the level that was set: a short circuit, or another program?"
+        )
+        self._unread = self._named([line for line in wrong if line not in off], "not read as it was set")
+
+    def _named(self, lines: list[int | str], what: str) -> str:
+        return f"{self._chip}: line {', '.join(map(str, lines))} is {what}" if lines else ""
 
     def _rest(self) -> None:
         """Close every valve and shut the supply; call with the lock held."""
@@ -156,7 +168,7 @@ class ThrusterDriver(ValveDriver):
         """Whether it floats; see `DeviceDriver`."""
         return {
             "air_bearing": "on" if self._bearing_on else "off",
-            "warning": "" if self._bearing_on else "the air bearing is off: the valves stay closed",
+            "warning": self._unread if self._bearing_on else "the air bearing is off: the valves stay closed",
         }
 
     @property

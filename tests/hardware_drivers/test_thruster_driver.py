@@ -225,13 +225,26 @@ def test_wiring_that_cannot_be_is_refused(change, says):
 def test_a_line_that_is_not_at_the_level_that_was_set_is_a_refusal_by_its_name(rig):
     bank, settings = rig
     driver = started(settings)
-    assert driver.step(np.eye(8)[2]).refusal == ""
-    assert driver.step(np.eye(8)[2]).refusal == ""
-    line = driver._driver._lines
-    line._levels[3] ^= 1  # as by another program
+    thruster = settings.order[3]  # of the fourth line
+    for command in (np.eye(8)[thruster], np.zeros(8), np.zeros(8)):
+        assert driver.step(command).refusal == ""
+    driver._driver._lines._levels[3] ^= 1  # as by another program
     refusal = driver.step(np.zeros(8)).refusal
     assert refusal.startswith(f"{bank.address}: line {settings.lines[3]} is not at the level that was set")
     assert driver.step(np.zeros(8)).refusal == ""
+    driver.close()
+
+
+def test_a_chip_that_reads_nothing_but_low_is_a_warning_and_no_refusal(rig, monkeypatch):
+    _, settings = rig
+    driver = started(settings)
+    low = gpiod.line.Value.ACTIVE if settings.active_low else gpiod.line.Value.INACTIVE
+    monkeypatch.setattr(driver._driver._lines, "get_values", lambda lines: [low] * len(lines))
+    for command in (np.eye(8)[2], np.zeros(8), np.ones(8), np.zeros(8)):
+        assert driver.step(command).refusal == ""
+    driver.step(np.eye(8)[2])
+    driver.step(np.eye(8)[2])
+    assert "is not read as it was set" in driver.health()["warning"]
     driver.close()
 
 

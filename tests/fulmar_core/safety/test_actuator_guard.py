@@ -386,7 +386,9 @@ class TestCommandWriters:
 @given(
     st.lists(
         st.tuples(
-            st.sampled_from(["offer", "hand", "press", "released", "reset", "back", "wait"]),
+            st.sampled_from(
+                ["offer", "hand", "press", "released", "reset", "back", "refuse", "obey", "wait"]
+            ),
             st.lists(st.floats(allow_nan=True, allow_infinity=True), max_size=10),
             st.integers(0, 300),
         ),
@@ -409,10 +411,12 @@ def test_whatever_comes_the_output_is_a_command_within_limits_and_safe_under_the
             guard.estop.release(now)
         elif what == "back":
             guard.give_back(now)
+        elif what in ("refuse", "obey"):
+            guard.see_refusal("mode HOLD" if what == "refuse" else "")
         output = guard.output(now)
         assert output.shape == (8,)
         assert set(output.tolist()) <= {0.0, 1.0}
-        if guard.estop.reason(now) or guard.watchdog.expired(now):
+        if guard.estop.reason(now) or guard.watchdog.expired(now) or guard.held:
             assert not output.any()
 
 
