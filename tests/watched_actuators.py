@@ -12,6 +12,7 @@ from fulmar_core.disturbances.scenario import Scenario, load_scenario
 from fulmar_core.goal import goal_in_float64
 from fulmar_core.health.applied import AppliedHistory
 from fulmar_core.health.fault_monitor import FaultMonitor
+from fulmar_core.health.losses import Losses
 from fulmar_core.robot import load_robot
 from fulmar_core.safety.convergence import ConvergenceMonitor
 from fulmar_core.simulation import BatchSimulation
@@ -103,6 +104,7 @@ def watch(
     named: list[tuple[dict[str, float], dict[str, float]]] = [({}, {}) for _ in range(episodes)]
     said: list[dict[str, None]] = [{} for _ in range(episodes)]
     at_goal: list[float | None] = [None] * episodes
+    losses = [Losses(robot) for _ in range(episodes)]
     convergence, unconverged = ConvergenceMonitor(robot, loop.task, loop.dt), [None] * episodes
     for number in range(round(seconds / loop.dt)):
         time_s, stamp_ns = number * loop.dt, round(1e9 * number * loop.dt)
@@ -119,8 +121,11 @@ def watch(
         step = loop.act(inputs)
         convergence.see(inputs.state, inputs.goal, step.command)
         suspected = np.array([bool(monitor.beliefs.dead) for monitor in monitors])
-        for i, late in enumerate(convergence.late(suspected)):
-            unconverged[i] = time_s if late and unconverged[i] is None else unconverged[i]
+        late = convergence.late(suspected)
+        for i, monitor in enumerate(monitors):
+            late[i] |= losses[i].hopeless(monitor.beliefs.dead, stamp_ns)
+        for i, stops in enumerate(late):
+            unconverged[i] = time_s if stops and unconverged[i] is None else unconverged[i]
         for history, command in zip(histories, step.command, strict=True):
             history.add(stamp_ns, np.array(command, dtype=float))
         within = loop.task.tolerance.holds(loop.task.errors(batch.truth, loop.goal))

@@ -415,6 +415,16 @@ def test_what_is_believed_dead_is_named_where_a_robot_does_not_converge():
     assert "valve thruster_3 believed dead" in stand(bench).reason
 
 
+@pytest.mark.parametrize(("task", "stops"), [("go_to_pose", True), ("go_to_position", False)])
+def test_a_robot_that_can_hold_no_pose_without_what_is_dead_stops_in_a_task_of_poses(task, stops):
+    bench = Bench(task=task)
+    bench.controller.answer = FAST
+    bench.guard.suspect("fan fan_3 believed dead", hopeless=True)
+    bench.give()
+    reasons = [bench.step()[0].reason for _ in range(3)]
+    assert ("no pose can be held without it" in reasons[-1]) == stops
+
+
 def test_a_goal_that_is_repeated_moves_no_robot_that_does_not_converge():
     bench = Bench()
     bench.controller.answer = FAST

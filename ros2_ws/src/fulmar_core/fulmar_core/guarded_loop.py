@@ -288,9 +288,14 @@ class GuardedLoop:
                 self.set(unconverged=stuck)
         return self._follow_switch(before)
 
-    def suspect(self, actuators: str) -> None:
-        """Give a robot less time to converge, some of whose actuators are believed dead, in words; empty for none."""
-        self._convergence.suspicion = actuators
+    def suspect(self, actuators: str, *, hopeless: bool = False) -> None:
+        """Give a robot less time to converge, some of whose actuators are believed dead.
+
+        Args:
+            actuators: Which, in words; empty for none.
+            hopeless: Whether no pose can be held without them: then a task of poses stops at once.
+        """
+        self._convergence.suspicion, self._convergence.hopeless = actuators, hopeless
 
     def fall_back(self, reason: str) -> bool:
         """Let the fallback go on in place of a controller that raised; false if there is none."""

@@ -7,21 +7,28 @@ from fulmar_core.health.applied import AppliedHistory
 from fulmar_core.health.beliefs import BeliefReader, Beliefs, joined
 from fulmar_core.health.fault_monitor import FaultMonitor
 from fulmar_core.health.hypotheses import can_monitor
+from fulmar_core.health.losses import Losses
 from fulmar_core.health.thruster_health import Health, can_estimate_health
 from fulmar_core.robot import Robot
 from fulmar_core.safety.input_gate import Measurement
 
 
 class ActuatorBeliefs:
-    """Beliefs about valves or fans, whatever controls them; none about other actuators."""
+    """Beliefs about valves or fans, whatever controls them; none about other actuators.
+
+    Attributes:
+        hopeless: Whether no pose can be held without those that are believed dead.
+    """
 
     def __init__(self, robot: Robot, settings: ControllerSettings, applied: AppliedHistory) -> None:
         """Begin with sound actuators; `applied` is what they did."""
         self._reader = BeliefReader(robot) if can_estimate_health(robot) else None
-        self._monitor = None
+        self._monitor = self._losses = None
+        self.hopeless = False
         if can_monitor(robot):
             hz = settings.control_rate(robot)
             self._monitor = FaultMonitor(robot, applied, control_hz=hz, lockstep=settings.lockstep)
+            self._losses = Losses(robot)
         self._estimated = Beliefs()
         self._epoch = 0
 
@@ -45,11 +52,13 @@ class ActuatorBeliefs:
         Returns:
             What is believed after it.
         """
-        if self._monitor is None:
+        if self._monitor is None or self._losses is None:
             return self._estimated
         if stands or epoch != self._epoch:
             self._monitor.reset()
             self._epoch = epoch
         if not stands:
             self._monitor.take(measurement.state, measurement.stamp_ns)
-        return joined(self._estimated, self._monitor.beliefs, self._monitor.suspects)
+        believed = joined(self._estimated, self._monitor.beliefs, self._monitor.suspects)
+        self.hopeless = self._losses.hopeless(believed.dead, measurement.stamp_ns)
+        return believed

@@ -375,7 +375,7 @@ class ControllerNode(LifecycleNode):
             measurement, epoch=guard.epoch, stands=guard.flags.bearing_off
         )
         dead = [word for word in self._beliefs.warnings if word.endswith(DEAD)]
-        guard.suspect(", ".join(dead))
+        guard.suspect(", ".join(dead), hopeless=self._actuator_beliefs.hopeless)
         if self._beliefs.open and decision.may_act and not guard.flags.latched_fault:
             self._fail(f"{self._beliefs.words[0]}. Close its supply.")
 

@@ -169,6 +169,7 @@ class ConvergenceWatch:
     Attributes:
         problem: How it does not converge, in words; empty while it does.
         suspicion: Which actuators are believed dead, in words; empty for none.
+        hopeless: Whether no pose can be held without these.
     """
 
     def __init__(self, robot: Robot, task: Task, control_dt: float, applied: AppliedHistory | None) -> None:
@@ -184,6 +185,9 @@ class ConvergenceWatch:
         self._alike = ALIKE * robot.actuators.scale
         self._own: deque[np.ndarray] = deque(maxlen=OWN)
         self.problem = self.suspicion = ""
+        self.hopeless = False
+        limits = task.tolerance
+        self._wants_pose = bool(limits.position) and bool(limits.heading_deg or limits.attitude_deg)
 
     def reset(self) -> None:
         """Begin anew; see `ConvergenceMonitor.reset`."""
@@ -197,7 +201,12 @@ class ConvergenceWatch:
             self.reset()
         self._own.append(command[0])
         self._monitor.see(inputs.state, inputs.goal, command)
-        if bool(self._monitor.late(np.array([bool(self.suspicion)]))[0]):
+        if self.hopeless and self._wants_pose:
+            self.problem = (
+                f"{UNCONVERGED}: the {self.suspicion}, and no pose can be held without it. Repair it, then give a new "
+                "goal."
+            )
+        elif bool(self._monitor.late(np.array([bool(self.suspicion)]))[0]):
             late_s = float(self._monitor.late_s[0])
             cause = f"The {self.suspicion}." if self.suspicion else MAY_BE
             self.problem = (
