@@ -78,9 +78,8 @@ class SatelliteInputs:
 
     def _take_wheels(self, message: JointState) -> None:
         reading = reading_of(message, SENSORS["wheels"])
-        if self._accept(
-            SENSORS["wheels"].problem(reading, self._robot)
-        ):  # refused ones count as not measured
+        problem = SENSORS["wheels"].problem(reading, self._robot)
+        if self._accept(problem):  # refused speeds count as not measured
             by_name = dict(zip(message.name, reading.value.speeds.tolist(), strict=True))
             speeds = np.array([[by_name[name] for name in self._names]])
             self._wheels = stamp_ns(message.header.stamp), speeds

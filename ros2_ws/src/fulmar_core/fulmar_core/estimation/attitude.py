@@ -23,7 +23,9 @@ from fulmar_core.actuators.reaction_wheels import ReactionWheels
 from fulmar_core.attitude import exponential, normalised, product, rotation_error
 from fulmar_core.estimation.estimator import LACKS_NOTHING, Estimate
 from fulmar_core.estimation.reading_times import ReadingTimes
+from fulmar_core.estimation.satellite_repeats import STAR_TRACKER, SatelliteRepeats
 from fulmar_core.estimation.settings import AttitudeSettings
+from fulmar_core.estimation.tracker_trust import TrackerTrust
 from fulmar_core.robot import Robot
 from fulmar_core.rotation import rotate
 from fulmar_core.sensors.imu import NO_GYROSCOPE
@@ -33,12 +35,12 @@ from fulmar_core.state import RigidBodyState
 TURN, RATE, BIAS = slice(0, 3), slice(3, 6), slice(6, 9)  # of the errors
 ERRORS = 9
 KEPT_NS = 2_000_000_000  # how late a reading may come
-TO_BEGIN_ANEW = 10  # attitudes in a row that are no match: then it is the estimate that is wrong
 LATE_SHARE = 0.1  # of what a rate changed since its reading: how far the reading may be off by that
 GATE = 16.3  # 1 good reading of 1,000 lies beyond it: chi-squared, 3 degrees of freedom
 RATE_STD = 0.05  # of the turn rate when the filter begins [rad/s]
 BIAS_STD = 1e-4  # of the gyroscope's bias when the filter begins [rad/s]
 SPIN_GAP_NS = 500_000_000  # between readings of the wheels: after a longer one their torque is not known [ns]
+RATE_NAMES = {"gyroscope": "gyroscope", "events": "event cameras", "wheels": "wheels"}  # for people
 NO_ATTITUDE = "no attitude yet. Does the star tracker see stars?"
 
 
@@ -53,6 +55,7 @@ class AttitudeEstimator:
         self._lightness = np.linalg.inv(self._inertia)
         self._names = robot.actuators.wheel_names
         self._gyroscope_range = robot.sensors.imu.gyroscope_range
+        self._sensors, self._tick_s = robot.sensors, robot.timing.physics_dt
         self.reset()
 
     def reset(self) -> None:
@@ -66,13 +69,16 @@ class AttitudeEstimator:
         self._stamp_ns = 0
         self._times = ReadingTimes(self._begin_epoch)
         self._lacks = ""  # whether the inertial unit says that it has no gyroscope
+        self._blind = False  # whether the newest speeds of the wheels are no measurement
         self._momentum: np.ndarray | None = None  # of the wheels, in the body [N·m·s]
         self._held: list[
             tuple[int, Callable[[int], str]]
         ] = []  # readings until the wheels' of that time come
         # Stamps [ns], attitudes and turn rates before now, oldest first.
         self._past: deque[tuple[int, np.ndarray, np.ndarray]] = deque()
-        self._strangers = 0
+        self._trust = TrackerTrust(self._settings.gyroscope_drift)
+        self._repeats = SatelliteRepeats(self._sensors, self._names, tick_s=self._tick_s)
+        self._attitudes = 0  # that were believed
         self._gyroscope_ns = self._rate_ns = self._attitude_ns = self._spin_ns = 0
 
     def _begin_epoch(self) -> None:
@@ -120,8 +126,8 @@ class AttitudeEstimator:
         return "wheels"
 
     def warnings(self) -> tuple[str, ...]:
-        """None; see `Estimator.warnings`."""
-        return ()
+        """See `Estimator.warnings`."""
+        return tuple(filter(None, (self._trust.doubt, self._trust.warning, *self._repeats.frozen)))
 
     def status(self) -> dict[str, str]:
         """See `Estimator.status`."""
@@ -132,6 +138,10 @@ class AttitudeEstimator:
         if std[0] > self._settings.attitude_limit_deg:
             since_s = (now_ns - self._attitude_ns) / 1e9
             return f"the attitude is known to {std[0]:.2f}° only: no star tracker for {since_s:.0f} s"
+        if self._trust.doubt:
+            return self._trust.doubt
+        if self._attitudes < 2 and STAR_TRACKER in self._repeats.frozen:
+            return f"{STAR_TRACKER}, and no other attitude was ever seen"
         if std[1] > self._settings.rate_limit_deg:
             return f"the turn rate is known to {std[1]:.3f} °/s only: no gyroscope and no stars"
         return ""
@@ -140,6 +150,8 @@ class AttitudeEstimator:
         quat = np.asarray(reading.value, dtype=float)
         if not np.isfinite(quat).all() or abs(float(np.linalg.norm(quat)) - 1.0) > 0.01:
             return "the attitude is no unit quaternion of finite numbers"
+        if repeated := self._repeats.see("star_tracker", quat, stamp_ns):
+            return repeated
         quat = quat / np.linalg.norm(quat)
         noise = self._settings.star_tracker_std**2 * np.eye(3)
         if reading.covariance is not None and np.asarray(reading.covariance).any():
@@ -151,16 +163,27 @@ class AttitudeEstimator:
 
     def _use_attitude(self, quat: np.ndarray, noise: np.ndarray, stamp_ns: int) -> str:
         self._move_to(stamp_ns)
-        residual = np.array(rotation_error(tuple(self._quat_at(stamp_ns)), tuple(quat)))
+        believed = self._quat_at(stamp_ns)
+        residual = np.array(rotation_error(tuple(believed), tuple(quat)))
         if not self._correct(residual, TURN, noise, gated=True):
-            self._strangers += 1
-            if self._strangers >= TO_BEGIN_ANEW:
+            variance = float(np.linalg.eigvalsh(noise)[-1])
+            if self._trust.stranger(believed, quat, variance, stamp_ns, self._rate_alone()):
                 self._begin(quat, noise, stamp_ns)
                 self.epoch += 1
                 return ""
             return f"the attitude lies beyond the gate: {self.outliers} outliers so far"
-        self._strangers, self._attitude_ns = 0, stamp_ns
+        self._attitudes += 1
+        self._attitude_ns = stamp_ns
+        self._trust.match()
+        if self.rate_source == "gyroscope":
+            self._trust.see_bias(self._bias, self._P[BIAS, BIAS], stamp_ns)
         return ""
+
+    def _rate_alone(self) -> str:
+        """What the turn rate comes from, for people; empty where gyroscope and event cameras agree on it."""
+        source = self.rate_source
+        seen = self._rate_ns and self._stamp_ns - self._rate_ns <= 1e9 * self._settings.bridge_s
+        return "" if source == "gyroscope" and seen else RATE_NAMES[source]
 
     def _begin(self, quat: np.ndarray, noise: np.ndarray, stamp_ns: int) -> None:
         self._quat, self._turning, self._bias = quat, np.zeros(3), np.zeros(3)
@@ -168,7 +191,8 @@ class AttitudeEstimator:
         self._P[TURN, TURN] = noise
         self._P[RATE, RATE], self._P[BIAS, BIAS] = RATE_STD**2 * np.eye(3), BIAS_STD**2 * np.eye(3)
         self._stamp_ns = self._attitude_ns = stamp_ns
-        self._begun, self._strangers = True, 0
+        self._begun = True
+        self._attitudes += 1
         self._past.clear()
 
     def _gyroscope(self, reading: Reading, stamp_ns: int) -> str:
@@ -181,6 +205,8 @@ class AttitudeEstimator:
         largest = float(np.abs(rate).max())
         if largest >= self._gyroscope_range or largest > 2.0 * self._limits.yaw_rate:
             return f"the gyroscope reads {largest:.2f} rad/s, beyond what is possible"
+        if repeated := self._repeats.see("imu", rate, stamp_ns):
+            return repeated
         if not self._begun:
             return ""
         return self._with_wheels(stamp_ns, partial(self._use_gyroscope, rate))
@@ -196,6 +222,8 @@ class AttitudeEstimator:
         rate = np.asarray(reading.value, dtype=float)
         if not np.isfinite(rate).all() or reading.covariance is None:
             return "the rate is not finite, or has no covariance"
+        if repeated := self._repeats.see("rate", rate, stamp_ns):
+            return repeated
         if not self._begun:
             return ""
         return self._with_wheels(stamp_ns, partial(self._use_rate, rate, np.asarray(reading.covariance)))
@@ -217,12 +245,17 @@ class AttitudeEstimator:
         """Use a reading now, or once the wheels' of its time came: unknown torque would look like noise."""
         self._held.append((stamp_ns, use))
         self._held.sort(key=lambda one: one[0])
-        silent = self._held[-1][0] > self._spin_ns + SPIN_GAP_NS
+        silent = self._blind or self._held[-1][0] > self._spin_ns + SPIN_GAP_NS
         problems = []
         while self._held and (silent or self._held[0][0] <= self._spin_ns):
             held_ns, use = self._held.pop(0)
             problems.append(use(held_ns))
         return "; ".join(filter(None, problems))
+
+    def _release(self, problem: str) -> str:
+        """Use what waited for the wheels, since these say nothing; returns why of them and of it nothing was used."""
+        waiting, self._held = self._held, []
+        return "; ".join(filter(None, (problem, *(use(held_ns) for held_ns, use in waiting))))
 
     def _spin(self, reading: Reading, stamp_ns: int) -> str:
         speeds = dict(zip(reading.value.names, np.asarray(reading.value.speeds, dtype=float), strict=False))
@@ -231,10 +264,14 @@ class AttitudeEstimator:
         each = np.array([speeds[name] for name in self._names])
         if not np.isfinite(each).all():
             return "a wheel reports a speed that is not finite"
+        was_blind, repeated = self._blind, self._repeats.see_wheels(each, stamp_ns)
+        self._blind = bool(repeated)  # from now on the torque of the wheels is not known
+        if self._blind:
+            return self._release(repeated)
         momentum = self._wheels.to_body(self._wheels.spin_inertia * each)
         before, before_ns = self._momentum, self._spin_ns
         self._momentum, self._spin_ns = momentum, stamp_ns
-        if not self._begun or before is None or stamp_ns - before_ns > SPIN_GAP_NS:
+        if not self._begun or before is None or was_blind or stamp_ns - before_ns > SPIN_GAP_NS:
             return ""  # of a longer change the gyroscope has shown its part already
         meanwhile = [one for one in self._held if one[0] <= stamp_ns]
         self._held = self._held[len(meanwhile) :]
@@ -282,7 +319,8 @@ class AttitudeEstimator:
         F[TURN, TURN] = rotate(np.asarray(turned), np.eye(3))  # of the inverse rotation: rows are turned axes
         F[TURN, RATE] = t * np.eye(3)
         Q, one, s = np.zeros((ERRORS, ERRORS)), np.eye(3), self._settings
-        spin = (s.rate_spread if stamp_ns <= self._spin_ns + SPIN_GAP_NS else s.rate_spread_blind) ** 2
+        measured = stamp_ns <= self._spin_ns + (0 if self._blind else SPIN_GAP_NS)
+        spin = (s.rate_spread if measured else s.rate_spread_blind) ** 2
         Q[TURN, TURN], Q[RATE, RATE] = spin * t**3 / 3.0 * one, spin * t * one
         Q[TURN, RATE] = Q[RATE, TURN] = spin * t * t / 2.0 * one
         Q[BIAS, BIAS] = s.gyroscope_drift**2 * t * one

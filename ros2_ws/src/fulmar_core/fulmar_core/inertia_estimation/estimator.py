@@ -14,6 +14,7 @@ import numpy as np
 from fulmar_core.actuators.reaction_wheels import ReactionWheels
 from fulmar_core.estimation.estimator import Estimate
 from fulmar_core.estimation.reading_times import ReadingTimes
+from fulmar_core.estimation.satellite_repeats import SatelliteRepeats
 from fulmar_core.estimation.settings import InertiaSettings
 from fulmar_core.inertia_estimation.batch import SPAN_S, batch_fit
 from fulmar_core.inertia_estimation.ekf import EkfSettings, InertiaFilter
@@ -41,6 +42,7 @@ class InertiaEstimator:
         self._settings, self._wheels = settings, robot.actuators
         self._guess = settings.guess * numbers_of(robot.body.inertia_matrix, settings.count)
         self._limit = 2.0 * robot.limits.yaw_rate
+        self._sensors, self._tick_s = robot.sensors, robot.timing.physics_dt
         self.reset()
 
     def reset(self) -> None:
@@ -54,6 +56,7 @@ class InertiaEstimator:
         self.saturated: tuple[str, ...] = ()
         self._lacking = ""  # what the newest reading of the inertial unit does not have, in words
         self._times = ReadingTimes(self._begin_epoch)
+        self._repeats = SatelliteRepeats(self._sensors, self._wheels.wheel_names, tick_s=self._tick_s)
         self._waiting: dict[str, deque[tuple[int, np.ndarray]]] = {"imu": deque(), "wheels": deque()}
         self._samples: deque[tuple[float, np.ndarray, np.ndarray]] = deque(maxlen=MOST_SAMPLES)
         self._first_ns = self._last_ns = -1
@@ -92,7 +95,7 @@ class InertiaEstimator:
         if float(np.abs(rate).max()) > self._limit:
             self.outliers += 1
             return rate, f"turn rate {float(np.abs(rate).max()):.1f} rad/s is beyond what is possible"
-        return rate, ""
+        return rate, self._repeats.see("imu", rate, reading.stamp_ns or 0)
 
     def _momentum_of(self, reading: Reading) -> tuple[np.ndarray, str]:
         speeds = dict(zip(reading.value.names, np.asarray(reading.value.speeds, dtype=float), strict=False))
@@ -104,7 +107,8 @@ class InertiaEstimator:
             return each, "a wheel reports a speed that is not finite"
         top = 0.999 * self._wheels.top_speed
         self.saturated = tuple(name for name, speed in zip(names, each, strict=True) if abs(speed) >= top)
-        return self._wheels.to_body(self._wheels.spin_inertia * each), ""
+        momentum = self._wheels.to_body(self._wheels.spin_inertia * each)
+        return momentum, self._repeats.see_wheels(each, reading.stamp_ns or 0)
 
     def _pair(self) -> None:
         """Use readings of one time, at most as often as the settings say."""
@@ -131,7 +135,7 @@ class InertiaEstimator:
             self.problem = self._lacking or NOT_BEGUN
             return None
         numbers, covariance = self._believed()
-        self.problem = self._problem_of(numbers, covariance)
+        self.problem = "; ".join(self._repeats.frozen) or self._problem_of(numbers, covariance)
         if self.problem:
             return None
         whole = np.zeros((FULL, FULL))
@@ -154,8 +158,8 @@ class InertiaEstimator:
         )
 
     def warnings(self) -> tuple[str, ...]:
-        """None; see `Estimator.warnings`."""
-        return ()
+        """See `Estimator.warnings`."""
+        return self._repeats.frozen
 
     def status(self) -> dict[str, str]:
         """Excitation and what cannot be observed, for people: a value for each axis and the wheels."""
