@@ -20,6 +20,7 @@ from fulmar_bags.message_reader import stamp_ns
 from fulmar_core.attitude import rotation_error
 from fulmar_core.errors import ConfigError
 from fulmar_core.robot import load_robot
+from fulmar_core.sensors.ranges import attitude_problem
 from fulmar_core.sky.catalogue import load_stars
 from fulmar_core.sky.event_sensor import EventSensor
 from fulmar_core.topics import EVENTS, EVENTS_2, TRUTH
@@ -102,6 +103,8 @@ class EventCameraNode(Node):
 
     def _exposed(self, time_ns: int, quat: np.ndarray) -> list[tuple[Publisher, PointCloud2]]:
         """Packets of every camera from the state before to this one."""
+        if attitude_problem(quat):
+            return []  # a state that is none shows no stars
         if self._before is not None and self._before[0] == time_ns:
             return []  # a plant that waits for an answer sends its state again
         before, self._before = self._before, (time_ns, quat)

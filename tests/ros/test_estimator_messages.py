@@ -5,14 +5,12 @@ Handlers are called directly, with real messages, on real nodes: DDS would only 
 
 from __future__ import annotations
 
-import importlib
 import sys
 from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 import pytest
-from geometry_msgs.msg import Quaternion
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from sensor_msgs.msg import JointState, PointCloud2
@@ -25,6 +23,7 @@ from fulmar_ros.convert import stamp_of
 from fulmar_ros.estimator_node import BROKEN, EstimatorNode
 from fulmar_ros.estimator_wires import READERS
 from fulmar_ros.event_packets import cloud_of_events
+from tests.ros.any_message import any_message, numbers
 from tests.ros.neighbour import Neighbour
 
 pytest.importorskip("filterpy")
@@ -42,54 +41,6 @@ FILES = {
 }
 WHEELS = list(load_robot("cubesat_wheels").actuators.wheel_names)
 BEGIN_NS = 1_000_000_000_000
-INTEGERS = {
-    "uint8": (0, 2**8 - 1),
-    "uint16": (0, 2**16 - 1),
-    "uint32": (0, 2**32 - 1),
-    "int32": (-(2**31), 2**31 - 1),
-}
-numbers = st.sampled_from([0.0, 1.0, -1.0, 1e-3, 1e308, 4294967295.0]) | st.floats()
-names = st.sampled_from(["odom", "map", "", "base_link", *WHEELS]) | st.text(max_size=4)
-
-
-def of_field(kind: str) -> st.SearchStrategy[Any]:
-    """Any value of a field of a message."""
-    if kind.startswith("sequence<"):
-        return st.lists(of_field(kind[9:-1]), max_size=4)
-    if kind.endswith("]"):
-        part, count = kind[:-1].split("[")
-        few = st.lists(st.tuples(st.integers(0, int(count) - 1), numbers), max_size=3)
-        return few.map(lambda found: _filled(int(count), found)) if part == "double" else st.nothing()
-    if kind in ("double", "float"):
-        return numbers
-    if kind in INTEGERS:
-        return st.integers(*INTEGERS[kind])
-    if kind == "boolean":
-        return st.booleans()
-    return names if kind == "string" else any_message(_class_of(kind))
-
-
-def _class_of(kind: str) -> Any:
-    package, name = kind.split("/")
-    return getattr(importlib.import_module(f"{package}.msg"), name)
-
-
-def _filled(count: int, entries: list[tuple[int, float]]) -> np.ndarray:
-    found = np.zeros(count)
-    for index, value in entries:
-        found[index] = value
-    return found
-
-
-@st.composite
-def any_message(draw: st.DrawFn, cls: Any) -> Any:
-    """Any content in every field."""
-    if cls is Quaternion and draw(st.booleans()):
-        return Quaternion(w=1.0)
-    message = cls()
-    for name, kind in cls.get_fields_and_field_types().items():
-        setattr(message, name, draw(of_field(kind)))
-    return message
 
 
 @st.composite

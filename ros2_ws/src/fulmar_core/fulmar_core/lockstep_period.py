@@ -12,7 +12,14 @@ from typing import Generic, TypeVar
 
 T = TypeVar("T")
 
+MOST_MESSAGES = 1e6  # of a topic in a period
 PLANT = ""  # stands for the plant among the sources
+
+
+def counts_of(names: Iterable[str], values: Iterable[float]) -> dict[str, int]:
+    """Numbers of messages by topic; values that are no counts are left out."""
+    pairs = zip(names, values, strict=False)
+    return {name: round(value) for name, value in pairs if 0.0 <= value <= MOST_MESSAGES}
 
 
 class PeriodInbox(Generic[T]):

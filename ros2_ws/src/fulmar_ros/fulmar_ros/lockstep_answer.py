@@ -10,7 +10,7 @@ from rclpy.publisher import Publisher
 from sensor_msgs.msg import JointState
 
 from fulmar_bags.message_reader import stamp_ns
-from fulmar_core.lockstep_period import PLANT, PeriodInbox
+from fulmar_core.lockstep_period import PLANT, PeriodInbox, counts_of
 from fulmar_core.topics import ANSWER, PERIOD
 from fulmar_ros.convert import stamp_of
 from fulmar_ros.qos import EVERYTHING, publish_patiently, publisher_qos, subscriber_qos
@@ -69,7 +69,7 @@ class LockstepAnswer:
         self._expect(message.header.frame_id, message)
 
     def _expect(self, source: str, message: JointState) -> None:
-        counts = {name: round(count) for name, count in zip(message.name, message.position, strict=False)}
+        counts = counts_of(message.name, message.position)
         self._inbox.expect(source, stamp_ns(message.header.stamp), counts)
         self._answer()
 

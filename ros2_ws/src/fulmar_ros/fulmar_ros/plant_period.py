@@ -19,6 +19,7 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 
 from fulmar_bags.message_reader import stamp_ns
+from fulmar_core.lockstep_period import counts_of
 from fulmar_core.topics import ANSWER, ODOMETRY, PERIOD
 from fulmar_ros.convert import VectorWriter, stamp_of
 from fulmar_ros.qos import EVERYTHING, publish_patiently, publisher_qos, subscriber_qos
@@ -116,10 +117,10 @@ class PlantPeriod:
         return any(count for _, count in self._answered.values())
 
     def _on_answer(self, message: JointState) -> None:
-        counts = dict(zip(message.name, message.position, strict=False))
+        counts = counts_of(message.name, message.position)
         with self._lock:
             self._answered[message.header.frame_id] = (
                 stamp_ns(message.header.stamp),
-                round(counts.get(self._odometry_topic, 0.0)),
+                counts.get(self._odometry_topic, 0),
             )
             self._lock.notify_all()

@@ -82,7 +82,7 @@ class Scene:
         targets = self._goal()
         if targets is None:
             return []
-        done = int(self._status.get("goals_done", "0"))
+        done = self._number("goals_done")
         return [
             *goal_shapes(targets, done, self._task, self._robot),
             *geofence_shapes(targets, done, self._robot),
@@ -95,11 +95,16 @@ class Scene:
         newest_ns, newest = self._goals[-1]
         if not self._status:
             return newest
-        stamp_ns = int(self._status.get("goal_stamp_ns", "0"))
+        stamp_ns = self._number("goal_stamp_ns")
         if stamp_ns == 0:  # without a goal, or with one that has no stamp
             waits = newest_ns != 0 or self._status.get("mode") == Mode.ARMED.value
             return None if waits else newest
         return next((targets for ns, targets in reversed(self._goals) if ns == stamp_ns), newest)
+
+    def _number(self, key: str) -> int:
+        """A whole number of the controller's status; 0 where it has none, as that of another program."""
+        text = self._status.get(key, "")
+        return int(text) if text.isdecimal() and len(text) < 20 else 0
 
     def _of_applied(self) -> list[Shape]:
         """What the actuators did on average since it was asked last: a short pulse shows, too."""
