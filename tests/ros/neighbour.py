@@ -108,6 +108,11 @@ class Neighbour:
         """Measure no more: a plant is to."""
         self.node.destroy_publisher(self._odometry)
 
+    def measure_anew(self) -> None:
+        """As a plant that ends in order and starts again."""
+        self.withdraw_odometry()
+        self._odometry = self.node.create_publisher(Odometry, ODOMETRY.name, publisher_qos(ODOMETRY))
+
     def command(self, values: list[float], names: list[str] | None = None, stamp_ns: int = 0) -> None:
         """Send one command, an answer to the observation of a stamp or to none."""
         writer = VectorWriter(names or self.robot.actuators.names)

@@ -99,6 +99,19 @@ def test_a_controller_follows_no_input_of_two_nodes_names_both_and_goes_on_when_
     until(acts)
 
 
+def test_a_node_that_publishes_odometry_and_starts_again_in_order_is_no_second_one(
+    neighbour: Neighbour, controller: ControllerNode
+) -> None:
+    until(lambda: neighbour.goal_publisher.get_subscription_count() > 0)
+    neighbour.give_goal()
+    for _ in range(4):
+        for _ in range(10):
+            neighbour.odometry(time.time_ns())
+            time.sleep(0.02)
+            assert not controller.guard.flags.contested
+        neighbour.measure_anew()
+
+
 @pytest.mark.slow
 def test_a_run_ends_where_another_node_commands_its_robot_and_its_result_names_both(
     neighbour: Neighbour, ros_domain: RosDomain, tmp_path: Path
