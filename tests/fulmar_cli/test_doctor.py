@@ -76,8 +76,15 @@ def no_rights(tmp_path):
     ("environment", "hardware", "level", "fix"),
     [
         ({}, False, "ok", ""),
-        ({}, True, "advice", f"export {RANGE}=SUBNET"),
-        ({RANGE: "SUBNET"}, True, "ok", ""),
+        (
+            {},
+            True,
+            "advice",
+            "export ROS_STATIC_PEERS=ADDRESS   # of the operator's computer, docs/security.md",
+        ),
+        ({"ROS_STATIC_PEERS": "10.0.0.2"}, True, "ok", ""),
+        ({RANGE: "SUBNET"}, False, "ok", ""),
+        ({RANGE: "SUBNET"}, True, "advice", f"unset {RANGE}   # and set ROS_STATIC_PEERS, docs/security.md"),
         ({RANGE: "OFF"}, False, "wrong", f"export {RANGE}=LOCALHOST"),
         ({RANGE: "EVERYWHERE"}, False, "wrong", f"export {RANGE}=LOCALHOST"),
         ({"ROS_DOMAIN_ID": "233"}, False, "wrong", "export ROS_DOMAIN_ID=0"),

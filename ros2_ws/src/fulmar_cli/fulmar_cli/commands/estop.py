@@ -49,8 +49,10 @@ def estop(
     if not answers:
         whom = f"'{robot}'" if robot else "any robot"
         raise RunFailed(
-            f"no plant and no e-stop node of {whom} is found in this ROS domain. Check ROS_DOMAIN_ID and "
-            "ROS_AUTOMATIC_DISCOVERY_RANGE" + (", or cut the power." if not reset else ".") + others
+            f"no plant and no e-stop node of {whom} is found in this ROS domain. Check ROS_DOMAIN_ID, "
+            "ROS_AUTOMATIC_DISCOVERY_RANGE and, for a robot of another host, ROS_STATIC_PEERS"
+            + (", or cut the power." if not reset else ".")
+            + others
         )
     if as_json:
         print_json({"robots": answers})

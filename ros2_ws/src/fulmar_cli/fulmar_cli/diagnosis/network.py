@@ -17,7 +17,15 @@ from fulmar_bringup.shared_memory_cleanup import (
     give_back_abandoned_memory,
 )
 from fulmar_cli.diagnosis.check_result import Finding
-from fulmar_ros.middleware import DISCOVERY_RANGE, TRANSPORTS, UDP_ONLY, discovery_range, foreign_profile
+from fulmar_ros.middleware import (
+    DISCOVERY_RANGE,
+    STATIC_PEERS,
+    TRANSPORTS,
+    UDP_ONLY,
+    discovery_range,
+    foreign_profile,
+    static_peers,
+)
 from fulmar_ros.middleware import OWN_HOST as OURS
 
 RANGES = ("SUBNET", "LOCALHOST", "OFF", "SYSTEM_DEFAULT")
@@ -54,9 +62,22 @@ def check_discovery(environment: Mapping[str, str], *, hardware: bool) -> Findin
     if int(domain) > DOMAINS[-1]:
         found = f"{found}: its ports are among those that Linux gives to other programs"
         return Finding(what, "advice", found, f"export ROS_DOMAIN_ID={DOMAINS[-1]}   # or less")
-    if hardware and reach == "LOCALHOST":
-        found = f"{found}: no other computer sees the robot"
-        return Finding(what, "advice", found, f"export {DISCOVERY_RANGE}=SUBNET")
+    peers = static_peers(environment)
+    if peers:
+        found = f"{found}, peers {', '.join(peers)}"
+    elif hardware and reach == OURS:
+        found = f"{found}: no other computer reaches the robot"
+        return Finding(
+            what,
+            "advice",
+            found,
+            f"export {STATIC_PEERS}=ADDRESS   # of the operator's computer, docs/security.md",
+        )
+    elif hardware:
+        found = f"{found}: every computer of the network can command the robot"
+        return Finding(
+            what, "advice", found, f"unset {DISCOVERY_RANGE}   # and set {STATIC_PEERS}, docs/security.md"
+        )
     return Finding(what, "ok", found)
 
 
