@@ -103,6 +103,31 @@ def check_provenance(file):
     assert set(reported) == {"fulmar_version", "git_revision", "python", "platform", "packages"}
 
 
+def test_a_recorder_that_is_started_again_goes_on_in_the_bag_of_the_one_that_died(record, node):
+    publisher = odometry_soon(node, recorder := record())
+    publish(publisher, range(50))
+    wait_for(lambda: len(recorder.stamps_by_rosbags()) == 50)
+    recorder.end(signal.SIGKILL)
+    again = record("resume:=true")
+    again.wait_until_recording()
+    stamp = 100
+    while len(recorder.stamps_by_rosbags()) < 100:  # they find each other after a second or two
+        assert stamp < 3000
+        publish(publisher, range(stamp, stamp + 100))
+        stamp += 100
+    assert again.end(signal.SIGINT)[0] == 0
+    kept = again.stamps_by_rosbags()
+    assert kept[:50] == list(range(50))
+    assert kept[50:] == list(range(kept[50], stamp))
+    health = open_bag(again.directory).topics["/diagnostics"]
+    assert any(b"the recorder was started again: nothing was recorded for" in data for data in health.data)
+
+
+def odometry_soon(node, recorder):
+    recorder.wait_until_recording()
+    return odometry(node)
+
+
 def test_a_killed_recorder_leaves_a_bag_up_to_its_last_second(record, node):
     recorder = record()
     recorder.wait_until_recording()

@@ -228,7 +228,7 @@ def open_bag(path: Path) -> Bag:
         topics=dict(sorted(gathered.topics.items())),
         info=info,
         recording=json_object(custom_text(path, RECORDING)) or {},
-        faults=_faults(gathered.faults or custom_text(path, FAULTS)),
+        faults=recorded_faults(gathered.faults or custom_text(path, FAULTS)),
         attachments=gathered.attachments,
         warnings=tuple(problems + gathered.warnings),
     )
@@ -336,8 +336,8 @@ def json_object(text: str) -> dict[str, Any] | None:
     return value if isinstance(value, dict) else None
 
 
-def _faults(text: str) -> tuple[Fault, ...]:
-    """None where the text is not what a ring writes."""
+def recorded_faults(text: str) -> tuple[Fault, ...]:
+    """Faults of a ring from their JSON text; none where the text is not what a ring writes."""
     try:
         return tuple(Fault(int(each["time_ns"]), str(each["reason"])) for each in json.loads(text or "[]"))
     except (ValueError, TypeError, KeyError, RecursionError):

@@ -21,7 +21,12 @@ class BagPerGoal:
     """
 
     def __init__(
-        self, open_bag: Callable[[int], BagWriter], *, goals: Set[str], latched: Mapping[str, int]
+        self,
+        open_bag: Callable[[int], BagWriter],
+        *,
+        goals: Set[str],
+        latched: Mapping[str, int],
+        first: int = 1,
     ) -> None:
         """Begin with the bag of the first goal.
 
@@ -29,6 +34,7 @@ class BagPerGoal:
             open_bag: Makes the bag of a number, from 1, with its topics.
             goals: Topics of goals.
             latched: Latched topics, and how many messages of each a bag begins with.
+            first: Number of the first bag.
 
         Raises:
             BagError: The first bag cannot be written.
@@ -42,7 +48,8 @@ class BagPerGoal:
         self._due = False  # whether a goal has no bag yet
         self._next_try = 0.0
         self._repeated = 0  # latched messages that bags begin with
-        self._bags = [open_bag(1)]
+        self._first = first
+        self._bags = [open_bag(first)]
         self._unclosed: list[BagWriter] = []
 
     @property
@@ -101,7 +108,7 @@ class BagPerGoal:
             self._unclosed.pop()
 
     def _begin(self) -> None:
-        new = self._open_bag(len(self._bags) + 1)
+        new = self._open_bag(self._first + len(self._bags))
         self._unclosed.append(self._bags[-1])
         self._bags.append(new)
         self._due = False

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -45,6 +45,7 @@ class BagRing:
         latched: Mapping[str, int],
         fault_in: Callable[[str, bytes], str],
         max_bytes: int = MAX_BYTES,
+        faults: Sequence[dict[str, object]] = (),
     ) -> None:
         """Begin with an empty memory.
 
@@ -55,6 +56,7 @@ class BagRing:
             latched: Latched topics, and how many messages of each are kept however old they are.
             fault_in: Fault that a message reports, by topic and data; empty if none.
             max_bytes: More is not kept; then less than `before_s` is.
+            faults: Those that an interrupted bag, which goes on, has files of.
         """
         self._open_bag, self._fault_in = open_bag, fault_in
         self._before_ns, self._after_ns, self._max_bytes = (
@@ -71,7 +73,7 @@ class BagRing:
         self._bytes_due = 0  # that came since it showed
         self._next_try = 0.0
         self._bag: BagWriter | None = None
-        self.faults: list[dict[str, object]] = []  # that showed so far
+        self.faults: list[dict[str, object]] = list(faults)  # that showed so far
         self.cut_short = False  # whether the memory was too small for `before_s`
 
     @property

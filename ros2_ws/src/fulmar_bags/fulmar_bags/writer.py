@@ -11,6 +11,7 @@ from dataclasses import astuple, dataclass
 from pathlib import Path
 from typing import Any
 
+from fulmar_bags.interrupted_bag import FinishedPart, interrupted_bag
 from fulmar_bags.mcap_file import BagPart, Topic
 from fulmar_bags.message_types import message_type, offered_qos
 from fulmar_bags.metadata import BagSpan, TopicCount, write_metadata
@@ -49,6 +50,7 @@ class BagWriter:
         attachments: Mapping[str, bytes] | None = None,
         split_bytes: float = 0.0,
         split_s: float = 0.0,
+        resume: bool = False,
     ) -> None:
         """Create the bag; it is valid, though empty, from here on.
 
@@ -58,19 +60,25 @@ class BagWriter:
             attachments: Files to carry along in each MCAP file, by name.
             split_bytes: A file of this size is followed by a new one; 0: never.
             split_s: So is one that was begun so long ago; 0: never [s].
+            resume: Whether a bag that a dead recorder left in the folder goes on, in a further file.
 
         Raises:
-            BagError: There is something in the folder already, or it cannot be written.
+            BagError: There is something in the folder already, and it is not to go on; or it cannot be written.
         """
-        check_free(directory)
+        if not resume:
+            check_free(directory)
         self.directory = directory
         self._records = {RUN_RECORD: {RUN_KEY: json.dumps(run_info, sort_keys=True)}}
         self._attachments = dict(attachments or {})
         self._split_bytes, self._split_s = split_bytes, split_s
         self._topics: dict[str, Topic] = {}
-        self._notes: dict[str, str] = {}
-        self._finished: list[BagPart] = []
-        self._last_ns = self._written = self._flushed = self._begun = 0
+        before = interrupted_bag(directory)
+        self._messages_before = before.messages
+        self._notes = {name: text for name, text in before.notes.items() if name != RUN_RECORD}
+        self._finished: list[FinishedPart] = list(before.parts)
+        self._begun = before.next_number
+        self._last_ns = before.last_ns
+        self._written = self._flushed = 0
         self._next_flush: float | None = None
         self._split_at = float("inf")
         try:
@@ -87,7 +95,7 @@ class BagWriter:
 
     @property
     def counts(self) -> BagCounts:
-        """Messages and bytes so far."""
+        """Messages that this writer was given, and all files, those of an interrupted bag among them."""
         parts = (*self._finished, self._part)
         return BagCounts(self._written, self._flushed, len(parts), sum(part.size for part in parts))
 
@@ -102,7 +110,8 @@ class BagWriter:
         Raises:
             BagError: Unknown type.
         """
-        self._topics[name] = Topic(name, message_type(type_name), delivery)
+        before = self._messages_before.get(name, 0)
+        self._topics[name] = Topic(name, message_type(type_name), delivery, messages=before)
         self._part.add_topic(self._topics[name])
 
     def write(self, topic: str, data: bytes, *, log_ns: int, publish_ns: int | None = None) -> None:
@@ -173,7 +182,7 @@ class BagWriter:
         self.flush()
         following = self._new_part()
         self._part.finish_if_there_is_room()
-        self._finished.append(self._part)
+        self._finished.append(FinishedPart(self._part.name, self._part.span, self._part.size))
         self._part = following
         self.flush()
 

@@ -14,9 +14,9 @@ import queue
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Any, Protocol
 
 from fulmar_bags.writer import BagCounts
 from fulmar_core.errors import BagError
@@ -76,6 +76,7 @@ class BagThread:
         on_error: Callable[[str], None],
         max_queued: int = MAX_QUEUED,
         max_waiting: int = MAX_WAITING,
+        before: Mapping[str, Any] | None = None,
     ) -> None:
         """Start the thread.
 
@@ -84,7 +85,9 @@ class BagThread:
             on_error: Receives each kind of trouble once, in one line.
             max_queued: Messages that may wait for the thread.
             max_waiting: Bytes that may wait for the thread, and as many for the disk.
+            before: What `RECORDING` says of an interrupted bag that goes on; its counts are added in the bag.
         """
+        self._before = dict(before or {})
         self._bag, self._on_error = bag, on_error
         self._max_queued, self._max_waiting = max_queued, max_waiting
         self._queue: queue.SimpleQueue[tuple[str, bytes, int, int | None]] = queue.SimpleQueue()
@@ -168,7 +171,14 @@ class BagThread:
 
     def _note(self, *, complete: bool) -> None:
         account = self.account(complete=complete)
-        text = {"complete": complete, "received": account.received, "dropped": account.dropped}
+        received, dropped = self._before.get("received", 0), self._before.get("dropped", {})
+        text: dict[str, Any] = {
+            "complete": complete,
+            "received": received + account.received,
+            "dropped": dict(Counter(dropped) + Counter(account.dropped)),
+        }
+        if self._before:
+            text["interruptions"] = self._before.get("interruptions", 0) + 1
         self._bag.note(RECORDING, json.dumps(text))
 
     def _try(self, action: Callable[[], None]) -> None:

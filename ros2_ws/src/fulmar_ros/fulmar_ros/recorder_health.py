@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from rclpy.node import Node
@@ -28,6 +28,8 @@ class RecorderHealth:
         account: Callable[[], Account],
         mode: Callable[[], str],
         commanders: Callable[[], int],
+        *,
+        warnings: Sequence[str] = (),
     ) -> None:
         """Begin to publish.
 
@@ -38,7 +40,9 @@ class RecorderHealth:
             account: The account of the recording now.
             mode: What the recorder is doing, in a word or two.
             commanders: Number of publishers of commands that the recorder is matched with.
+            warnings: What a reader of the bag should know, from the start on.
         """
+        self._warnings = tuple(warnings)
         self._commanders = commanders
         self._account, self._mode, self._directory = account, mode, directory
         self._health = Health(node, f"{robot}: {RECORDER}")
@@ -61,7 +65,7 @@ class RecorderHealth:
             "size_bytes": str(account.size),
             "free_bytes": str(free),
         }
-        self._health.publish(level, message or self._mode(), values)
+        self._health.publish(level, message or self._mode(), values, warnings=self._warnings)
 
 
 def status_of(account: Account, free_bytes: int) -> tuple[str, str]:

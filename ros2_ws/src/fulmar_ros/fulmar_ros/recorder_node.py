@@ -7,15 +7,19 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import asdict
 from pathlib import Path
 
 from rclpy.node import Node
 from rclpy.subscription import Subscription
 
+from fulmar_bags.contents import json_object, recorded_faults
+from fulmar_bags.interrupted_bag import interrupted_bag
+from fulmar_bags.mcap_records import custom_text
 from fulmar_bags.per_goal import BagPerGoal
-from fulmar_bags.ring import BagRing, fault_finder
+from fulmar_bags.ring import FAULTS, BagRing, fault_finder
 from fulmar_bags.writer import BagWriter, check_free
-from fulmar_bags.writer_thread import BagThread
+from fulmar_bags.writer_thread import RECORDING, BagThread
 from fulmar_core.errors import DONE, FAILED, BagError
 from fulmar_core.provenance import attachments
 from fulmar_core.topics import (
@@ -78,7 +82,9 @@ class RecorderNode(Node):
         self._topics = {wire: self.resolve_topic_name(wire.name, only_expand=True) for wire in classes}
         self._ring = self._new_ring() if settings.mode == "ring" else None
         whole = self._bag_per_goal if settings.mode == "goals" else self._open_bag
-        self._thread = BagThread(self._ring or whole(), on_error=self.get_logger().error)
+        before = (json_object(custom_text(self._directory, RECORDING)) or {}) if settings.resume else {}
+        warnings = [self._interruption()] if settings.resume else []
+        self._thread = BagThread(self._ring or whole(), on_error=self.get_logger().error, before=before)
         self._provenance = threading.Thread(target=self._attach_provenance, name="provenance", daemon=True)
         self._provenance.start()
         commands: list[list[Subscription]] = []
@@ -104,6 +110,7 @@ class RecorderNode(Node):
             self._thread.account,
             lambda: self._mode,
             lambda: sum(max(each.get_publisher_count() for each in made) for made in commands),
+            warnings=warnings,
         )
         doing = "recording to" if self._ring is None else f"keeping {settings.before_fault_s:g} s for"
         sys.stdout.write(f"{doing} {self._directory}\n")
@@ -117,6 +124,20 @@ class RecorderNode(Node):
         short = ": memory is too small for more" if self._ring.cut_short else ""
         return f"ring: {self._ring.kept_s:.0f} s in memory, {len(self._ring.faults)} faults{short}"
 
+    def _interruption(self) -> str:
+        """What the recorder that died before this one has cost."""
+        if self._settings.mode == "ring":
+            return "the recorder was started again: its memory of the time before is lost"
+        last_ns = max((interrupted_bag(bag).last_ns for bag in self._bags()), default=0)
+        if not last_ns:
+            return "the recorder was started again: nothing was recorded before"
+        away_s = max(0.0, (time.time_ns() - last_ns) / 1e9)
+        return f"the recorder was started again: nothing was recorded for {away_s:.1f} s"
+
+    def _bags(self) -> tuple[Path, ...]:
+        """Folders with bags of this recording: that of the whole bag, or one for each goal."""
+        return (self._directory, *sorted(self._directory.glob("goal_[0-9]*")))
+
     def _open_bag(self, below: str = "") -> BagWriter:
         """Make the bag, or one below its folder, with its topics."""
         bag = BagWriter(
@@ -125,6 +146,7 @@ class RecorderNode(Node):
             attachments=self._attachments,
             split_bytes=1e6 * self._settings.split_mb,
             split_s=self._settings.split_s,
+            resume=self._settings.resume,
         )
         for wire, topic in self._topics.items():
             bag.add_topic(topic, wire.type, wire.delivery)
@@ -132,13 +154,16 @@ class RecorderNode(Node):
 
     def _bag_per_goal(self) -> BagPerGoal:
         """A bag for each goal, below the folder of all."""
-        check_free(self._directory)
+        if not self._settings.resume:
+            check_free(self._directory)
+        numbers = [int(bag.name.removeprefix("goal_")) for bag in self._bags()[1:]]
         return BagPerGoal(
             lambda number: self._open_bag(f"goal_{number:03d}"),
             goals={
                 topic for wire, topic in self._topics.items() if wire in (*GOAL_WIRES.values(), GOAL_POSES)
             },
             latched=self._latched,
+            first=1 + max(numbers, default=0),
         )
 
     @property
@@ -152,7 +177,8 @@ class RecorderNode(Node):
         Raises:
             BagError: If it could not.
         """
-        check_free(self._directory)
+        if not self._settings.resume:
+            check_free(self._directory)
         try:
             self._directory.mkdir(parents=True, exist_ok=True)
         except OSError as error:
@@ -163,6 +189,7 @@ class RecorderNode(Node):
             after_s=self._settings.after_fault_s,
             latched=self._latched,
             fault_in=fault_finder(self._robot, self._topics),
+            faults=[asdict(each) for each in recorded_faults(custom_text(self._directory, FAULTS))],
         )
 
     def _keep(self, topic: str) -> Keep:

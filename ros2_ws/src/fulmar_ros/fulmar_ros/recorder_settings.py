@@ -20,6 +20,7 @@ class RecorderSettings(Recording):
 
     things: tuple[str, ...] = ("",)  # names of the things of the task, beside the topics of the table
     lossless: bool = False  # lock step with nodes between: lose nothing, and leave repetitions out
+    resume: bool = False  # go on with what a recorder that died has left in the directory
     directory: str = ""  # bag folder to make; "" makes one under `runs/` that is named after robot and time
     run_info: str = "{}"  # JSON object: what kind of run this is
     attachments: str = (
