@@ -45,7 +45,8 @@ class Row:
     namespace: str = "platform"
     parameters: dict = field(default_factory=lambda: {"control_hz": 5.0, "lockstep": True, "seed": 7})
     remappings: dict = field(default_factory=dict)
-    optional: bool = False
+    loss: str = "ends"
+    ends_within_s: float = 0.0
 
 
 STAND_INS = {
@@ -164,9 +165,17 @@ def test_the_end_of_a_node_ends_the_launch(launch_with):
         assert node.kwargs["name"] in node.kwargs["on_exit"].kwargs["reason"]
 
 
-def test_the_end_of_an_optional_node_does_not_end_the_launch(launch_with):
-    _, (node,) = launch_with(Row(name="markers", optional=True))
-    assert node.kwargs["on_exit"] == []
+def test_a_helper_that_ends_is_started_again_and_does_not_end_the_launch(launch_with):
+    _, (helper, plant) = launch_with(Row(name="recorder", loss="restarts"), Row())
+    assert helper.kwargs["on_exit"] == []
+    assert helper.kwargs["respawn"]
+    assert not plant.kwargs["respawn"]
+
+
+def test_a_plant_that_lands_first_gets_the_time_for_it(launch_with):
+    _, (lands, stops) = launch_with(Row(ends_within_s=304.0), Row(name="controller"))
+    assert lands.kwargs["sigterm_timeout"] == "304.0"
+    assert "sigterm_timeout" not in stops.kwargs
 
 
 def test_the_launch_arguments_are_those_of_the_node_table():

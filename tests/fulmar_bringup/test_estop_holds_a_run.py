@@ -29,6 +29,9 @@ class Overseer:
         self.plant = self._rest.pop(0)
         self.controller = Report(received_s=time.monotonic())
 
+    def silent_s(self, report: Report) -> float:
+        return 0.0
+
     def wait_until(self, condition: Any, alive: Any) -> None:
         while not condition():
             alive()
@@ -39,26 +42,23 @@ def said(level: str, message: str, mode: str = "running") -> Report:
     return Report(level, message, {"mode": mode, "sim_time_s": "1.0"}, time.monotonic())
 
 
-def wait_for_end(monkeypatch: pytest.MonkeyPatch, *plants: Report, end_on_estop: bool = False) -> None:
-    monkeypatch.setattr(run_executor, "raise_if_ended", lambda _group: None)
-    group = SimpleNamespace()
-    run_executor._wait_for_end(PLAN, Overseer(*plants), group, lambda *_: None, end_on_estop=end_on_estop)
+def wait_for_end(*plants: Report, end_on_estop: bool = False) -> None:
+    keeper = SimpleNamespace(look=lambda: None)
+    run_executor._wait_for_end(PLAN, Overseer(*plants), keeper, lambda *_: None, end_on_estop=end_on_estop)
 
 
-def test_an_e_stop_holds_the_run_until_its_time_is_over(monkeypatch):
-    wait_for_end(
-        monkeypatch, said("ok", "running"), said("error", PRESSED), said("ok", "finished", "finished")
-    )
+def test_an_e_stop_holds_the_run_until_its_time_is_over():
+    wait_for_end(said("ok", "running"), said("error", PRESSED), said("ok", "finished", "finished"))
 
 
-def test_a_run_that_is_asked_to_ends_on_an_e_stop(monkeypatch):
+def test_a_run_that_is_asked_to_ends_on_an_e_stop():
     with pytest.raises(RunFailed, match="plant: e-stop: pressed"):
-        wait_for_end(monkeypatch, said("ok", "running"), said("error", PRESSED), end_on_estop=True)
+        wait_for_end(said("ok", "running"), said("error", PRESSED), end_on_estop=True)
 
 
-def test_every_other_error_of_the_plant_ends_the_run(monkeypatch):
+def test_every_other_error_of_the_plant_ends_the_run():
     with pytest.raises(RunFailed, match="plant: no command"):
-        wait_for_end(monkeypatch, said("error", PRESSED), said("error", "no command for 500 ms"))
+        wait_for_end(said("error", PRESSED), said("error", "no command for 500 ms"))
 
 
 def test_the_result_says_that_the_e_stop_was_pressed_and_what_does_not_fit(reached):

@@ -94,14 +94,24 @@ def test_output_of_a_child_is_prefixed_with_its_name(start, capfd):
     wait_for(lambda: "[talker] hello" in capfd.readouterr().err)
 
 
-def test_the_end_of_an_optional_child_is_said_once_and_is_no_end(start, capfd):
+def test_the_end_of_an_optional_child_is_no_end(start):
     group = start("markers", "raise SystemExit(3)", optional=True)
     group.process("markers").wait(10.0)
     assert group.ended() is None
-    assert group.ended() is None
-    said = "markers ended with exit code 3; the system goes on without it"
-    assert capfd.readouterr().err.count(said) == 1
     assert [(end.returncode, end.optional) for end in group.stop_all()] == [(3, True)]
+
+
+def test_a_child_is_started_again_in_its_place_also_where_it_hangs(start):
+    start("first", "import time; time.sleep(60)")
+    group = start("second", "import time; time.sleep(60)")
+    hangs = group.process("first")
+    hangs.suspend()
+    wait_for(lambda: group.is_stopped("first"))
+    group.start_again(group.specs["first"])
+    assert not hangs.is_running()
+    assert group.process("first").pid != hangs.pid
+    assert not group.is_stopped("first")
+    assert list(group.specs) == ["first", "second"]  # which is stopped last, and first
 
 
 def test_the_last_words_of_a_child_are_printed_before_stop_returns(start, capfd):

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 
 import pytest
 
-from fulmar_bringup.run_executor import _let_it_land, _wait_for_end
-from fulmar_bringup.run_plan import RunPlan
+from fulmar_bringup.node_table import plant_spec
+from fulmar_bringup.run_executor import _bring_down, _wait_for_end
+from fulmar_bringup.run_plan import NodeSpec, RunPlan
 from fulmar_bringup.supervisor import Report
-from fulmar_core.actuators.refuge import DOWN
+from fulmar_core.actuators.refuge import LANDS_S
 from fulmar_core.errors import RunFailed
 from fulmar_core.safety.watchdog import NO_COMMAND
 
@@ -27,6 +29,9 @@ class Overseer:
         self.plant = Report()
         self.controller = Report(values={"mode": mode}, received_s=time.monotonic())
 
+    def silent_s(self, report: Report) -> float:
+        return time.monotonic() - report.received_s
+
     def wait_until(self, condition, alive) -> None:
         for level, message in self._reports:
             mode = message if message == "finished" else "running"
@@ -36,15 +41,15 @@ class Overseer:
             alive()
 
 
-class Group:
-    """Processes that all live."""
+class Keeper:
+    """Looks after processes that all live."""
 
-    def ended(self) -> None:
-        return None
+    def look(self) -> None:
+        pass
 
 
 def watched(mode: str, *reports: tuple[str, str], end_on_estop: bool = False) -> None:
-    _wait_for_end(PLAN, Overseer(mode, *reports), Group(), lambda *_: None, end_on_estop=end_on_estop)
+    _wait_for_end(PLAN, Overseer(mode, *reports), Keeper(), lambda *_: None, end_on_estop=end_on_estop)
 
 
 def test_a_late_command_ends_a_run_that_acts():
@@ -66,7 +71,7 @@ def test_an_error_of_the_plant_ends_a_run_also_if_a_command_takes_it_back_at_onc
 
     overseer.wait_until = wait_until
     with pytest.raises(RunFailed, match="no command for 493 ms"):
-        _wait_for_end(PLAN, overseer, Group(), lambda *_: None, end_on_estop=False)
+        _wait_for_end(PLAN, overseer, Keeper(), lambda *_: None, end_on_estop=False)
 
 
 def test_an_e_stop_ends_a_run_only_if_asked_to():
@@ -75,48 +80,65 @@ def test_an_e_stop_ends_a_run_only_if_asked_to():
         watched("armed", RUNNING, PRESSED, RUNNING, FINISHED, end_on_estop=True)
 
 
-class Landing:
-    """Plays what a plant's safe controller does, one report for each look."""
+class Plant:
+    """A plant that flies down once it is asked to end, by one look after the other, and then has ended."""
 
-    def __init__(self, *does: str, silent_s: float = 0.0) -> None:
-        self.does, self._silent_s = list(does), silent_s
+    def __init__(self, *, looks: int = 3, mode: str = "running", silent_s: float = 0.0) -> None:
+        self._looks, self._silent_s, self.asked = looks, silent_s, 0
+        self.plant = Report(values={"mode": mode}, received_s=time.monotonic())
+        self.specs = {"plant": replace(ROW, ends_within_s=20.0)}
 
-    @property
-    def plant(self) -> Report:
-        now = self.does.pop(0) if len(self.does) > 1 else self.does[0]
-        return Report("error", "", {"safe_controller": now}, time.monotonic() - self._silent_s)
-
-
-class Plants:
-    """A plant that lives, or has ended."""
-
-    def __init__(self, code: int | None = None) -> None:
-        self._code = code
-
-    def process(self, name: str) -> Plants:
+    def process(self, name: str) -> Plant:
         assert name == "plant"
         return self
 
+    def ask_to_stop(self, name: str) -> None:
+        assert name == "plant"
+        self.asked += 1
+
     def poll(self) -> int | None:
-        return self._code
+        self._looks -= 1 if self.asked else 0
+        return 0 if self._looks < 0 else None
+
+    def listen(self) -> None:
+        pass
+
+    def silent_s(self, report: Report) -> float:
+        return self._silent_s
 
 
-def test_what_cannot_stop_is_flown_down_before_its_plant_is_stopped():
-    landing = Landing("holds its height", "descends", "descends", DOWN)
-    _let_it_land(landing, Plants())
-    assert landing.does == [DOWN]
+ROW = NodeSpec("plant", "x", "x", "x", "/x")
+
+
+def test_what_cannot_stop_is_asked_to_land_once_and_is_waited_for():
+    plant = Plant()
+    _bring_down(plant, plant)
+    assert plant.asked == 1
+    assert plant.poll() == 0
 
 
 @pytest.mark.parametrize(
-    ("landing", "plants"),
-    [
-        (Landing(""), Plants()),
-        (Landing("descends"), Plants(-9)),
-        (Landing("descends", silent_s=60.0), Plants()),
-    ],
-    ids=["stands", "plant has ended", "plant hangs"],
+    "plant", [Plant(mode="inactive"), Plant(silent_s=60.0)], ids=["does not run", "hangs"]
 )
-def test_a_run_does_not_wait_for_a_landing_that_nobody_flies(landing, plants):
+def test_nobody_waits_for_a_landing_that_nobody_flies(plant):
     began = time.monotonic()
-    _let_it_land(landing, plants)
+    _bring_down(plant, plant)
     assert time.monotonic() - began < 0.5
+
+
+def test_ctrl_c_cuts_a_landing_short_and_leaves_the_reason_of_the_end(monkeypatch):
+    plant = Plant(looks=1000)
+    monkeypatch.setattr("fulmar_bringup.run_executor.time.sleep", interrupt)
+    _bring_down(plant, plant)
+    assert plant.poll() is None
+
+
+def interrupt(_seconds: float) -> None:
+    raise KeyboardInterrupt
+
+
+def test_only_the_plant_of_what_cannot_stop_lands():
+    aircraft = RunPlan("airship_v7", "fly_hold", "lqi", "mujoco", 50.0)
+    lands = [plant_spec(plan).ends_within_s for plan in (aircraft, replace(aircraft, lockstep=True), PLAN)]
+    assert lands[0] > LANDS_S
+    assert lands[1:] == [0.0, 0.0]

@@ -96,8 +96,8 @@ class BagWriter:
     @property
     def counts(self) -> BagCounts:
         """Messages that this writer was given, and all files, those of an interrupted bag among them."""
-        parts = (*self._finished, self._part)
-        return BagCounts(self._written, self._flushed, len(parts), sum(part.size for part in parts))
+        sizes = [*(part.size for part in self._finished), self._part.size]
+        return BagCounts(self._written, self._flushed, len(sizes), sum(sizes))
 
     @property
     def waiting(self) -> int:
@@ -209,7 +209,8 @@ class BagWriter:
             TopicCount(t.name, t.type.name, t.type.hash, offered_qos(t.delivery), t.messages)
             for t in self._topics.values()
         ]
-        spans: dict[str, BagSpan] = {part.name: part.span for part in (*self._finished, self._part)}
+        spans: dict[str, BagSpan] = {part.name: part.span for part in self._finished}
+        spans[self._part.name] = self._part.span
         custom = {RUN_RECORD: self._records[RUN_RECORD][RUN_KEY], **self._notes}
         write_metadata(self.directory, spans, topics, custom)
 

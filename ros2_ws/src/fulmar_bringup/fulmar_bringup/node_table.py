@@ -8,6 +8,7 @@ from pathlib import Path
 from fulmar_bringup.emulation import Emulation
 from fulmar_bringup.estimator_rows import estimator_specs, robot_row, simulates_without_noise
 from fulmar_bringup.run_plan import NodeSpec, Parameter, RunPlan
+from fulmar_core.actuators.refuge import LANDS_S
 from fulmar_core.estimation.kinds import estimator_kind, load_estimator
 from fulmar_core.recording import Recording
 from fulmar_core.robot import load_robot
@@ -40,6 +41,7 @@ from fulmar_core.topics import (
 from hardware_drivers.hardware import load_hardware
 from policy_server.controllers import controller_entry
 
+STOPS_S = 4.0  # for a plant to end once its robot is down [s]
 MODEL = (
     DESCRIPTION.name,
     TRANSFORMS.name,
@@ -172,6 +174,7 @@ def plant_spec(plan: RunPlan, *, port: str = "") -> NodeSpec:
         plan: What to run.
         port: Where the device is, in the place of what the hardware file says.
     """
+    lands_s = LANDS_S + STOPS_S if load_robot(plan.robot).flies and not plan.lockstep else 0.0
     parameters: dict[str, Parameter] = {
         "robot": plan.robot,
         "task": plan.task,
@@ -214,6 +217,7 @@ def plant_spec(plan: RunPlan, *, port: str = "") -> NodeSpec:
             outputs=tuple(
                 dict.fromkeys((ACTUATORS_STATE.name, *_sensor_topics(plan), paced_wire(plan).name, *MODEL))
             ),
+            ends_within_s=lands_s,
         )
     parameters |= _motion_capture(plan)
     things = tuple(thing.wire.name for thing in load_task(plan.task).things)
@@ -237,6 +241,7 @@ def plant_spec(plan: RunPlan, *, port: str = "") -> NodeSpec:
             *period,
             *MODEL,
         ),
+        ends_within_s=lands_s,
     )
 
 
@@ -299,6 +304,7 @@ def recorder_spec(plan: RunPlan, *, directory: str = "", info: str = "", files: 
         | ({"lossless": True} if chain_of(plan) else {})
         | ({"things": [thing.name for thing in things]} if things else {}),
         observed=tuple(wire.name for wire in (*WIRES, *(thing.wire for thing in things)) if wire.recorded),
+        loss=plan.loss_of_helpers,
     )
 
 
@@ -313,6 +319,7 @@ def guard_specs(plan: RunPlan) -> tuple[NodeSpec, ...]:
                 "fulmar_ros.estop_node",
                 {"robot": plan.robot} | ({"pressed": True} if plan.unattended else {}),
                 outputs=(ESTOP.name,),
+                loss=plan.loss_of_helpers,
             )
         )
     return (*nodes, *estimator_specs(plan))

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from fulmar_bringup.estimator_rows import robot_row
 from fulmar_bringup.goal_plan import goal_rate, is_path_of_places
+from fulmar_bringup.node_loss import RESTARTS
 from fulmar_bringup.run_plan import NodeSpec, Parameter, RunPlan, node_row
 from fulmar_core.robot_name import namespace_of
 from fulmar_core.safety.geofence import NO_AREA
@@ -65,7 +66,12 @@ def run_goals_spec(plan: RunPlan) -> NodeSpec:
         control_hz=goal_rate(plan.control_hz),
     )
     more: dict[str, Parameter] = {"stay": True, "lockstep": plan.lockstep, "rate": plan.rate}
-    return replace(spec, parameters=spec.parameters | more, remappings=dict(plan.remappings))
+    return replace(
+        spec,
+        parameters=spec.parameters | more,
+        remappings=dict(plan.remappings),
+        loss=plan.loss_of_helpers,
+    )
 
 
 def markers_spec(plan: RunPlan) -> NodeSpec:
@@ -83,6 +89,7 @@ def markers_spec(plan: RunPlan) -> NodeSpec:
         observed=(*goals, OBSTACLES.name, ACTUATORS_STATE.name, STATUS.name, DIAGNOSTICS.name),
         outputs=(MARKERS.name,),
         optional=True,
+        loss=RESTARTS,
     )
 
 

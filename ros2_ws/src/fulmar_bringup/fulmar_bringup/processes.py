@@ -17,11 +17,12 @@ from typing import IO
 
 import psutil
 
-from fulmar_bringup.console import log_line, printable
+from fulmar_bringup.console import printable
 from fulmar_bringup.run_plan import NodeSpec, Parameter
 from fulmar_ros.middleware import middleware_environment
 
 PATIENCE_S = 4.0  # for an orderly end, before it is no longer asked for
+KILL_S = 2.0  # for a process to be gone after SIGKILL [s]
 LAST_WORDS_S = 1.0  # for what a child that ended has left in the pipe; a grandchild may keep it open
 
 
@@ -52,9 +53,7 @@ class ProcessGroup:
         self._environment = {**os.environ, **child_environment(), **(environment or {})}
         self._children: dict[str, psutil.Popen] = {}
         self._relays: dict[str, _Relay] = {}
-        self._optional: dict[
-            str, bool
-        ] = {}  # nodes that a system goes on without: whether their end was reported
+        self._specs: dict[str, NodeSpec] = {}
 
     def start(self, spec: NodeSpec) -> None:
         """Start one node in a process of its own."""
@@ -67,34 +66,54 @@ class ProcessGroup:
             start_new_session=True,  # Ctrl-C reaches us alone; we stop the children in order
         )
         self._relays[spec.name] = _Relay(spec.name, child.stdout)
-        if spec.optional:
-            self._optional[spec.name] = False
+        self._specs[spec.name] = spec
         self._children[spec.name] = child
         self._relays[spec.name].start()
+
+    def start_again(self, spec: NodeSpec) -> None:
+        """Start a node in the place of its process that has ended or hangs; it keeps its place among the others."""
+        old = self._children[spec.name]
+        if old.poll() is None:
+            old.kill()
+            old.wait(KILL_S)
+        self.start(spec)
 
     def process(self, name: str) -> psutil.Popen:
         """A child that was started."""
         return self._children[name]
 
+    @property
+    def specs(self) -> dict[str, NodeSpec]:
+        """Rows of the children that were started and not stopped, by name."""
+        return {name: self._specs[name] for name in self._children}
+
     def ended(self) -> Ended | None:
-        """The first child found to have ended, or None; the end of an optional one is printed once, and no end."""
+        """The first child found to have ended, or None; the end of an optional one is no end."""
         for name, child in self._children.items():
             code = child.poll()
-            if code is None:
-                continue
-            if name not in self._optional:
+            if code is not None and not self._specs[name].optional:
                 return Ended(name, code)
-            if not self._optional[name]:
-                self._optional[name] = True
-                log_line(f"{Ended(name, code).text}; the system goes on without it")
         return None
+
+    def is_stopped(self, name: str) -> bool:
+        """Whether a child was stopped in its tracks, as by SIGSTOP."""
+        try:
+            return bool(self._children[name].status() == psutil.STATUS_STOPPED)
+        except psutil.NoSuchProcess:
+            return False
+
+    def ask_to_stop(self, name: str) -> None:
+        """Ask a child to end in order, and do not wait."""
+        child = self._children.get(name)
+        if child is not None and child.poll() is None:
+            child.send_signal(signal.SIGTERM)
 
     def stop(self, *names: str) -> list[Ended]:
         """Stop children by name, asked first, then killed; returns how each ended, also before."""
         chosen = [(name, self._children[name]) for name in names if name in self._children]
         killed: set[int] = set()
         # Not SIGINT: it ends a node that still imports its modules with a traceback, SIGTERM without a word.
-        for number, patience_s in ((signal.SIGTERM, PATIENCE_S), (signal.SIGKILL, 2.0)):
+        for number, patience_s in ((signal.SIGTERM, PATIENCE_S), (signal.SIGKILL, KILL_S)):
             alive = [child for _, child in chosen if child.poll() is None]
             for child in alive:
                 # A stopped process only reacts to SIGKILL.
@@ -108,7 +127,7 @@ class ProcessGroup:
             if self._relays[name].ident is not None:  # Ctrl-C may have come before it was started
                 self._relays[name].join(LAST_WORDS_S)
         return [
-            Ended(name, child.poll(), forced=child.pid in killed, optional=name in self._optional)
+            Ended(name, child.poll(), forced=child.pid in killed, optional=self._specs[name].optional)
             for name, child in chosen
         ]
 

@@ -16,6 +16,7 @@ from fulmar_bringup.bag_origin import attachments, run_info
 from fulmar_bringup.console import log_line
 from fulmar_bringup.domains import claimed_domain
 from fulmar_bringup.goal_plan import is_endless, shown_path
+from fulmar_bringup.node_keeper import NodeKeeper, OnRestart, Restart
 from fulmar_bringup.planning import RunRequest
 from fulmar_bringup.processes import Ended, ProcessGroup
 from fulmar_bringup.progress import state_words, time_bar
@@ -30,7 +31,7 @@ from fulmar_bringup.run_plan import NodeSpec, RunPlan
 from fulmar_bringup.supervisor import Report, Supervisor, supervisor
 from fulmar_bringup.system_events import distance_of, mode_of
 from fulmar_bringup.system_rows import system_rows
-from fulmar_core.actuators.refuge import DOWN
+from fulmar_core.actuators.refuge import LANDS_S
 from fulmar_core.errors import BAD_USAGE, ConfigError, RunFailed
 from fulmar_core.goal_files import load_goals
 from fulmar_core.robot import load_robot
@@ -46,7 +47,6 @@ STOPPED = "stopped by the user"
 LAST_WORDS_S = 0.5  # after a controller died, the plant still shows that its actuators are safe
 SILENT_S = 2.0  # a controller without a status for so long hangs, in real time
 PLANT_SILENT_S = 3.0  # the same for a plant, which publishes its status once a second
-LANDS_S = 300.0  # for a safe controller to bring a craft down, which at 0.4 m/s is from 100 m
 LOCKSTEP_SILENT_S = 10.0  # in lock step both are busy, and a plant itself waits 5 s for an answer
 
 
@@ -56,6 +56,7 @@ class Execution:
 
     failure: str  # why it did not come to its planned end; empty if it did
     plant_steps: int  # commands that the plant received in lock step
+    warnings: tuple[str, ...] = ()  # of the launcher, such as nodes that it started again
 
 
 def execute(request: RunRequest) -> Execution:
@@ -69,16 +70,20 @@ def execute(request: RunRequest) -> Execution:
     return run_nodes(request, _watch)
 
 
-Watch = Callable[[RunRequest, RunPlan, Supervisor, ProcessGroup], str]
+Watch = Callable[[RunRequest, RunPlan, Supervisor, ProcessGroup, NodeKeeper], str]
 
 
-def run_nodes(request: RunRequest, watch: Watch) -> Execution:
+def run_nodes(request: RunRequest, watch: Watch, on_restart: OnRestart = lambda *_: None) -> Execution:
     """Start every node of a request, watch them, and stop them in order.
+
+    What cannot stop is brought to the ground before its plant ends, whatever ended the run. A second Ctrl-C cuts that
+    short.
 
     Args:
         request: What to run.
         watch: Called once the processes are started; gets them ready, waits for the end, and returns why the run
             failed, empty if it did not.
+        on_restart: Called with the name of a node that was started again, and why.
 
     Raises:
         ConfigError: As of `execute`.
@@ -87,13 +92,13 @@ def run_nodes(request: RunRequest, watch: Watch) -> Execution:
     if request.plan.hardware and not request.plan.emulated:
         check_presence(load_hardware(request.plan.hardware).driver)
     with claimed_domain(request.plan.robot_name, request.plan.only):
-        return _run(request, watch)
+        return _run(request, watch, on_restart)
 
 
-def _run(request: RunRequest, watch: Watch) -> Execution:
+def _run(request: RunRequest, watch: Watch, on_restart: OnRestart) -> Execution:
     plan = replace(request.plan, supervised=True)
     group = ProcessGroup()
-    failure, plant, ends = "", Report(), list[Ended]()
+    failure, plant, ends, restarts = "", Report(), list[Ended](), list[Restart]()
     folders = contextlib.ExitStack()
     try:
         folder = tempfile.TemporaryDirectory(prefix="fulmar_", ignore_cleanup_errors=True)
@@ -108,14 +113,19 @@ def _run(request: RunRequest, watch: Watch) -> Execution:
                 for spec in specs:
                     group.start(spec)
             plant = overseer.plant
+            keeper = NodeKeeper(group, overseer, on_restart)
+            restarts = keeper.restarts
             try:
-                failure = watch(request, plan, overseer, group)
+                failure = watch(request, plan, overseer, group, keeper)
             except TwinRunError:  # before anything has run
                 _withdraw(group, specs, request.record)
                 raise
             except KeyboardInterrupt as stop:
                 failure = str(stop) or STOPPED
-                overseer.stop_plant()  # a plant that goes on would miss the commands of a controller that ends
+                if not _lands(group):
+                    overseer.stop_plant()  # one that goes on would miss the commands of a controller that ends
+            if _lands(group):
+                _bring_down(overseer, group)
             # The controller first: the plant then shows that its actuators are safe, and the recorder sees it.
             ends += group.stop("controller")
             ends += group.stop("plant")
@@ -127,7 +137,8 @@ def _run(request: RunRequest, watch: Watch) -> Execution:
     if any(end.name == "plant" and end.returncode == BAD_USAGE for end in ends):
         shutil.rmtree(request.record, ignore_errors=True)  # nothing has run
         raise ConfigError(failure)
-    return Execution(_with_ends(failure, ends), int(plant.values.get("steps", 0)))
+    warnings = tuple(restart.warning for restart in restarts)
+    return Execution(_with_ends(failure, ends), int(plant.values.get("steps", 0)), warnings)
 
 
 def _withdraw(group: ProcessGroup, specs: list[NodeSpec], record: Path) -> None:
@@ -148,7 +159,9 @@ def _with_ends(failure: str, ends: list[Ended]) -> str:
     return "; ".join([*([failure] if failure else []), *(f"{end.text} when it was stopped" for end in bad)])
 
 
-def _watch(request: RunRequest, plan: RunPlan, overseer: Supervisor, group: ProcessGroup) -> str:
+def _watch(
+    request: RunRequest, plan: RunPlan, overseer: Supervisor, group: ProcessGroup, keeper: NodeKeeper
+) -> str:
     """Start the run and wait for its end; returns why it failed, or an empty text."""
     external = controller_entry(plan.controller).is_external
     try:
@@ -168,32 +181,40 @@ def _watch(request: RunRequest, plan: RunPlan, overseer: Supervisor, group: Proc
         if external:
             wait_for_reader(plan, overseer, lambda: raise_if_ended(group))
         with time_bar("running", plan.duration_s) as moved:
-            _wait_for_end(plan, overseer, group, moved, end_on_estop=request.end_on_estop)
+            _wait_for_end(plan, overseer, keeper, moved, end_on_estop=request.end_on_estop)
     except RunFailed as error:
         time.sleep(LAST_WORDS_S)
-        reason = with_plant_reaction(str(error), overseer)
-        with contextlib.suppress(KeyboardInterrupt):  # which ends the descent, and leaves the reason as it is
-            _let_it_land(overseer, group)
-        return reason
+        return with_plant_reaction(str(error), overseer)
     return ""
 
 
-def _let_it_land(overseer: Supervisor, group: ProcessGroup) -> None:
-    """Let the plant of what cannot stop bring it down before the plant, too, is stopped."""
-    until_s = time.monotonic() + LANDS_S
-    if overseer.plant.values.get("safe_controller", "") not in ("", DOWN):
-        log_line(f"the safe controller flies the robot down, within {LANDS_S:g} s; Ctrl-C ends it at once")
-    while overseer.plant.values.get("safe_controller", "") not in ("", DOWN):
-        ended, silent_s = group.process("plant").poll(), time.monotonic() - overseer.plant.received_s
-        if ended is not None or silent_s > PLANT_SILENT_S or time.monotonic() > until_s:
-            return
-        time.sleep(0.1)
+def _lands(group: ProcessGroup) -> bool:
+    """Whether the plant flies what cannot stop, which it brings down before it ends."""
+    return "plant" in group.specs and group.specs["plant"].ends_within_s > 0.0
+
+
+def _bring_down(overseer: Supervisor, group: ProcessGroup) -> None:
+    """Ask the plant of what cannot stop to end, and wait while it flies down; Ctrl-C cuts that short.
+
+    Nobody waits for a plant that has ended or hangs, nor for one that does not run.
+    """
+    plant, until_s = group.process("plant"), time.monotonic() + group.specs["plant"].ends_within_s
+    if overseer.plant.values.get("mode") != "running" or overseer.silent_s(overseer.plant) > PLANT_SILENT_S:
+        return
+    log_line(f"the safe controller flies the robot down, within {LANDS_S:g} s; Ctrl-C ends it at once")
+    group.ask_to_stop("plant")
+    with contextlib.suppress(KeyboardInterrupt):  # the reason of the run's end stays as it is
+        overseer.listen()
+        while plant.poll() is None and time.monotonic() < until_s:
+            if overseer.silent_s(overseer.plant) > PLANT_SILENT_S:
+                return
+            time.sleep(0.1)
 
 
 def _wait_for_end(
     plan: RunPlan,
     overseer: Supervisor,
-    group: ProcessGroup,
+    keeper: NodeKeeper,
     moved: Callable[[float, str], None],
     *,
     end_on_estop: bool,
@@ -202,6 +223,7 @@ def _wait_for_end(
     began = time.monotonic()
     plant_limit_s, controller_limit_s = silence_limits_s(plan)
     limit_s = 30.0 + 1.5 * plan.duration_s / plan.rate + (plan.duration_s if plan.lockstep else 0.0)
+    limit_s += LANDS_S if plan.hardware and load_robot(plan.robot).flies else 0.0
 
     def failed() -> bool:
         message = overseer.plant.message
@@ -211,15 +233,15 @@ def _wait_for_end(
         return overseer.plant.level == "error" and not (held or waits)
 
     def running() -> None:
-        raise_if_ended(group)
+        keeper.look()
         plant, controller = overseer.plant, overseer.controller
         moved(passed_s(plan, plant), state_words(distance_of(controller.values), mode_of(plant, controller)))
         if failed():
             raise RunFailed(f"plant: {overseer.plant.message}")
         if overseer.controller.level == "error":
             raise RunFailed(f"controller: {overseer.controller.message}")
-        raise_if_silent("controller", overseer.controller, controller_limit_s)
-        raise_if_silent("plant", overseer.plant, plant_limit_s)
+        raise_if_silent("controller", overseer.silent_s(controller), controller_limit_s)
+        raise_if_silent("plant", overseer.silent_s(plant), plant_limit_s)
         if time.monotonic() - began > limit_s:
             raise RunFailed(f"the run did not end within {limit_s:.0f} s of wall-clock time")
 
@@ -250,10 +272,9 @@ def silence_limits_s(plan: RunPlan) -> tuple[float, float]:
     return PLANT_SILENT_S, max(SILENT_S, 3.0 / (plan.control_hz * plan.rate))
 
 
-def raise_if_silent(name: str, report: Report, limit_s: float) -> None:
-    """Raise RunFailed for a node that has reported and then fell silent for longer than a limit [s]."""
-    silent_s = time.monotonic() - report.received_s
-    if report.received_s and silent_s > limit_s:
+def raise_if_silent(name: str, silent_s: float, limit_s: float) -> None:
+    """Raise RunFailed for a node that has been silent for longer than a limit [s]."""
+    if silent_s > limit_s:
         raise RunFailed(f"{name}: has not reported for {silent_s:.1f} s; it hangs")
 
 

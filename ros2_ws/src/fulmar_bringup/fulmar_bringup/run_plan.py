@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from fulmar_bringup.node_loss import ENDS, RESTARTS
 from fulmar_bringup.system import NONE, Guards
 from fulmar_core.estimation.kinds import KINDS
 from fulmar_core.recording import Recording
@@ -35,7 +36,9 @@ class NodeSpec:
     inputs: tuple[str, ...] = ()  # topics without which it is of no use
     outputs: tuple[str, ...] = ()  # topics that it publishes
     observed: tuple[str, ...] = ()  # topics that it receives if they are there
-    optional: bool = False  # no node waits for it, and its end does not end the system
+    optional: bool = False  # no node waits for it
+    loss: str = ENDS  # what its loss means: one of `node_loss.LOSSES`
+    ends_within_s: float = 0.0  # that an orderly end may take; 0: as any node's [s]
 
 
 def node_row(
@@ -85,6 +88,11 @@ class RunPlan:
     only: str = ""  # plant or controller: the other one runs in another place; empty: both
     nodes: tuple[NodeSpec, ...] = ()  # of the system's own, beside those that every system has
     markers: bool = False  # a node draws goal, limits and thrust for viewers
+
+    @property
+    def loss_of_helpers(self) -> str:
+        """What the loss of a node means that takes no robot's control away; lock step waits for nobody's return."""
+        return ENDS if self.lockstep else RESTARTS
 
     @property
     def robot_name(self) -> str:

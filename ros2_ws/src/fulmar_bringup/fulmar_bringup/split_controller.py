@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import socket
-import time
 
 from fulmar_bringup.console import log_line
 from fulmar_bringup.domains import claimed_domain
@@ -119,7 +118,7 @@ def _follow(
     began = plant.values.get(STARTED_NS, "")
 
     def lost() -> str:
-        if time.monotonic() - plant.received_s > plant_limit_s:
+        if overseer.silent_s(plant) > plant_limit_s:
             return f"has not reported for {plant_limit_s:g} s; the controller waits for it to come back"
         if plant.values.get(STARTED_NS, "") != began:
             return "was started again; a new controller begins without a goal"
@@ -133,7 +132,7 @@ def _follow(
 
     def running() -> None:
         raise_if_ended(group)
-        raise_if_silent("controller", controller, controller_limit_s)
+        raise_if_silent("controller", overseer.silent_s(controller), controller_limit_s)
 
     overseer.wait_until(report, running)
     return lost()

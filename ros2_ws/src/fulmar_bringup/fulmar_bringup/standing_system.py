@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from fulmar_bringup.console import log_line
+from fulmar_bringup.node_keeper import NodeKeeper
 from fulmar_bringup.planning import RunRequest, chosen_recording, plan_run
 from fulmar_bringup.processes import ProcessGroup
 from fulmar_bringup.readiness import raise_if_ended, wait_for_publisher, wait_for_reader, while_starting
@@ -157,13 +158,15 @@ def keep_up(request: RunRequest, emit: Emit, show: Show) -> Ending:
     """
     stopped, plant_report = "", Report()
 
-    def watch(request: RunRequest, plan: RunPlan, overseer: Supervisor, group: ProcessGroup) -> str:
+    def watch(
+        request: RunRequest, plan: RunPlan, overseer: Supervisor, group: ProcessGroup, keeper: NodeKeeper
+    ) -> str:
         nonlocal stopped, plant_report
         plant_report = overseer.plant
         try:
             _get_ready(request, plan, overseer, group)
             emit("started", **described(plan), name=plan.robot_name, bag=str(request.record))
-            _follow(plan, overseer, group, SystemEvents(emit), show)
+            _follow(plan, overseer, keeper, SystemEvents(emit), show)
         except RunFailed as error:
             time.sleep(LAST_WORDS_S)
             return with_plant_reaction(str(error), overseer)
@@ -173,7 +176,10 @@ def keep_up(request: RunRequest, emit: Emit, show: Show) -> Ending:
             raise
         return ""
 
-    failure = run_nodes(request, watch).failure
+    def restarted(node: str, reason: str) -> None:
+        emit("restarted", time_s=round(passed_s(request.plan, plant_report), 3), node=node, reason=reason)
+
+    failure = run_nodes(request, watch, restarted).failure
     asked = re.fullmatch(rf"{STOPPED}|stopped by SIG[A-Z]+", failure)  # also while the nodes still start
     return Ending("" if asked else failure, trips_of(plant_report))
 
@@ -224,9 +230,9 @@ def _get_ready(request: RunRequest, plan: RunPlan, overseer: Supervisor, group: 
 
 
 def _follow(
-    plan: RunPlan, overseer: Supervisor, group: ProcessGroup, events: SystemEvents, show: Show
+    plan: RunPlan, overseer: Supervisor, keeper: NodeKeeper, events: SystemEvents, show: Show
 ) -> None:
-    """Report what happens, until a node ends or falls silent.
+    """Report what happens, until a node ends or falls silent without which the robot must end.
 
     Raises:
         RunFailed: One did.
@@ -242,9 +248,9 @@ def _follow(
         return False
 
     def running() -> None:
-        raise_if_ended(group)
+        keeper.look()
         if remote is None:
-            raise_if_silent("controller", controller, controller_limit_s)
-        raise_if_silent("plant", plant, plant_limit_s)
+            raise_if_silent("controller", overseer.silent_s(controller), controller_limit_s)
+        raise_if_silent("plant", overseer.silent_s(plant), plant_limit_s)
 
     overseer.wait_until(report, running)

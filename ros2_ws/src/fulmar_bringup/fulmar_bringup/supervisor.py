@@ -36,6 +36,7 @@ START_TIMEOUT_S = 30.0
 REPEAT_S = 0.5  # after an e-stop was silent, before the goal is published again
 SUBSCRIBES_S = 1.0  # for an external controller that publishes already to subscribe its goal
 STOP_S = 1.0  # for a plant to come to rest when a run is stopped
+PAUSE_S = 1.0  # between two looks of ours; after a longer one we were stopped ourselves
 REFUSAL_WORDS_S = 1.0  # for the reason of a refusal, which comes another way than the refusal itself
 
 
@@ -62,6 +63,8 @@ class Supervisor:
         self._node, self._plan, self._task = node, plan, task
         self._made_s = time.monotonic()
         self.plant, self.controller, self.recorder = Report(), Report(), Report()
+        self._reports = {"plant": self.plant, "controller": self.controller, "recorder": self.recorder}
+        self._looked_s = self._listens_s = time.monotonic()
         self._changed = threading.Condition()
         self._errors: list[Exception] = [] if errors is None else errors
         self.fail = self._errors.append  # gives up the wait of whoever waits
@@ -94,12 +97,13 @@ class Supervisor:
         refuse_twins(self._node, self._plan.namespace, NODES)
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
+        own = f"{self._plan.robot_name}: "
         for status in message.status:
-            parts = {"plant": self.plant, "controller": self.controller, "recorder": self.recorder}
-            part = parts.get(status.name.removeprefix(f"{self._plan.robot_name}: "))
-            if part is None:
+            name = status.name.removeprefix(own)
+            if not (status.name.startswith(own) or name in self._reports):
                 continue
             with self._changed:
+                part = self._reports.setdefault(name, Report())
                 part.level = {DiagnosticStatus.OK: "ok", DiagnosticStatus.WARN: "warn"}.get(
                     status.level, "error"
                 )
@@ -107,6 +111,30 @@ class Supervisor:
                 part.values = {pair.key: pair.value for pair in status.values}
                 part.received_s = time.monotonic()
                 self._changed.notify_all()
+
+    def report_of(self, node: str) -> Report:
+        """The newest status of a node of this robot, by its name; an empty one before its first."""
+        return self._reports.get(node, Report())
+
+    def silent_s(self, report: Report) -> float:
+        """How long a node has been silent since its last status [s]; 0 before its first.
+
+        Time in which this process did not listen, since it was stopped itself, does not count.
+        """
+        if not report.received_s:
+            return 0.0
+        return time.monotonic() - max(report.received_s, self._listens_s)
+
+    def listen(self) -> None:
+        """Count silences from now on, since nobody has looked at them for a while."""
+        self._looked_s = self._listens_s = time.monotonic()
+
+    def _notice_own_pause(self) -> None:
+        """Begin to count silences anew where this process did not look for a while."""
+        now = time.monotonic()
+        if now - self._looked_s > PAUSE_S:
+            self._listens_s = now
+        self._looked_s = now
 
     def give_goal(self, goal: Goal, *, time_ns: int, alive: Callable[[], None], listeners: int = 1) -> None:
         """Publish a goal, with the obstacles if the task has any, and wait until the controller has them.
@@ -272,8 +300,10 @@ class Supervisor:
 
     def wait_until(self, condition: Callable[[], bool], alive: Callable[[], None]) -> None:
         """Wait for a condition, checked with each report; `alive` runs ten times a second and raises to give up."""
+        self._notice_own_pause()
         with self._changed:
             while not self._changed.wait_for(condition, 0.1):
+                self._notice_own_pause()
                 if self._errors:
                     raise RunFailed(f"the supervisor failed: {self._errors[0]!r}") from self._errors[0]
                 alive()

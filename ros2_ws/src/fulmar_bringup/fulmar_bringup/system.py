@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from fulmar_bringup.node_loss import ENDS, LOSSES
 from fulmar_core.config import load_config
 from fulmar_core.controllers.classical import default_gains_note
 from fulmar_core.errors import ConfigError, UnknownNameError, did_you_mean
@@ -66,6 +67,12 @@ class OwnNode:
     inputs: tuple[str, ...] = ()  # topics without which it is of no use
     outputs: tuple[str, ...] = ()  # topics that it publishes
     parameters: dict[str, Any] = field(default_factory=dict)
+    loss: str = ENDS  # restarts: it is started again when it ends; ends: the robot ends
+
+    def __post_init__(self) -> None:
+        """Refuse a loss that has no meaning."""
+        if self.loss not in LOSSES:
+            raise ValueError(f"'loss' = '{self.loss}' must be one of {', '.join(LOSSES)}.")
 
 
 @dataclass(frozen=True)

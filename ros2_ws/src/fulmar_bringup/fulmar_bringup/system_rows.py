@@ -91,7 +91,15 @@ def own_nodes(system: System) -> tuple[NodeSpec, ...]:
     """Rows of the nodes that a system file names beside those that every system has."""
     space = namespace_of(system.name or system.robot)
     return tuple(
-        node_row(space, node.name, node.module, node.parameters, inputs=node.inputs, outputs=node.outputs)
+        node_row(
+            space,
+            node.name,
+            node.module,
+            node.parameters,
+            inputs=node.inputs,
+            outputs=node.outputs,
+            loss=node.loss,
+        )
         for node in system.nodes
     )
 

@@ -11,7 +11,10 @@ from launch_ros.parameter_descriptions import ParameterValue
 
 from fulmar_bringup.launch_check import refuse_living_plants
 from fulmar_bringup.launched_system import list_nodes
+from fulmar_bringup.node_loss import RESTARTS
 from fulmar_bringup.run_plan import NodeSpec
+
+RESPAWN_S = 1.0  # before a helper that has ended is started again [s]
 
 ARGUMENTS = {
     "system": "a file of configs/systems, without .yaml",
@@ -31,12 +34,14 @@ ARGUMENTS = {
 
 
 def to_node(spec: NodeSpec) -> Node:
-    """Translate one row of the node table; the end of any node that is not optional ends the launch."""
+    """Translate one row of the node table: the end of a helper starts it again, that of any other ends the launch."""
     # Without its type, launch_ros would read a text such as "7" or "on" as YAML.
     parameters = {
         key: ParameterValue(value, value_type=str) if isinstance(value, str) else value
         for key, value in spec.parameters.items()
     }
+    # An aircraft lands before its plant ends; a second Ctrl-C ends it at once.
+    patience = {"sigterm_timeout": str(spec.ends_within_s)} if spec.ends_within_s else {}
     return Node(
         package=spec.package,
         executable=spec.executable,
@@ -45,7 +50,10 @@ def to_node(spec: NodeSpec) -> Node:
         parameters=[parameters] if parameters else [],
         remappings=list(spec.remappings.items()),
         output="screen",
-        on_exit=[] if spec.optional else Shutdown(reason=f"{spec.name} ended"),
+        on_exit=[] if spec.loss == RESTARTS else Shutdown(reason=f"{spec.name} ended"),
+        respawn=spec.loss == RESTARTS,
+        respawn_delay=RESPAWN_S,
+        **patience,
     )
 
 

@@ -57,6 +57,7 @@ def evaluate_execution(request: RunRequest, execution: Execution) -> RunOutcome:
     except FulmarError as error:
         failure, summary = failure or str(error), summarise(_nothing_recorded(request))
         summary["bag"] = str(request.record) if request.record.exists() else None
+    summary["warnings"] = [*summary["warnings"], *dict.fromkeys(execution.warnings)]
     external = controller_entry(request.plan.controller).is_external
     if not failure and not ring and external and not summary["steps"]:
         failure = f"no command came on {command_input(request.plan).topic}: your controller published none"

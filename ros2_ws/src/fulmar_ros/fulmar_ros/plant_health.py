@@ -95,6 +95,8 @@ class PlantHealth:
         """Level, message, and the part of the message whose change counts."""
         if self.mode == "fault":
             return "error", self.reason, "fault"
+        if self.mode == "running" and self._guard.handed_over:
+            return "warn", f"the plant is about to end: {self._refuge()}", "ends"
         held = self._held()
         if held:
             return "error", f"{held}: {self._refuge()} until `{GIVE_BACK_BY}`", held

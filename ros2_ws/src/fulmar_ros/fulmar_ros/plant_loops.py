@@ -8,6 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from fulmar_core.actuators.refuge import DOWN
 from fulmar_core.backend import AirBearing, Backend, Sample
 from fulmar_core.errors import LockstepError
 from fulmar_core.flight.refuge import refuge_of
@@ -224,12 +225,16 @@ class RealtimeLoop:
         self.ticks = 0
         self._ticked_ns: int | None = None
 
-    def run(self, sample: Sample, ticks: int | None, stop: threading.Event) -> None:
-        """Tick from the first sample until `ticks` are done, None for no end, or `stop` is set."""
+    def run(self, sample: Sample, ticks: int | None, stop: threading.Event, *, lands: bool = False) -> None:
+        """Tick from the first sample until `ticks` are done, None for no end, or `stop` is set.
+
+        A safe controller that brings the robot to the ground is not cut short by the last tick. `lands`: it begins to
+        do so there.
+        """
         take_priority(PLANT_PRIORITY)
         self._ticked_ns = time.monotonic_ns()
         self._wires.publish_sample(sample, self._clock.now_ns)
-        while (ticks is None or self.ticks < ticks) and self.deadlines.wait(stop):
+        while self._goes_on(ticks, lands=lands) and self.deadlines.wait(stop):
             command, begun_ns = self._command(sample), self._clock.now_ns
             sample = self._backend.step(command)
             applied = command if sample.applied is None else sample.applied
@@ -238,6 +243,15 @@ class RealtimeLoop:
             self.ticks += 1
             self._ticked_ns = time.monotonic_ns()
             self._wires.publish_sample(sample, self._clock.now_ns)
+
+    def _goes_on(self, ticks: int | None, *, lands: bool) -> bool:
+        if ticks is None or self.ticks < ticks:
+            return True
+        with self._wires.lock:
+            if lands and not self._guard.handed_over:
+                self._guard.hand_over(time.monotonic_ns())
+                return True  # one tick more, by which the safe controller begins
+            return self._guard.handed_over and self._guard.doing not in ("", DOWN)
 
     def since_tick_s(self, now_ns: int) -> float:
         """Time since the last finished step, 0 before the first [s]; `now_ns` by the monotonic clock."""

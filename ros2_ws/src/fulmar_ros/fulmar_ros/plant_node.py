@@ -9,11 +9,12 @@ from collections.abc import Callable
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 
+from fulmar_core.actuators.refuge import DOWN, LANDS_S
 from fulmar_core.backend import AirBearing, Backend, Sample
 from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import Episode
 from fulmar_core.errors import BAD_USAGE, FAILED, ConfigError, FulmarError
-from fulmar_core.flight.refuge import refuge_of
+from fulmar_core.flight.refuge import BLIND, refuge_of
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.safety.actuator_guard import ActuatorGuard
 from fulmar_core.safety.estop import EstopMonitor
@@ -38,6 +39,8 @@ from fulmar_ros.runtime import RequestExit, settle_memory
 MakeBackend = Callable[[Robot, PlantSettings], Backend]
 DONE, REFUSED = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
 SETTLE_S = 0.3  # a publisher sees a match some milliseconds before the subscriber's side is ready
+BLIND_S = 3.0  # without any measured state, after which a descent is none [s]
+LOOK_S = 0.05  # between two looks at a descent [s]
 PATIENCE_S = 2.0  # for a backend that hangs in a step, before the node goes on without it
 
 
@@ -184,6 +187,30 @@ class PlantNode(LifecycleNode):
     # From whatever state, and after an error too: actuators are never left as they are.
     on_shutdown = on_error = on_cleanup
 
+    def bring_down(self, cut_short: Callable[[], bool]) -> None:
+        """Let the safe controller of an aircraft in flight bring it to the ground, before the process ends.
+
+        Returns at once for what can stop, what is on the ground, and in lock step, where time stands still.
+
+        Args:
+            cut_short: Whether the process has been asked once more to end.
+        """
+        if not self.robot.flies or self.settings.lockstep or self.health.mode != "running":
+            return
+        self.get_logger().warning(
+            f"asked to end in flight: the safe controller flies down, within {LANDS_S:g} s; asked again, the plant ends"
+        )
+        with self.wires.lock:
+            self.guard.hand_over(time.monotonic_ns())
+        self.health.publish()
+        until_s = blind_s = time.monotonic() + LANDS_S
+        while self.health.mode == "running" and self.guard.doing != DOWN:
+            now_s = time.monotonic()
+            blind_s = min(blind_s, now_s + BLIND_S) if self.guard.doing == BLIND else until_s
+            if cut_short() or now_s > min(until_s, blind_s):
+                return
+            time.sleep(LOOK_S)
+
     def stop(self) -> int:
         """Publish the safe command several times before the process ends.
 
@@ -283,7 +310,10 @@ class PlantNode(LifecycleNode):
                 steps = self._count(1.0 / self.settings.control_rate(self.robot))
                 self._lockstep.run(sample, steps, self._stop)
             else:
-                self._realtime.run(sample, self._count(self.robot.timing.physics_dt), self._stop)
+                # What ends in the air falls; a simulated one is put back at its next start.
+                lands = self.robot.flies and not self._simulated
+                ticks = self._count(self.robot.timing.physics_dt)
+                self._realtime.run(sample, ticks, self._stop, lands=lands)
             self.health.mode = "stopping"
             self.wires.listening = False  # from here on no command is due
             self._make_safe()

@@ -34,6 +34,7 @@ from fulmar_ros.private_memory import PRIVATE, keep_memory_private
 # A thread that waits for the interpreter gets it after this long; Python's own 5 ms is a lot of 20 ms.
 SWITCH_INTERVAL_S = 0.0005
 
+ORPHANED = signal.SIGUSR1  # from the kernel, when the launcher that started us has died
 ENDS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 SPIN_S = 60.0
 RCLPY = os.path.dirname(rclpy.__file__) + os.sep
@@ -47,9 +48,10 @@ def run_node(make_node: Callable[[RequestExit], Node], argv: Sequence[str] | Non
     """Build one node, spin it until it is stopped, and stop it in order.
 
     SIGINT, SIGTERM, SIGQUIT and, unless `nohup` had it ignored, SIGHUP (the terminal or the ssh connection is gone) ask
-    for an orderly end with exit code 0. A node may have a method `stop()`: it is
-    called in the main thread while messages still flow (publish zeros, flush, close). What it returns, if
-    anything, is the exit code of a run that would otherwise end with 0.
+    for an orderly end with exit code 0, and so does the death of the launcher. A node may have a method
+    `bring_down(cut_short)`, which ends a flight, and a method `stop()`: both are called in the main thread while
+    messages still flow (publish zeros, flush, close). What `stop` returns, if anything, is the exit code of a run that
+    would otherwise end with 0.
 
     Args:
         make_node: Builds the node. It is given a function that ends the process with an exit code.
@@ -62,9 +64,14 @@ def run_node(make_node: Callable[[RequestExit], Node], argv: Sequence[str] | Non
     # A SimpleQueue may be filled from a signal handler; an Event may not, its lock is not reentrant.
     exit_codes: queue.SimpleQueue[int] = queue.SimpleQueue()
 
-    def on_signal(_number: int, _frame: FrameType | None) -> None:
-        exit_codes.put(DONE)
+    asked: list[int] = []
 
+    def on_signal(number: int, _frame: FrameType | None) -> None:
+        if number != ORPHANED or not asked:  # whose launcher dies is not asked a second time by that
+            exit_codes.put(DONE)
+        asked.append(number)
+
+    signal.signal(ORPHANED, on_signal)
     for number in ENDS:
         if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN:
             signal.signal(number, on_signal)
@@ -122,13 +129,13 @@ def init_ros(argv: Sequence[str] | None = (), *, context: rclpy.Context | None =
 
 
 def end_with_parent() -> None:
-    """Ask the kernel for SIGINT when the launcher that started us dies, so that no node is left behind.
+    """Ask the kernel for a signal when the launcher that started us dies, so that no node is left behind.
 
     Only for children with their launcher's id in the environment; a node that a person started outlives the shell.
     """
     parent = os.environ.get("FULMAR_PARENT_PID", "")
     if parent.isdecimal():
-        end_with(int(parent), signal.SIGINT)
+        end_with(int(parent), ORPHANED)
 
 
 def _spin(node: Node, exit_codes: queue.SimpleQueue[int]) -> int:
@@ -139,6 +146,7 @@ def _spin(node: Node, exit_codes: queue.SimpleQueue[int]) -> int:
     with spinning(node, on_error):
         settle_memory()
         asked = exit_codes.get()
+        _bring_down(node, exit_codes)
         stopped = _stop(node)
     return asked or stopped
 
@@ -223,6 +231,24 @@ def ros_node(name: str, on_error: Callable[[Exception], None], *, namespace: str
             yield node
     finally:
         rclpy.try_shutdown()
+
+
+def _bring_down(node: Any, exit_codes: queue.SimpleQueue[int]) -> None:
+    """Let a node whose robot cannot stop bring it to the ground first; a second request to end cuts that short."""
+    bring_down = getattr(node, "bring_down", None)
+    if bring_down is None:
+        return
+
+    def asked_again() -> bool:
+        while not exit_codes.empty():
+            if exit_codes.get() == DONE:  # a callback that failed is no request
+                return True
+        return False
+
+    try:
+        bring_down(asked_again)
+    except Exception as error:  # noqa: BLE001 - the rest of the shutdown must still happen
+        node.get_logger().error(_one_line(error))
 
 
 def _stop(node: Any) -> int:

@@ -13,6 +13,7 @@ import numpy as np
 from fulmar_core.state import RigidBodyState
 
 DOWN = "is down"  # what a safe controller that steers has done in the end
+LANDS_S = 300.0  # longest time for it to bring a craft down, which at 0.4 m/s is from 100 m [s]
 LONGEST_S = 60.0  # after which no slowdown goes on: a refuge that steers a vehicle has no end of its own [s]
 
 

@@ -87,12 +87,26 @@ class ActuatorGuard:
             None  # since when the controller of what cannot stop commands what is safe
         )
         self._steering_ns: int | None = None  # by the plant's clock, since when the safe controller steers
+        self._handed_over_ns: int | None = None  # since when the safe controller has the actuators for good
         self.watchdog.reset()
 
     @property
     def doing(self) -> str:
         """See the class."""
         return self.refuge.doing if self._steering_ns is not None else ""
+
+    @property
+    def handed_over(self) -> bool:
+        """Whether the safe controller has the actuators for good."""
+        return self._handed_over_ns is not None
+
+    def hand_over(self, now_ns: int) -> None:
+        """Give the actuators to the safe controller until `reset`, whatever is commanded: the plant is about to end.
+
+        From then on no command is due, so that no silence counts as a trip. `now_ns` is by the steady clock [ns].
+        """
+        if self._handed_over_ns is None:
+            self._handed_over_ns = now_ns
 
     def offer(
         self,
@@ -202,7 +216,7 @@ class ActuatorGuard:
 
         What cannot stop flies on by its safe controller, for which `state` is the newest one; as of `output`.
         """
-        since_ns = self._handed_over(now_ns)
+        since_ns = self._ended_by_decision(now_ns)
         if since_ns is None or self._steers:
             return self._applied(since_ns, now_ns, state, plant_ns)
         return self._actuators.safe_command
@@ -225,14 +239,16 @@ class ActuatorGuard:
             since_s = (plant_ns - self._steering_ns) / 1e9
         return self.refuge.command(since_s, self._applied_last, state)
 
-    def _handed_over(self, now_ns: int) -> int | None:
+    def _ended_by_decision(self, now_ns: int) -> int | None:
         """Since when the e-stop, a second publisher or the controller itself has ended the command [ns]."""
         ends = [self._stopped(now_ns), self._asked_ns]
         return min((end for end in ends if end is not None), default=None)
 
     def _ended_ns(self, now_ns: int) -> int | None:
         """When the command came to its end; None if it holds."""
-        ends = [self._handed_over(now_ns)]
+        if self._handed_over_ns is not None:
+            return self._handed_over_ns
+        ends = [self._ended_by_decision(now_ns)]
         if self.watchdog.expired(now_ns):
             ends.append(now_ns - self.watchdog.silent_ns(now_ns) + self.watchdog.timeout_ns)
         if self._steers and self.watchdog.silent_ns(now_ns) > self._bridge_ns:

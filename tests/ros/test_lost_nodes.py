@@ -1,0 +1,149 @@
+"""Processes that die or hang below the launchers that people use: who is started again, and what ends the robot."""
+
+from __future__ import annotations
+
+import signal
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fulmar_bags.run_record import read_run
+from fulmar_bringup.launched_command import LaunchedCommand, launched
+from fulmar_core.attitude import euler_of
+from fulmar_core.errors import DONE, FAILED
+from tests.conftest import RosDomain
+
+pytestmark = pytest.mark.real_time
+AIRCRAFT = ("airship_v7", "--task", "fly_hold", "--controller", "classical")
+RATE = ("--rate", "4")
+BANK_DEG, SINK = 10.0, 1.0  # most until touch-down, and there [m/s]
+
+
+def fly(folder: Path, domain: RosDomain, *more: str) -> LaunchedCommand:
+    """`fulmar run` of an aircraft at 2 m, four times as fast as the clock."""
+    words = (
+        "run",
+        *AIRCRAFT,
+        "--start",
+        "0,0,2,0,0,0",
+        "--duration",
+        "600",
+        *RATE,
+        "--json",
+        "--record",
+        "bag",
+    )
+    return launched((*words, *more), environment=domain.env, folder=folder)
+
+
+def in_flight(command: LaunchedCommand) -> None:
+    """Until the plant has flown for a second or more."""
+    command.node("plant")
+    bag = Path(command.process.cwd()) / "bag"
+    command.wait_until(lambda: any(bag.glob("*.mcap")) and len(read_run(bag).truth) > 400, "flight", 40.0)
+
+
+def landed_well(bag: Path) -> None:
+    """Assert that the craft in a bag came down with level wings and slowly."""
+    record = read_run(bag)
+    motion = record.truth
+    bank = np.degrees(np.abs(euler_of(motion.quat_xyzw)[0]))
+    assert motion.position[-1, 2] < 0.3
+    assert bank.max() <= BANK_DEG
+    assert -motion.velocity_in_world[-50:, 2].min() <= SINK
+
+
+@pytest.mark.parametrize("node", ["controller", pytest.param("estop", marks=pytest.mark.slow)])
+def test_an_aircraft_whose_node_is_killed_lands_before_its_run_ends(
+    node: str, ros_domain: RosDomain, tmp_path: Path
+) -> None:
+    with fly(tmp_path, ros_domain, "--estop") as command:
+        in_flight(command)
+        command.node(node).kill()
+        if node == "estop":  # its silence brings the craft down, and it is back before
+            command.node(node, other_than=0)
+            command.process.send_signal(signal.SIGINT)
+        assert command.wait(60.0) == FAILED
+        assert command.left_over() == []
+    landed_well(tmp_path / "bag")
+
+
+def test_ctrl_c_lands_an_aircraft_and_a_second_one_ends_it_at_once(
+    ros_domain: RosDomain, tmp_path: Path
+) -> None:
+    with fly(tmp_path, ros_domain) as command:
+        in_flight(command)
+        command.process.send_signal(signal.SIGINT)
+        command.wait_until(lambda: any("flies the robot down" in line for line in command.log), "words", 10.0)
+        command.process.send_signal(signal.SIGINT)
+        assert command.wait(10.0) == FAILED
+        assert command.result["failure"].startswith("stopped by the user")
+        assert command.left_over() == []
+    assert read_run(tmp_path / "bag").truth.position[-1, 2] > 1.0
+
+
+def test_an_aircraft_lands_also_where_its_launcher_is_killed(ros_domain: RosDomain, tmp_path: Path) -> None:
+    with fly(tmp_path, ros_domain) as command:
+        in_flight(command)
+        plant = command.node("plant")
+        command.process.kill()
+        command.wait(5.0)
+        assert plant.is_running()
+        assert command.left_over(60.0) == []
+
+
+@pytest.mark.parametrize(
+    ("node", "number"),
+    [
+        ("recorder", signal.SIGKILL),
+        pytest.param("recorder", signal.SIGSTOP, marks=pytest.mark.slow),
+        pytest.param("markers", signal.SIGKILL, marks=pytest.mark.slow),
+        pytest.param("markers", signal.SIGSTOP, marks=pytest.mark.slow),
+        pytest.param("estop", signal.SIGKILL, marks=pytest.mark.slow),
+        pytest.param("estop", signal.SIGSTOP, marks=pytest.mark.slow),
+    ],
+)
+def test_a_helper_that_dies_or_hangs_below_up_is_started_again_and_control_goes_on(
+    node: str, number: signal.Signals, ros_domain: RosDomain, tmp_path: Path
+) -> None:
+    words = ("up", "mock_lqr", "--estop", "--json", "--record", "bag")
+    with launched(words, environment=ros_domain.env, folder=tmp_path) as command:
+        command.wait_for_event("started")
+        controller = command.node("controller").pid
+        lost = command.node(node)
+        lost.send_signal(number)
+        again = command.node(node, other_than=lost.pid)
+        event = command.wait_for_event("restarted")
+        assert event["node"] == node
+        assert event["reason"] == (
+            f"{node} was killed by SIGKILL"
+            if number == signal.SIGKILL
+            else f"{node} was stopped (SIGSTOP) for 3 s"
+        )
+        assert command.node("controller").pid == controller
+        assert again.is_running()
+        command.process.send_signal(signal.SIGTERM)
+        assert command.wait(30.0) == DONE
+        assert command.left_over() == []
+    assert not read_run(tmp_path / "bag").warnings
+
+
+def test_a_run_whose_recorder_is_killed_goes_on_and_its_bag_and_result_say_so(
+    ros_domain: RosDomain, tmp_path: Path
+) -> None:
+    words = ("run", "floating_platform", "--controller", "lqr", "--backend", "mock", "--duration", "8")
+    more = ("--start", "1,0,0", "--goal", "0,0,0", "--json", "--record", "bag")
+    with launched((*words, *more), environment=ros_domain.env, folder=tmp_path) as command:
+        bag = tmp_path / "bag"
+        command.wait_until(lambda: any(bag.glob("*.mcap")) and len(read_run(bag).truth) > 100, "motion", 40.0)
+        command.node("recorder").kill()
+        assert command.wait(40.0) == DONE
+        warnings = command.result["warnings"]
+    assert command.result["success"]
+    said = "recorder was killed by SIGKILL; it was started again, and the robot went on"
+    assert said in warnings
+    assert any("nothing was recorded for" in warning for warning in warnings)
+    record = read_run(bag)
+    assert len(list(bag.glob("*.mcap"))) == 2
+    assert record.truth.stamp_s[-1] - record.truth.stamp_s[0] > 7.0
