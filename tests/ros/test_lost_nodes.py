@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import shutil
 import signal
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +14,9 @@ from fulmar_bags.run_record import read_run
 from fulmar_bringup.launched_command import LaunchedCommand, launched
 from fulmar_core.attitude import euler_of
 from fulmar_core.errors import DONE, FAILED
+from fulmar_core.robot import load_robot
 from tests.conftest import RosDomain
+from tests.ros.cli import WATCHDOG_TRIP, under_way
 
 pytestmark = pytest.mark.real_time
 AIRCRAFT = ("airship_v7", "--task", "fly_hold", "--controller", "classical")
@@ -40,16 +44,15 @@ def fly(folder: Path, domain: RosDomain, *more: str) -> LaunchedCommand:
 def in_flight(command: LaunchedCommand) -> None:
     """Until the plant has flown for a second or more."""
     command.node("plant")
-    bag = Path(command.process.cwd()) / "bag"
-    command.wait_until(lambda: any(bag.glob("*.mcap")) and len(read_run(bag).truth) > 400, "flight", 40.0)
+    assert under_way(command.process, Path(command.process.cwd()) / "bag", 1500)
 
 
 def landed_well(bag: Path) -> None:
     """Assert that the craft in a bag came down with level wings and slowly."""
     record = read_run(bag)
     motion = record.truth
-    bank = np.degrees(np.abs(euler_of(motion.quat_xyzw)[0]))
-    assert motion.position[-1, 2] < 0.3
+    bank = np.degrees(np.abs(euler_of(tuple(motion.quat_xyzw.T))[0]))
+    assert motion.position[-1, 2] + load_robot("airship_v7").hull_span[0] < 0.1
     assert bank.max() <= BANK_DEG
     assert -motion.velocity_in_world[-50:, 2].min() <= SINK
 
@@ -80,7 +83,7 @@ def test_ctrl_c_lands_an_aircraft_and_a_second_one_ends_it_at_once(
         assert command.wait(10.0) == FAILED
         assert command.result["failure"].startswith("stopped by the user")
         assert command.left_over() == []
-    assert read_run(tmp_path / "bag").truth.position[-1, 2] > 1.0
+    assert read_run(tmp_path / "bag").truth.position[-1, 2] > 0.6
 
 
 def test_an_aircraft_lands_also_where_its_launcher_is_killed(ros_domain: RosDomain, tmp_path: Path) -> None:
@@ -132,18 +135,25 @@ def test_a_helper_that_dies_or_hangs_below_up_is_started_again_and_control_goes_
 def test_a_run_whose_recorder_is_killed_goes_on_and_its_bag_and_result_say_so(
     ros_domain: RosDomain, tmp_path: Path
 ) -> None:
-    words = ("run", "floating_platform", "--controller", "lqr", "--backend", "mock", "--duration", "8")
-    more = ("--start", "1,0,0", "--goal", "0,0,0", "--json", "--record", "bag")
-    with launched((*words, *more), environment=ros_domain.env, folder=tmp_path) as command:
-        bag = tmp_path / "bag"
-        command.wait_until(lambda: any(bag.glob("*.mcap")) and len(read_run(bag).truth) > 100, "motion", 40.0)
-        command.node("recorder").kill()
-        assert command.wait(40.0) == DONE
-        warnings = command.result["warnings"]
-    assert command.result["success"]
+    result, bag = run_without_its_recorder(ros_domain, tmp_path)
+    if str(result["failure"]).startswith(WATCHDOG_TRIP):  # a busy machine; see `run_in_real_time`
+        shutil.rmtree(bag)
+        result, bag = run_without_its_recorder(ros_domain, tmp_path)
+    assert (result["failure"], result["success"]) == (None, True)
     said = "recorder was killed by SIGKILL; it was started again, and the robot went on"
-    assert said in warnings
-    assert any("nothing was recorded for" in warning for warning in warnings)
+    assert said in result["warnings"]
+    assert any("nothing was recorded for" in warning for warning in result["warnings"])
     record = read_run(bag)
     assert len(list(bag.glob("*.mcap"))) == 2
     assert record.truth.stamp_s[-1] - record.truth.stamp_s[0] > 7.0
+
+
+def run_without_its_recorder(domain: RosDomain, folder: Path) -> tuple[dict[str, Any], Path]:
+    """Result and bag of a run whose recorder is killed on its way."""
+    words = ("run", "floating_platform", "--controller", "lqr", "--backend", "mock", "--duration", "8")
+    more = ("--start", "1,0,0", "--goal", "0,0,0", "--json", "--record", "bag")
+    with launched((*words, *more), environment=domain.env, folder=folder) as command:
+        assert under_way(command.process, folder / "bag", 400)
+        command.node("recorder").kill()
+        command.wait(60.0)
+        return command.result, folder / "bag"
