@@ -20,12 +20,11 @@ from tests.ros.cli import WATCHDOG_TRIP, under_way
 
 pytestmark = pytest.mark.real_time
 AIRCRAFT = ("airship_v7", "--task", "fly_hold", "--controller", "classical")
-RATE = ("--rate", "4")
 BANK_DEG, SINK = 10.0, 1.0  # most until touch-down, and there [m/s]
 
 
 def fly(folder: Path, domain: RosDomain, *more: str) -> LaunchedCommand:
-    """`fulmar run` of an aircraft at 2 m, four times as fast as the clock."""
+    """`fulmar run` of an aircraft at 2 m."""
     words = (
         "run",
         *AIRCRAFT,
@@ -33,7 +32,6 @@ def fly(folder: Path, domain: RosDomain, *more: str) -> LaunchedCommand:
         "0,0,2,0,0,0",
         "--duration",
         "600",
-        *RATE,
         "--json",
         "--record",
         "bag",
@@ -44,20 +42,22 @@ def fly(folder: Path, domain: RosDomain, *more: str) -> LaunchedCommand:
 def in_flight(command: LaunchedCommand) -> None:
     """Until the plant has flown for a second or more."""
     command.node("plant")
-    assert under_way(command.process, Path(command.process.cwd()) / "bag", 1500)
+    assert under_way(command.process, Path(command.process.cwd()) / "bag", 700)
 
 
 def landed_well(bag: Path) -> None:
     """Assert that the craft in a bag came down with level wings and slowly."""
-    record = read_run(bag)
-    motion = record.truth
+    motion = read_run(bag).truth
+    low = motion.position[:, 2] + load_robot("airship_v7").hull_span[0]
+    down = int(np.argmax(low < 0.02))
     bank = np.degrees(np.abs(euler_of(tuple(motion.quat_xyzw.T))[0]))
-    assert motion.position[-1, 2] + load_robot("airship_v7").hull_span[0] < 0.1
-    assert bank.max() <= BANK_DEG
-    assert -motion.velocity_in_world[-50:, 2].min() <= SINK
+    assert low[down] < 0.02
+    assert bank[: down + 1].max() <= BANK_DEG
+    assert -motion.velocity_in_world[down, 2] <= SINK
 
 
-@pytest.mark.parametrize("node", ["controller", pytest.param("estop", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("node", ["controller", "estop"])
 def test_an_aircraft_whose_node_is_killed_lands_before_its_run_ends(
     node: str, ros_domain: RosDomain, tmp_path: Path
 ) -> None:
@@ -72,6 +72,7 @@ def test_an_aircraft_whose_node_is_killed_lands_before_its_run_ends(
     landed_well(tmp_path / "bag")
 
 
+@pytest.mark.slow
 def test_ctrl_c_lands_an_aircraft_and_a_second_one_ends_it_at_once(
     ros_domain: RosDomain, tmp_path: Path
 ) -> None:
@@ -86,6 +87,7 @@ def test_ctrl_c_lands_an_aircraft_and_a_second_one_ends_it_at_once(
     assert read_run(tmp_path / "bag").truth.position[-1, 2] > 0.6
 
 
+@pytest.mark.slow
 def test_an_aircraft_lands_also_where_its_launcher_is_killed(ros_domain: RosDomain, tmp_path: Path) -> None:
     with fly(tmp_path, ros_domain) as command:
         in_flight(command)
@@ -132,6 +134,7 @@ def test_a_helper_that_dies_or_hangs_below_up_is_started_again_and_control_goes_
     assert not read_run(tmp_path / "bag").warnings
 
 
+@pytest.mark.slow
 def test_a_run_whose_recorder_is_killed_goes_on_and_its_bag_and_result_say_so(
     ros_domain: RosDomain, tmp_path: Path
 ) -> None:
@@ -145,12 +148,12 @@ def test_a_run_whose_recorder_is_killed_goes_on_and_its_bag_and_result_say_so(
     assert any("nothing was recorded for" in warning for warning in result["warnings"])
     record = read_run(bag)
     assert len(list(bag.glob("*.mcap"))) == 2
-    assert record.truth.stamp_s[-1] - record.truth.stamp_s[0] > 7.0
+    assert record.truth.stamp_s[-1] - record.truth.stamp_s[0] > 11.0
 
 
 def run_without_its_recorder(domain: RosDomain, folder: Path) -> tuple[dict[str, Any], Path]:
     """Result and bag of a run whose recorder is killed on its way."""
-    words = ("run", "floating_platform", "--controller", "lqr", "--backend", "mock", "--duration", "8")
+    words = ("run", "floating_platform", "--controller", "lqr", "--backend", "mock", "--duration", "12")
     more = ("--start", "1,0,0", "--goal", "0,0,0", "--json", "--record", "bag")
     with launched((*words, *more), environment=domain.env, folder=folder) as command:
         assert under_way(command.process, folder / "bag", 400)

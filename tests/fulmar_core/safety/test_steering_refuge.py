@@ -124,3 +124,19 @@ def test_what_can_stop_does_as_its_controller_says():
     guard.offer(NAMES, SAFE, 0)
     assert guard.output(0, object(), plant_ns=0).tolist() == SAFE
     assert guard.doing == ""
+
+
+def test_a_plant_that_is_about_to_end_takes_no_command_and_counts_no_silence(guard):
+    """The last of its robot's flight belongs to the safe controller, whoever still commands."""
+    guard.offer(NAMES, GOOD, 0)
+    guard.hand_over(10 * MS)
+    for now in range(10, 2000, 10):
+        if now < 1000:
+            guard.offer(NAMES, OTHER, now * MS)
+        assert applied(guard, now * MS) == STEERED
+    assert guard.doing == "glides"
+    assert guard.watchdog.trips == 0
+    guard.reset()
+    assert not guard.handed_over
+    guard.offer(NAMES, GOOD, 3000 * MS)
+    assert applied(guard, 3000 * MS) == GOOD

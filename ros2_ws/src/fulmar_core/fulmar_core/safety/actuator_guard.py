@@ -240,8 +240,8 @@ class ActuatorGuard:
         return self.refuge.command(since_s, self._applied_last, state)
 
     def _ended_by_decision(self, now_ns: int) -> int | None:
-        """Since when the e-stop, a second publisher or the controller itself has ended the command [ns]."""
-        ends = [self._stopped(now_ns), self._asked_ns]
+        """Since when the plant's end, the e-stop, a second publisher or the controller has ended the command [ns]."""
+        ends = [self._handed_over_ns, self._stopped(now_ns), self._asked_ns]
         return min((end for end in ends if end is not None), default=None)
 
     def _ended_ns(self, now_ns: int) -> int | None:
