@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import signal
+import time
 from pathlib import Path
 from typing import Any
 
@@ -160,3 +161,21 @@ def run_without_its_recorder(domain: RosDomain, folder: Path) -> tuple[dict[str,
         command.node("recorder").kill()
         command.wait(60.0)
         return command.result, folder / "bag"
+
+
+@pytest.mark.slow
+def test_a_launcher_that_is_stopped_is_reported_by_its_nodes_and_takes_no_control_away(
+    ros_domain: RosDomain, tmp_path: Path
+) -> None:
+    """Nor does it when it goes on, after a time in which it has heard of nobody."""
+    words = ("run", "floating_platform", "--controller", "lqr", "--backend", "mock", "--duration", "20")
+    more = ("--rate", "0.5", "--start", "1,0,0", "--goal", "0,0,0", "--json", "--record", "bag")
+    with launched((*words, *more), environment=ros_domain.env, folder=tmp_path) as command:
+        assert under_way(command.process, tmp_path / "bag", 400)
+        command.process.suspend()
+        time.sleep(12.0)
+        assert set(command.nodes()) == {"plant", "controller", "recorder"}
+        command.process.resume()
+        assert command.wait(90.0) == DONE, command.result
+    assert command.result["success"]
+    assert [each for each in command.result["warnings"] if each.startswith("the launcher is stopped")]

@@ -19,6 +19,7 @@ import psutil
 
 from fulmar_bringup.console import printable
 from fulmar_bringup.run_plan import NodeSpec, Parameter
+from fulmar_core.process import LAUNCHER_PID
 from fulmar_ros.middleware import middleware_environment
 
 PATIENCE_S = 4.0  # for an orderly end, before it is no longer asked for
@@ -162,7 +163,7 @@ def child_environment() -> dict[str, str]:
         "OMP_NUM_THREADS": "1",
         "OPENBLAS_NUM_THREADS": "1",
         "PYTHONUNBUFFERED": "1",
-        "FULMAR_PARENT_PID": str(os.getpid()),
+        LAUNCHER_PID: str(os.getpid()),
     }
 
 

@@ -49,7 +49,21 @@ def give_up_priority() -> None:
         os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
 
 
+LAUNCHER_PID = (
+    "FULMAR_PARENT_PID"  # environment variable: id of the process that started a node and watches it
+)
+_STOPPED = ("T", "t")  # states of a process in proc(5): by a signal, or by a debugger
 _PR_SET_PDEATHSIG = 1  # prctl(2)
+
+
+def is_stopped(process: int) -> bool:
+    """Whether a process, by its id, was stopped in its tracks, as by SIGSTOP; Linux alone says so."""
+    try:
+        with open(f"/proc/{process}/stat", encoding="ascii", errors="replace") as file:
+            after_name = file.read().rpartition(")")[2]
+    except OSError:
+        return False
+    return after_name.split()[:1] in ([state] for state in _STOPPED)
 
 
 def end_with(parent: int, ending: signal.Signals) -> None:

@@ -12,6 +12,7 @@ from rclpy.publisher import Publisher
 from fulmar_core.topics import DIAGNOSTICS
 from fulmar_core.wire_check import BETWEEN, WARNINGS
 from fulmar_ros.convert import stamp_of
+from fulmar_ros.launcher_watch import LauncherWatch
 from fulmar_ros.qos import publisher_qos
 
 LEVELS = {"ok": DiagnosticStatus.OK, "warn": DiagnosticStatus.WARN, "error": DiagnosticStatus.ERROR}
@@ -24,6 +25,7 @@ class Health:
         """Publish on `/diagnostics` under a name such as `<robot>: plant`, and with more publishers of its type."""
         own = node.create_publisher(DiagnosticArray, DIAGNOSTICS.name, publisher_qos(DIAGNOSTICS))
         self._name, self.publishers = name, [*more, own]
+        self._launcher = LauncherWatch()
 
     def listeners(self) -> int:
         """How many subscribers are matched: one that comes between two beats need not wait for the next."""
@@ -38,8 +40,13 @@ class Health:
             level: `ok`, `warn` or `error`.
             message: For people.
             values: For programs.
-            warnings: What endangers the robot, one sentence each; the result and the report of a run list them.
+            warnings: What endangers the robot, one sentence each; the result and the report of a run list them. A
+                launcher that is stopped is one more.
         """
+        alone = self._launcher.problem()
+        if alone:
+            warnings = (*warnings, alone)
+            level, message = ("warn", alone) if level == "ok" else (level, message)
         status = DiagnosticStatus(level=LEVELS[level], name=self._name, message=message, hardware_id="")
         status.values = [KeyValue(key=key, value=value) for key, value in values.items()]
         if warnings:

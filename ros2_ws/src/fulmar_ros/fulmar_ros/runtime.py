@@ -26,7 +26,7 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
 from fulmar_core.errors import BAD_USAGE, DONE, FAILED, FulmarError
-from fulmar_core.process import end_with
+from fulmar_core.process import LAUNCHER_PID, end_with
 from fulmar_ros.middleware import range_for_rclpy, set_up_middleware, static_peers, strangers_can_send
 from fulmar_ros.peer_filter import PeerFilter
 from fulmar_ros.private_memory import PRIVATE, keep_memory_private
@@ -133,7 +133,7 @@ def end_with_parent() -> None:
 
     Only for children with their launcher's id in the environment; a node that a person started outlives the shell.
     """
-    parent = os.environ.get("FULMAR_PARENT_PID", "")
+    parent = os.environ.get(LAUNCHER_PID, "")
     if parent.isdecimal():
         end_with(int(parent), ORPHANED)
 
