@@ -92,9 +92,10 @@ class Plant:
         assert name == "plant"
         return self
 
-    def ask_to_stop(self, name: str) -> None:
+    def ask_to_stop(self, name: str, *, at_once: bool = False) -> None:
         assert name == "plant"
         self.asked += 1
+        self.at_once = at_once
 
     def poll(self) -> int | None:
         self._looks -= 1 if self.asked else 0
@@ -130,7 +131,7 @@ def test_ctrl_c_cuts_a_landing_short_and_leaves_the_reason_of_the_end(monkeypatc
     plant = Plant(looks=1000)
     monkeypatch.setattr("fulmar_bringup.run_executor.time.sleep", interrupt)
     _bring_down(plant, plant)
-    assert plant.poll() is None
+    assert (plant.asked, plant.at_once) == (2, True)
 
 
 def interrupt(_seconds: float) -> None:

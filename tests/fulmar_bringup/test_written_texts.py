@@ -152,3 +152,8 @@ def test_compose_passes_variables_as_whole_words_and_starts_no_shell():
     for name, service in yaml.safe_load(path.read_text())["services"].items():
         assert isinstance(service["command"], list), name
         assert service["command"][0] in ("up", "train"), name
+
+
+def test_a_service_that_flies_gets_the_time_to_land():
+    assert "TimeoutStopSec=15\n" in unit_text(SERVICE, {})
+    assert "TimeoutStopSec=315\n" in unit_text(replace(SERVICE, lands=True), {})

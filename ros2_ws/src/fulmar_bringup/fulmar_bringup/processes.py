@@ -103,11 +103,11 @@ class ProcessGroup:
         except psutil.NoSuchProcess:
             return False
 
-    def ask_to_stop(self, name: str) -> None:
-        """Ask a child to end in order, and do not wait."""
+    def ask_to_stop(self, name: str, *, at_once: bool = False) -> None:
+        """Ask a child to end in order, and do not wait; `at_once`: it is not to finish first what takes time."""
         child = self._children.get(name)
         if child is not None and child.poll() is None:
-            child.send_signal(signal.SIGTERM)
+            child.send_signal(signal.SIGINT if at_once else signal.SIGTERM)
 
     def stop(self, *names: str) -> list[Ended]:
         """Stop children by name, asked first, then killed; returns how each ended, also before."""

@@ -203,12 +203,14 @@ def _bring_down(overseer: Supervisor, group: ProcessGroup) -> None:
         return
     log_line(f"the safe controller flies the robot down, within {LANDS_S:g} s; Ctrl-C ends it at once")
     group.ask_to_stop("plant")
-    with contextlib.suppress(KeyboardInterrupt):  # the reason of the run's end stays as it is
+    try:
         overseer.listen()
         while plant.poll() is None and time.monotonic() < until_s:
             if overseer.silent_s(overseer.plant) > PLANT_SILENT_S:
                 return
             time.sleep(0.1)
+    except KeyboardInterrupt:  # the reason of the run's end stays as it is
+        group.ask_to_stop("plant", at_once=True)
 
 
 def _wait_for_end(

@@ -27,6 +27,7 @@ from fulmar_bringup.system import System, varied_system
 from fulmar_cli.extras import check_plan
 from fulmar_core.errors import ConfigError, FulmarError
 from fulmar_core.own_class import is_own
+from fulmar_core.robot import load_robot
 from fulmar_core.written_text import NAME, USER, check_lines, check_written
 from hardware_drivers.hardware import load_hardware
 from hardware_drivers.presence import check_presence
@@ -138,6 +139,7 @@ def plan_service(wanted: Wanted, root: Path, *, dry_run: bool) -> PlannedService
         user,
         known,
         whole_paths(os.environ) | module_path(own, os.environ),
+        lands=load_robot(chosen.robot).flies,
     )
     files = Files(root, service.name)
     return PlannedService(files, texts_of(files, unit_text(service, os.environ), rules))

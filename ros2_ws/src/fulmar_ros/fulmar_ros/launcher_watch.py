@@ -25,7 +25,7 @@ class LauncherWatch:
         self._since_s: float | None = None
 
     def problem(self, now_s: float | None = None) -> str:
-        """What is wrong with the launcher, empty if nothing is; `now_s` is by the monotonic clock, by default now [s]."""
+        """What is wrong with the launcher, empty if nothing is; `now_s` is by the monotonic clock [s]."""
         now_s = time.monotonic() if now_s is None else now_s
         if self._launcher and now_s - self._looked_s >= LOOK_S:
             self._looked_s = now_s

@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
+from fulmar_core.actuators.refuge import LANDS_S
 from fulmar_core.process import RT_LIMIT
 from fulmar_core.written_text import LINE, NAME, USER, check_written
 
@@ -86,6 +87,7 @@ class Service:
     variables: Mapping[str, str] = field(
         default_factory=dict
     )  # of the environment; they replace what is passed
+    lands: bool = False  # whether the robot flies, and is brought to the ground when the service stops
 
 
 def unit_text(service: Service, environment: Mapping[str, str]) -> str:
@@ -120,7 +122,7 @@ def unit_text(service: Service, environment: Mapping[str, str]) -> str:
         environment="".join(f"Environment={_quoted(f'{name}={value}')}\n" for name, value in passed.items()),
         state=STATE,
         command=" ".join(_quoted(word.replace("$", "$$")) for word in service.command),
-        stop=STOP_S,
+        stop=STOP_S + (round(LANDS_S) if service.lands else 0),
         restart=RESTART_S,
         rtprio=RT_LIMIT,
         name=service.name,
