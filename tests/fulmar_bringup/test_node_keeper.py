@@ -201,3 +201,10 @@ def test_an_e_stop_that_does_not_last_ends_the_robot(system, now):
 def test_a_recorder_goes_on_in_its_bag():
     row = system_rows(PLAN, record={"directory": "bag"})["recorder"]
     assert resumed(row, {}).parameters == {**row.parameters, "resume": True}
+
+
+def test_goals_go_on_where_the_node_before_was():
+    row = system_rows(PLAN, record={"directory": "bag"})["goals"]
+    place = '{"reached": 2, "time_ns": 7}'
+    assert resumed(row, {"place": place}).parameters == {**row.parameters, "place": place}
+    assert resumed(row, {}) == row  # it had not begun

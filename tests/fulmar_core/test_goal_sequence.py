@@ -155,3 +155,26 @@ def test_an_open_path_is_followed_from_its_beginning_to_its_end():
     assert sequence.progress == "the path is at its end"
     assert np.linalg.norm(places - points[0], axis=1).min() < 0.3
     assert np.linalg.norm(places[-1] - points[-1]) < 0.1
+
+
+def test_waypoints_go_on_where_the_node_before_was():
+    first, second = goal_sequence(CORNERS, PLATFORM), goal_sequence(CORNERS, PLATFORM)
+    for time_s in (0.0, 1.0, 2.0):
+        first.step(at(1.0, 0.0), time_s)
+    second.go_on_at(first.place)
+    assert second.progress == first.progress == "1 of 2 targets reached"
+    assert second.step(at(1.0, 1.0), 0.0).current[1] == 2.0
+    second.go_on_at({"reached": 7})  # of another file
+    assert second.done
+
+
+@pytest.mark.parametrize("goals", [RING, load_goals("spiral")], ids=["closed", "open"])
+def test_a_path_goes_on_where_the_node_before_was(goals):
+    first, second = goal_sequence(goals, PLATFORM), goal_sequence(goals, PLATFORM)
+    places, _ = drive(first, True, seconds=28.0)
+    assert first.place != second.place
+    second.go_on_at(first.place)
+    goal = second.step(at(*places[-1]), 0.0)
+    assert second.place.get("laps") == first.place.get("laps")
+    assert second.place.get("index", 0) >= first.place.get("index", 0)
+    assert goal.current == pytest.approx(first.step(at(*places[-1]), 28.0).current, abs=0.05)

@@ -162,4 +162,6 @@ def resumed(spec: NodeSpec, said: dict[str, str]) -> NodeSpec:
     """
     if spec.name == "recorder":
         return replace(spec, parameters={**spec.parameters, "resume": True})
+    if spec.name == "goals" and said.get("place"):
+        return replace(spec, parameters={**spec.parameters, "place": said["place"]})
     return spec

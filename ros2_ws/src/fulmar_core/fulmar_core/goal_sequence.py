@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Mapping
 from typing import Protocol
 
 import numpy as np
@@ -40,6 +41,13 @@ class GoalSequence(Protocol):
     @property
     def progress(self) -> str:
         """How far it has come, for people."""
+
+    @property
+    def place(self) -> dict[str, int]:
+        """How far it has come, for `go_on_at`; what goes by the clock alone has no place."""
+
+    def go_on_at(self, place: Mapping[str, int]) -> None:
+        """Go on where another one of the same file was."""
 
     def step(self, state: State, time_s: float) -> Goal:
         """Take a state.
@@ -90,6 +98,15 @@ class Waypoints:
     def progress(self) -> str:
         """How many are reached."""
         return f"{self._reached} of {len(self._targets)} targets reached"
+
+    @property
+    def place(self) -> dict[str, int]:
+        """How many are reached."""
+        return {"reached": self._reached}
+
+    def go_on_at(self, place: Mapping[str, int]) -> None:
+        """Take so many as reached."""
+        self._reached = min(max(0, place.get("reached", 0)), len(self._targets))
 
     def step(self, state: State, time_s: float) -> Goal:
         """The first target that is not reached, or all; see `GoalSequence.step`."""
@@ -146,6 +163,14 @@ class Schedule:
         """How many are over."""
         return f"{self._over} of {len(self._ends)} velocities over"
 
+    @property
+    def place(self) -> dict[str, int]:
+        """None: it goes by the clock."""
+        return {}
+
+    def go_on_at(self, place: Mapping[str, int]) -> None:
+        """It goes by the clock."""
+
     def step(self, state: State, time_s: float) -> Goal:
         """The velocity of this time; see `GoalSequence.step`."""
         # A microsecond early, for times that were added up.
@@ -164,6 +189,7 @@ class Following:
         self._file, self._sideways = file, sideways
         self._planner: LookAhead = file.planner()
         self._on_path: Progress | None = None
+        self._begin = Progress()
 
     @property
     def form(self) -> type[State]:
@@ -182,6 +208,17 @@ class Following:
             return "the path is at its end" if self.done else "on the path"
         laps = 0 if self._on_path is None else self._on_path.laps
         return f"{laps} rounds" if self._planner.loops == 0 else f"{laps} of {self._planner.loops} rounds"
+
+    @property
+    def place(self) -> dict[str, int]:
+        """Rounds, and of an open path the nearest point: a closed one is entered anew where it is nearest."""
+        at = self._on_path or Progress()
+        return {"laps": at.laps} if self._planner.closed else {"index": at.index, "laps": at.laps}
+
+    def go_on_at(self, place: Mapping[str, int]) -> None:
+        """Enter the path there."""
+        index = min(max(0, place.get("index", 0)), len(self._planner.points) - 1)
+        self._begin = Progress(index, max(0, place.get("laps", 0)))
 
     def step(self, state: State, time_s: float) -> Goal:
         """The velocity towards the aim; see `GoalSequence.step`."""
@@ -202,7 +239,7 @@ class Following:
         if self._planner.closed:
             points = np.roll(self._planner.points, -self._planner.nearest(position).index, axis=0)
             self._planner = dataclasses.replace(self._planner, points=points)
-        return Progress()
+        return self._begin
 
 
 class Moving:
@@ -232,6 +269,14 @@ class Moving:
         if not self._target.path.closed:
             return f"{math.floor(10.0 * rounds) * 10} % of the path"
         return f"{math.floor(rounds)} of {self._target.loops or 'endless'} rounds"
+
+    @property
+    def place(self) -> dict[str, int]:
+        """None: it goes by the clock."""
+        return {}
+
+    def go_on_at(self, place: Mapping[str, int]) -> None:
+        """It goes by the clock."""
 
     def step(self, state: State, time_s: float) -> Goal:
         """The pose of this time; see `GoalSequence.step`."""

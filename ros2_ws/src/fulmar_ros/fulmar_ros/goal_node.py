@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import sys
 import threading
@@ -16,6 +17,7 @@ from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 
+from fulmar_bags.contents import json_object
 from fulmar_bags.message_reader import measurement_of, stamp_ns
 from fulmar_core.errors import DONE, FAILED
 from fulmar_core.goal import Goal
@@ -57,6 +59,8 @@ class GoalSettings:
     stay: bool = False  # go on when everything is done, until stopped
     # End with exit code 1 when so long after the start there is no usable odometry, or no subscriber; 0: wait [s].
     give_up_s: float = 0.0
+    # Where to go on: the value `place` of the status of a goal node that has died; empty: at the beginning.
+    place: str = ""
 
     def __post_init__(self) -> None:
         """Refuse values without meaning."""
@@ -107,6 +111,7 @@ class GoalNode(Node):
         self._sent: Goal | None = None
         self._newest: Measurement | None = None
         self._time_ns, self._sent_at_ns = 0, 0  # of the sequence; it stands still while no odometry comes
+        self._go_on(self._settings.place)
         self._period_ns = round(1e9 / self._settings.control_hz)
         self._timeout_s = self._settings.input_timeout_s / min(self._settings.rate, 1.0)
         self._progress = self._sequence.progress
@@ -135,6 +140,17 @@ class GoalNode(Node):
         self.create_timer(WATCH_S, self._watch, clock=Clock(clock_type=ClockType.STEADY_TIME))
         if not self._single:
             self.get_logger().info(f"{goals.title}: goals for {name} on {self._publisher.topic_name}")
+
+    def _go_on(self, place: str) -> None:
+        """Take the place of a goal node that has died; a path that it gave whole is with the controller."""
+        before = json_object(place)
+        if not before:
+            return
+        numbers = {key: value for key, value in before.items() if isinstance(value, int)}
+        self._time_ns = max(0, numbers.get("time_ns", 0))
+        self._sequence.go_on_at(numbers)
+        if self._sequence.topic == GOAL_PATH.name:
+            self._sent = self._sequence.standstill
 
     def _on_odometry(self, message: Odometry) -> None:
         measurement = measurement_of(message, self._frames)
@@ -211,7 +227,9 @@ class GoalNode(Node):
         if self._sequence.progress != self._said or time.monotonic() - self._said_at > STATUS_PERIOD_S:
             self._said, self._said_at = self._progress, time.monotonic()
             mode = "finished" if self._sequence.done else "running"
-            self._health.publish("ok", self._progress, {"mode": mode, "progress": self._progress})
+            place = json.dumps({**self._sequence.place, "time_ns": self._time_ns})
+            values = {"mode": mode, "progress": self._progress, "place": place}
+            self._health.publish("ok", self._progress, values)
 
     def _farewell(self) -> str:
         if self._sequence.topic == "goal_path":

@@ -34,8 +34,8 @@ from fulmar_ros.private_memory import PRIVATE, keep_memory_private
 # A thread that waits for the interpreter gets it after this long; Python's own 5 ms is a lot of 20 ms.
 SWITCH_INTERVAL_S = 0.0005
 
-# A second request by one of these ends a flight at once. Not by SIGTERM, which systemd and a launcher may send both, and
-# not by the death of the launcher.
+# A second request by one of these ends a flight at once. SIGTERM does not, which systemd and a launcher may send both,
+# nor does the death of the launcher.
 CUTS_SHORT = (signal.SIGINT, signal.SIGQUIT)
 ORPHANED = signal.SIGUSR1  # from the kernel, when the launcher that started us has died
 ENDS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
