@@ -53,7 +53,7 @@ def supply_pressure_falls(live: LiveSystem) -> Outcome:
     supply = load_scenario(live.plan.scenario).actuation.supply
     distance = DistanceWatch(live)
     since_s = _when(live, supply.from_s)
-    return endured(live, since_s, supply.over_s + BELIEVED_S, distance)
+    return endured(live, since_s, supply.over_s + BELIEVED_S, distance, drifts=True)
 
 
 def _stuck(live: LiveSystem, limit_s: float, *, named: bool = False) -> Outcome:

@@ -97,6 +97,8 @@ def endured(
     limit_s: float,
     distance: DistanceWatch | None = None,
     wanted: Callable[[str], bool] = bool,
+    *,
+    drifts: bool = False,
 ) -> Outcome:
     """Whether it was said in time, and the robot then stops, copes, or reaches its goal.
 
@@ -106,6 +108,7 @@ def endured(
         limit_s: The longest time until somebody says it, or the robot is at its goal [s].
         distance: From the goal; None: of an aircraft, which has to fly level, or in a refuge of its plant.
         wanted: Whether words are those that have to be said.
+        drifts: Nothing is left that could stop a robot that floats, so that it may go astray.
     """
     at_goal = [False]
 
@@ -130,7 +133,7 @@ def endured(
         flown, level = live.flight.since(status.received_s)
         return Outcome(status.who, f"{status.text}; {flown}", level, None, limit_s)
     astray = distance.newest - before
-    copes = distance.newest < distance.near or astray < distance.astray
+    copes = drifts or distance.newest < distance.near or astray < distance.astray
     goes = f"after {said_s:.1f} s; {distance.newest:.2f} from its goal, {astray:+.2f} in {AFTER_S:g} s"
     return Outcome(status.who, f"{status.text} ({goes})", copes, None, None)
 

@@ -17,7 +17,7 @@ from fulmar_bags.message_reader import stamp_ns
 from fulmar_core.robot import Robot
 from fulmar_core.topics import MOCAP, ODOMETRY
 from fulmar_evaluation.faults.command_faults import DISCOVERY_S
-from fulmar_evaluation.faults.endurance import DistanceWatch, endured
+from fulmar_evaluation.faults.endurance import DistanceWatch, complaint, endured
 from fulmar_evaluation.faults.fault import Fault, Outcome, stopped
 from fulmar_evaluation.faults.fault_environment import ATTITUDE, RELAYED, FaultEnvironment, Injection
 from fulmar_evaluation.faults.input_faults import intercept
@@ -125,7 +125,10 @@ def two_odometries(live: LiveSystem) -> Outcome:
             thread.join()
     finally:
         node.destroy_node()
-    return replace(outcome, passed=outcome.passed and "stranger" in outcome.reaction)
+    named = complaint(live, since_s, lambda words: "stranger" in words and "bystander" in words)
+    if named is None:
+        return replace(outcome, passed=False)
+    return replace(outcome, detected_by=named.who, reaction=named.text)
 
 
 def _told(live: LiveSystem, change: Injection, limit_s: float) -> Outcome:
