@@ -36,6 +36,9 @@ IN_SPACE = (  # what differs there: three axes, sixteen valves, longer ticks, an
     "commands_from_another_node",
     "bundle_refused_with_fallback",
     "swap_to_the_same_policy",
+    "mocap_frozen",
+    "valve_stuck_open",
+    "supply_pressure_falls",
 )
 SATELLITE = "cubesat_wheels"
 ON_A_SATELLITE = (  # what differs there: estimators in a chain, a place that does not change
@@ -45,6 +48,10 @@ ON_A_SATELLITE = (  # what differs there: estimators in a chain, a place that do
     "odometry_dated_back",
     "goals_killed",
     "goal_with_a_wrong_quaternion",
+    "star_tracker_frozen",
+    "star_tracker_drifts",
+    "wheel_dead",
+    "two_odometries",
 )
 AIRCRAFT = "airship_v7"
 ON_AN_AIRCRAFT = (  # what differs there: it flies on, by the plant's own state
@@ -60,6 +67,11 @@ ON_AN_AIRCRAFT = (  # what differs there: it flies on, by the plant's own state
     "commands_late",
     "commands_from_another_node",
     "time_jump_backwards",
+    "recorder_killed",
+    "supervisor_stopped",
+    "surface_stuck",
+    "propeller_lost",
+    "gnss_creeps",
 )
 KEYS = [
     "name",
