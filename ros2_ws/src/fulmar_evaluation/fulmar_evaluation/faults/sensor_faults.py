@@ -15,6 +15,7 @@ from nav_msgs.msg import Odometry
 
 from fulmar_bags.message_reader import stamp_ns
 from fulmar_core.robot import Robot
+from fulmar_core.sensors.repetition import FEWEST
 from fulmar_core.topics import MOCAP, ODOMETRY
 from fulmar_evaluation.faults.command_faults import DISCOVERY_S
 from fulmar_evaluation.faults.endurance import DistanceWatch, complaint, endured
@@ -26,6 +27,7 @@ from fulmar_evaluation.faults.observer import wait_for
 from fulmar_ros.qos import publisher_qos
 
 NOISE_S = 1.0  # beyond the watchdog: what repeats of a noisy value, or slow drifts, take to tell
+REPEATS = FEWEST + 2  # readings of a slow sensor until it is known to be frozen, the one under way among them
 DRIFT_DEG = 0.05  # per second, of a star tracker [deg/s]
 TOLD_S = 20.0  # until a drift that slow has left the noise of gyroscope and wheels
 CREEP = 0.3  # of a position from satellites, with a velocity that knows nothing of it [m/s]
@@ -67,7 +69,9 @@ def mocap_frozen(live: LiveSystem) -> Outcome:
 
 def star_tracker_frozen(live: LiveSystem) -> Outcome:
     """The star tracker repeats its last attitude, under new stamps."""
-    return _told(live, frozen(), live.watchdog_s + NOISE_S)
+    tracker = live.robot.sensors.star_tracker
+    slow_s = REPEATS / tracker.rate_hz if tracker is not None and tracker.rate_hz else 0.0
+    return _told(live, frozen(), live.watchdog_s + NOISE_S + slow_s)
 
 
 def star_tracker_drifts(live: LiveSystem) -> Outcome:
