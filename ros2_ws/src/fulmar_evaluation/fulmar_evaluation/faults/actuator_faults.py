@@ -20,6 +20,7 @@ from fulmar_evaluation.faults.observer import wait_for
 
 MEASURED_S = 5.0  # until a part is named whose motion is measured
 BELIEVED_S = 15.0  # until it is stopped or at its goal, where only the robot's motion tells of it
+HIGH_M = 15.0  # for an aircraft to come back to level flight
 COMES_S = 30.0  # by then the scenario has begun to do it
 
 
@@ -102,7 +103,7 @@ def _without_valves(robot: Robot) -> str:
 
 
 def _fault(do: Callable[[LiveSystem], Outcome]) -> Fault:
-    return Fault(do, FaultEnvironment(scenario=do.__name__), _without_parts(do.__name__))
+    return Fault(do, FaultEnvironment(scenario=do.__name__, height_m=HIGH_M), _without_parts(do.__name__))
 
 
 ACTUATOR_FAULTS = (

@@ -14,13 +14,13 @@ from fulmar_core.topics import TRUTH
 from fulmar_core.wire_check import BETWEEN, WARNINGS
 from fulmar_evaluation.faults.fault import STAYS_S, Outcome
 from fulmar_evaluation.faults.fault_environment import goal_of
-from fulmar_evaluation.faults.flight_watch import FLIES_S
 from fulmar_evaluation.faults.live_system import LiveSystem
 from fulmar_evaluation.faults.observer import HealthStatus, wait_for
 from fulmar_ros.convert import OdometryReader
 from fulmar_ros.qos import subscriber_qos
 
 NEAR_M, NEAR_DEG = 0.3, 5.0  # from the goal: the robot copes with what was done
+LEVEL_AGAIN_S = 10.0  # for an aircraft to fly level again, or to come down
 AFTER_S = 4.0  # for which it is watched once it was said
 ASTRAY_M, ASTRAY_DEG = (
     0.5,
@@ -122,16 +122,16 @@ def endured(
         words = f"at its goal within {time.monotonic() - since_s:.1f} s, and nobody said anything"
         return Outcome("", words if at_goal[0] else "nobody said anything", at_goal[0], None, limit_s)
     said_s, before = status.received_s - since_s, math.inf if distance is None else distance.newest
-    time.sleep(AFTER_S if distance is not None else FLIES_S)
+    time.sleep(AFTER_S if distance is not None else LEVEL_AGAIN_S)
+    if distance is None:
+        assert live.flight is not None
+        flown, level = live.flight.settled(status.received_s)
+        return Outcome(status.who, f"{status.text}; {flown}", level, None, limit_s)
     safe, safe_s = resting(live, since_s)
     if safe or live.has_ended:
         return Outcome(
             status.who, f"{status.text}; stopped", True, safe_s, None if safe_s is None else limit_s + AFTER_S
         )
-    if distance is None:
-        assert live.flight is not None
-        flown, level = live.flight.since(status.received_s)
-        return Outcome(status.who, f"{status.text}; {flown}", level, None, limit_s)
     astray = distance.newest - before
     copes = drifts or distance.newest < distance.near or astray < distance.astray
     goes = f"after {said_s:.1f} s; {distance.newest:.2f} from its goal, {astray:+.2f} in {AFTER_S:g} s"

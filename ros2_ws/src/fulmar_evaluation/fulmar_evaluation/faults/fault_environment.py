@@ -135,6 +135,7 @@ class FaultEnvironment:
     two_hosts: bool = False  # the controller is on another one
     clock_of: str = ""  # node whose clock may step; empty: none
     bundle: Callable[[Path], None] | None = None  # what is done to the bundle before the start
+    height_m: float = HELD[2]  # at which an aircraft begins [m]
     nadir: bool = False  # a satellite keeps pointing to the Earth, and turns with its orbit
 
     def guards_of(self, robot: Robot) -> dict[str, Any]:
@@ -239,8 +240,8 @@ def request_of(name: str, record: Path, about: FaultEnvironment = USUAL) -> RunR
 def _start_of(robot: Robot, about: FaultEnvironment) -> tuple[float, ...] | None:
     """Where it starts, as people write it: an aircraft in level flight [m, deg]; None: as the task draws it."""
     if robot.airframe is not None:
-        level = find_trim(robot, robot.airframe.speed, HELD[2]).state
-        return *HELD[:3], *SpatialState.written(level.pose)[3:]
+        level = find_trim(robot, robot.airframe.speed, about.height_m).state
+        return *HELD[:2], about.height_m, *SpatialState.written(level.pose)[3:]
     return None if about.nadir else (0.0,) * robot.state_type.AXES
 
 

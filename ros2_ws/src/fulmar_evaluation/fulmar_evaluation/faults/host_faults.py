@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import signal
 import time
 
@@ -51,6 +52,7 @@ def supervisor_killed(live: LiveSystem) -> Outcome:
     since_s = live.until_it_moves()
     nodes = list(live.launched.nodes().values())
     live.launched.process.kill()
+    killed_s = time.monotonic()
     limit_s = ENDED_S if live.flight is None else OWN_LANDING_S
     wait_for(lambda: not any(map(_lives, nodes)), limit_s)
     left = sum(map(_lives, nodes))
@@ -61,7 +63,9 @@ def supervisor_killed(live: LiveSystem) -> Outcome:
     if live.flight is not None:
         flown, level = live.flight.since(since_s)
         words, ends_safe = f"{words}; {flown}", ends_safe and level
-    return Outcome("nodes" if not left else "", words, ends_safe and not left, safe_s, limit_s)
+    # The recorder of an aircraft ends before its plant, which flies it down.
+    away = (killed_s, math.inf) if live.flight is not None else None
+    return Outcome("nodes" if not left else "", words, ends_safe and not left, safe_s, limit_s, away)
 
 
 def _lives(process: psutil.Process) -> bool:

@@ -69,8 +69,8 @@ def mocap_frozen(live: LiveSystem) -> Outcome:
 
 def star_tracker_frozen(live: LiveSystem) -> Outcome:
     """The star tracker repeats its last attitude, under new stamps."""
-    tracker = live.robot.sensors.star_tracker
-    slow_s = REPEATS / tracker.rate_hz if tracker is not None and tracker.rate_hz else 0.0
+    rate_hz = live.robot.sensors.specs["star_tracker"].rate_hz
+    slow_s = REPEATS / rate_hz if rate_hz else 0.0
     return _told(live, frozen(), live.watchdog_s + NOISE_S + slow_s)
 
 
