@@ -50,6 +50,8 @@ class KobukiDriver(DeviceDriver):
         self._feedback = Feedback(f"Kobuki base at {settings.port}", settings.silent_s)
         self._decoder, self._time = Decoder(), DeviceTime(WRAP_MS)
         self._odometry = WheelOdometry(COUNT * WHEEL_RADIUS)
+        self._fastest = robot.limits.speed + 0.5 * robot.actuators.track * robot.limits.yaw_rate  # rim [m/s]
+        self._jumps = 0
         self._standing = StalledWheels()
         self._begin: tuple[float, float, float] | None = None
         self._core: CoreSensors | None = None
@@ -99,7 +101,7 @@ class KobukiDriver(DeviceDriver):
         core = self._core
         if core is None:
             return {}
-        warning = _touched(core) or _strained(core)
+        warning = _touched(core) or self._feedback.refusal or _strained(core)
         return {
             "battery_v": f"{core.battery:.1f}",
             "bumpers": str(core.bumpers),
@@ -107,6 +109,7 @@ class KobukiDriver(DeviceDriver):
             "wheel_drops": str(core.wheel_drops),
             "overcurrent": str(core.overcurrent),
             "lost_bytes": str(self._decoder.lost),
+            "refused_reports": str(self._jumps),
             "warning": warning,
         }
 
@@ -137,6 +140,10 @@ class KobukiDriver(DeviceDriver):
         begin, stamp_ns = self._begin, self._time.stamp_ns(core.time_ms, now_ns)
         if begin is not None:
             self._odometry.begin(*begin)
+        if problem := self._odometry.problem(core.left, core.right, stamp_ns / 1e9, self._fastest):
+            self._jumps += 1
+            self._feedback.refuse(problem)
+            return
         rims = self._wheels.wheel_speeds(self._sent) * WHEEL_RADIUS
         if problem := self._standing.problem(rims, np.array((core.left, core.right)), stamp_ns / 1e9):
             self._feedback.fail(problem)

@@ -12,6 +12,7 @@ from fulmar_core.state import RigidBodyState
 
 COUNTS = 1 << 16  # encoders count up to here and begin again
 LONGEST_GAP_S = 0.5  # the speed after a longer gap is zero
+JUMP_M = 0.05  # our value: beyond what the highest speed explains, for reports that came late
 
 
 class WheelOdometry:
@@ -31,6 +32,22 @@ class WheelOdometry:
         self._x, self._y, self._heading = x, y, heading
         self._left: int | None = None
         self._right, self._gyro, self._time_s = 0, 0.0, 0.0
+
+    def problem(self, left: int, right: int, time_s: float, fastest: float) -> str:
+        """Why no base has rolled so since the last report, such as one that was switched off and on; empty if one may.
+
+        Args:
+            left: As of `see`.
+            right: Same.
+            time_s: Same.
+            fastest: Highest speed of a rim [m/s].
+        """
+        if self._left is None:
+            return ""
+        rolled = self._scale * max(abs(_rolled(left - self._left)), abs(_rolled(right - self._right)))
+        if rolled <= fastest * max(0.0, time_s - self._time_s) + JUMP_M:
+            return ""
+        return "a wheel's count jumped: was the base switched off and on?"
 
     def see(self, left: int, right: int, gyro: float, yaw_rate: float, time_s: float) -> RigidBodyState:
         """Take a report.

@@ -116,6 +116,25 @@ def test_a_launch_argument_with_a_break_is_refused_by_its_name(field, text):
         list_nodes(**{field: f"a{text}b"})
 
 
+EXTERNAL = {"controller": "external", "robot": "floating_platform", "adapter": "zero_g_lab_valve_node"}
+BESIDE = {"topic": EXTERNAL, "adapter": EXTERNAL, "hardware": {"backend": "hardware", "robot": "turtlebot2"}}
+
+
+@pytest.mark.parametrize("field", sorted(set(LAUNCHED) - {"policy"}))
+@pytest.mark.parametrize("text", ['a"b', "a'b", "a;b", "$(env HOME)", "%h", "../../etc/passwd"])
+def test_a_launch_argument_that_is_no_name_is_refused_with_what_was_given(field, text):
+    with pytest.raises(ConfigError) as refusal:
+        list_nodes(**BESIDE.get(field, {}) | {field: text})
+    assert text in str(refusal.value)
+
+
+@pytest.mark.parametrize("text", ['a"b', "a;b", "$(env HOME)", "%h"])
+def test_a_launched_folder_reaches_its_node_as_it_is(text):
+    """As text with its type, which launch_ros neither reads as YAML nor fills in."""
+    rows = {row.name: row for row in list_nodes(system="mujoco_policy", policy=text)}
+    assert rows["controller"].parameters["policy"] == text
+
+
 @pytest.mark.parametrize("program", PROGRAMS)
 @given(text=TEXTS)
 def test_a_layout_has_the_name_as_it_is_or_it_is_refused(program, text):

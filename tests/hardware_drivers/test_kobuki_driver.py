@@ -115,6 +115,24 @@ def test_a_wheel_in_the_air_stops_everything(bench, driver):
     assert "hangs in the air" in driver.health()["warning"]
 
 
+def test_counts_that_jump_are_refused_and_end_the_reports_where_they_stay(bench, driver):
+    """As after the base was switched off and on: its encoders begin at zero."""
+    drive(driver, (0.2, 0.0), 0.3)
+    turning = bench.device._wheels
+    bench.device._wheels = lambda: tuple(angle + 40.0 for angle in turning())
+    with pytest.raises(DeviceError, match="refused, the last: a wheel's count jumped"):
+        drive(driver, (0.0, 0.0), 2.0)
+
+
+def test_a_wrong_count_in_one_report_moves_nothing(bench, driver):
+    before = drive(driver, (0.0, 0.0), 0.2).odometry.position_in_world
+    turning, wrong = bench.device._wheels, iter([True])
+    bench.device._wheels = lambda: tuple(angle + 40.0 * next(wrong, False) for angle in turning())
+    until(lambda: drive(driver, (0.0, 0.0), 0.02) and driver.health()["refused_reports"] == "1")
+    after = drive(driver, (0.0, 0.0), 0.2).odometry.position_in_world
+    assert after == pytest.approx(before, abs=0.01)
+
+
 def test_a_base_that_is_lifted_is_a_refusal_and_one_on_a_threshold_is_none(bench, driver):
     bench.device.wheel_drops = 1
     assert drive(driver, (0.2, 0.0), 0.5 * LIFTED_S).refusal == ""
