@@ -57,7 +57,7 @@ class TopicDriver(DeviceDriver):
             DeviceError: There is none.
         """
         self._send, self._listeners = send, listeners
-        self._heard_s = time.monotonic()
+        self._listened_s = time.monotonic()
         listeners.wait(patience_s)
 
     def write(self, command: np.ndarray) -> None:
@@ -68,8 +68,8 @@ class TopicDriver(DeviceDriver):
         """Whether nobody takes the commands any more; see `Answering`."""
         now_s = time.monotonic()
         if self._listeners.count():
-            self._heard_s = now_s
-        if now_s - self._heard_s < LONELY_S:
+            self._listened_s = now_s
+        if now_s - self._listened_s < LONELY_S:
             return ""
         return f"no node subscribes to {self._listeners.topic} any more: nobody carries out commands"
 
