@@ -162,7 +162,7 @@ def _load(path: Path) -> Any:
             f"{path}: holds {what}, which could run code when it is loaded; only weights are imported, and nothing was "
             "executed. Save the state dictionaries alone, or export the policy as ONNX."
         ) from error
-    except (RuntimeError, EOFError, LookupError, ValueError, TypeError, AttributeError) as error:
+    except Exception as error:  # damaged pickles and archives raise whatever they please
         raise ConfigError(
             f"{path}: is no checkpoint that PyTorch reads ({type(error).__name__}). "
             "Give a .pt of skrl, a .pth of rl_games or an .onnx file."

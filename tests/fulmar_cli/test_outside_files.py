@@ -12,6 +12,7 @@ import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 import torch
@@ -222,12 +223,20 @@ def an_expanded_tensor(path: Path) -> None:
     torch.save({"policy": {"net.weight": weight, "net.bias": torch.zeros(100_000)}}, path)
 
 
+def an_endless_recording(path: Path) -> None:
+    """A kilobyte that stands for a trillion events."""
+    with h5py.File(path, "w") as file:
+        for name in "xytp":
+            file.create_dataset(f"events/{name}", shape=(10**12,), dtype="u4", chunks=(1 << 20,))
+
+
 HARMFUL = (
     a_pipe,
     a_device,
     ten_gigabytes,
     ten_gigabytes_that_begin_well,
     an_expanded_tensor,
+    an_endless_recording,
 )
 BOMBS = (a_packed_bomb, a_zipped_bomb)
 

@@ -8,12 +8,14 @@ events: it is read block by block.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from fulmar_bags.mcap_records import UNPACK_LEAST, UNPACK_RATIO
 from fulmar_core.errors import BagError, ConfigError
 from fulmar_core.sky.events import Events, as_polarities, joined
 
@@ -154,7 +156,7 @@ def _dsec(path: Path) -> Iterator[tuple[np.ndarray, ...]]:
 
 
 def _refuse_layout(path: Path, name: str, part: Any) -> None:
-    """Refuse what is no row of whole numbers.
+    """Refuse what is no row of whole numbers, what stands for numbers that the file does not have, and other files.
 
     Raises:
         BagError: As said.
@@ -164,6 +166,11 @@ def _refuse_layout(path: Path, name: str, part: Any) -> None:
         found = "a group" if shape is None else f"{kind} of shape {shape}"
         seconds = " Times in seconds: multiply them by 1e6, and round." if name == "events/t" else ""
         raise BagError(f"{path}: '{name}' is {found}, must be a row of whole numbers. {LAYOUT}{seconds}")
+    if part.is_virtual or part.external:
+        raise BagError(f"{path}: '{name}' lies in other files, which are not opened. Copy it into this one.")
+    held = part.id.get_storage_size()
+    if part.nbytes > max(UNPACK_LEAST, UNPACK_RATIO * held):
+        raise BagError(f"{path}: '{name}' stands for {part.nbytes} bytes, and the file holds {held} of them.")
 
 
 def _offset_us(path: Path, part: Any) -> int:
@@ -180,13 +187,22 @@ def _offset_us(path: Path, part: Any) -> int:
 
 def _aedat4(path: Path) -> Iterator[tuple[np.ndarray, ...]]:
     decoder, stream, _ = _aedat4_stream(path)
-    try:
+    with _aedat_errors(f"{path}: the file is damaged"):
         for packet in decoder:
             if packet["stream_id"] == stream:
                 events = packet["events"]
                 yield events["x"], events["y"], US * events["t"].astype(np.int64), events["on"]
-    except RuntimeError as error:
-        raise BagError(f"{path}: the file is damaged: {error}") from error
+
+
+@contextmanager
+def _aedat_errors(what: str) -> Iterator[None]:
+    """Errors of `aedat` as `BagError`; a panic of its Rust code is no `Exception`, and has no public name."""
+    try:
+        yield
+    except BaseException as error:
+        if isinstance(error, RuntimeError) or type(error).__name__ == "PanicException":
+            raise BagError(f"{what}: {' '.join(str(error).split())}") from error
+        raise
 
 
 def _aedat4_size(path: Path) -> tuple[int, int]:
@@ -198,10 +214,8 @@ def _aedat4_stream(path: Path) -> tuple[Any, int, dict[str, Any]]:
     """Decoder, number of the first stream of events, and what the file says of it."""
     import aedat
 
-    try:
+    with _aedat_errors(f"{path}: cannot be read as AEDAT4"):
         decoder = aedat.Decoder(str(path))
-    except RuntimeError as error:
-        raise BagError(f"{path}: cannot be read as AEDAT4: {error}") from error
     for number, about in decoder.id_to_stream().items():
         if about["type"] == "events":
             return decoder, number, about
