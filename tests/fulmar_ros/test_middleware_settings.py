@@ -16,6 +16,8 @@ from fulmar_ros.middleware import (
     PROFILES,
     STATIC_PEERS,
     TRANSPORTS,
+    discovery_range,
+    environment_of_any_node,
     middleware_environment,
     own_profile,
     range_for_rclpy,
@@ -56,6 +58,26 @@ def test_the_profile_follows_a_range_that_changed_since_a_parent_chose_it(enviro
         environment.setenv(name, value)
     environment.setenv(DISCOVERY_RANGE, "SUBNET")
     assert {middleware_environment()[name] for name in PROFILES} == {str(NETWORK)}
+
+
+@pytest.mark.parametrize(
+    ("variables", "read"),
+    [
+        ({}, "SYSTEM_DEFAULT"),
+        (UDP, "SYSTEM_DEFAULT"),
+        (PEERS | UDP, "SUBNET"),
+        (PEERS, "LOCALHOST"),
+        (SUBNET, "SUBNET"),
+    ],
+)
+def test_a_node_that_is_not_of_fulmar_gets_the_range_of_its_profile_which_ours_read_as_what_was_meant(
+    variables, read
+):
+    given = variables | environment_of_any_node(variables)
+    assert given[DISCOVERY_RANGE] == read
+    assert own_profile(given) == own_profile(variables)
+    assert discovery_range(given) == discovery_range(variables)
+    assert environment_of_any_node(given) == {name: given[name] for name in (DISCOVERY_RANGE, *PROFILES)}
 
 
 @pytest.mark.parametrize("name", PROFILES)

@@ -11,7 +11,14 @@ import psutil
 import pytest
 
 from fulmar_evaluation.faults.two_hosts import TwoHosts, inside, two_hosts, why_not
-from fulmar_ros.middleware import DISCOVERY_RANGE, PROFILES, STATIC_PEERS, TRANSPORTS, UDP_ONLY
+from fulmar_ros.middleware import (
+    DISCOVERY_RANGE,
+    PROFILES,
+    STATIC_PEERS,
+    TRANSPORTS,
+    UDP_ONLY,
+    environment_of_any_node,
+)
 from tests.conftest import RosDomain
 from tests.ros.split_parts import in_container
 
@@ -48,6 +55,14 @@ while time.monotonic() < end:
         publisher.publish(publisher.msg_type())
     rclpy.spin_once(node, timeout_sec=0.1)
 """
+NOT_OURS = """
+import sys
+import rclpy
+rclpy.init()
+node = rclpy.create_node("own", namespace="/boat")
+print("ready", flush=True)
+sys.stdin.readline()
+"""
 ALL = "actuators/command controller/swap estop estop/released goal_pose"
 PLAIN = "rclpy.init()"  # no code of Fulmar: whatever speaks ROS 2
 OURS = "from fulmar_ros.runtime import init_ros; init_ros()"
@@ -67,9 +82,9 @@ def environment(domain: RosDomain, **more: str) -> dict[str, str]:
 
 
 @contextmanager
-def victim(hosts: TwoHosts, env: dict[str, str]) -> Iterator[subprocess.Popen[str]]:
-    """A node of Fulmar on the robot's host."""
-    command = in_container(hosts.robot, [sys.executable, "-c", VICTIM], other_user=False)
+def victim(hosts: TwoHosts, env: dict[str, str], code: str = VICTIM) -> Iterator[subprocess.Popen[str]]:
+    """A node on the robot's host, by default one of Fulmar."""
+    command = in_container(hosts.robot, [sys.executable, "-c", code], other_user=False)
     with subprocess.Popen(
         command, env=env, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     ) as child:
@@ -129,9 +144,15 @@ def test_with_a_static_peer_that_host_is_heard_and_no_other(
     assert heard_from_the_other_host(hosts, ros_domain, **{STATIC_PEERS: peer}) == arrives
 
 
+@pytest.mark.parametrize(
+    "code", [VICTIM, pytest.param(NOT_OURS, marks=pytest.mark.slow)], ids=["ours", "other"]
+)
 def test_the_sockets_of_a_node_are_bound_to_loopback_with_default_settings(
-    hosts: TwoHosts, ros_domain: RosDomain
+    hosts: TwoHosts, ros_domain: RosDomain, code: str
 ) -> None:
-    with victim(hosts, environment(ros_domain)) as node, inside(hosts.robot):
+    """Also those of a node that is not of Fulmar, as a launcher of Fulmar starts it."""
+    given = environment(ros_domain)
+    env = given if code == VICTIM else given | environment_of_any_node(given)
+    with victim(hosts, env, code) as node, inside(hosts.robot):
         own = [connection.laddr.ip for connection in psutil.Process(node.pid).net_connections("udp4")]
     assert set(own) == {"127.0.0.1"}

@@ -20,7 +20,7 @@ import psutil
 from fulmar_bringup.console import printable
 from fulmar_bringup.run_plan import NodeSpec, Parameter
 from fulmar_core.process import LAUNCHER_PID
-from fulmar_ros.middleware import middleware_environment
+from fulmar_ros.middleware import environment_of_any_node, middleware_environment
 
 PATIENCE_S = 4.0  # for an orderly end, before it is no longer asked for
 KILL_S = 2.0  # for a process to be gone after SIGKILL [s]
@@ -51,7 +51,8 @@ class ProcessGroup:
 
     def __init__(self, environment: Mapping[str, str] | None = None) -> None:
         """Begin without children, whose environment is ours and what is given."""
-        self._environment = {**os.environ, **child_environment(), **(environment or {})}
+        given = {**os.environ, **child_environment(), **(environment or {})}
+        self._environment = given | environment_of_any_node(given)
         self._children: dict[str, psutil.Popen] = {}
         self._relays: dict[str, _Relay] = {}
         self._specs: dict[str, NodeSpec] = {}

@@ -30,7 +30,8 @@ _loaded: list[str] = []  # the profile of this process; Fast DDS reads it once
 
 def discovery_range(environment: Mapping[str, str]) -> str:
     """How far the nodes of an environment are discovered: not on the network, unless it says so."""
-    return environment.get(DISCOVERY_RANGE) or OWN_HOST
+    wanted, profile = environment.get(DISCOVERY_RANGE) or OWN_HOST, environment.get(PROFILES[0], "")
+    return OWN_HOST if wanted == RANGE_OF.get(profile) else wanted
 
 
 def static_peers(environment: Mapping[str, str]) -> list[str]:
@@ -54,12 +55,23 @@ def own_profile(environment: Mapping[str, str]) -> Path:
     return LOOPBACK_UDP if by_udp else LOOPBACK
 
 
-def middleware_environment() -> dict[str, str]:
-    """The variables that Fast DDS reads, as this process or a child of it should have them."""
-    own = {DISCOVERY_RANGE: discovery_range(os.environ)}
-    if not foreign_profile(os.environ):
-        own |= dict.fromkeys(PROFILES, str(own_profile(os.environ)))
+def middleware_environment(environment: Mapping[str, str] | None = None) -> dict[str, str]:
+    """The variables that Fast DDS reads, as processes of an environment should have them, by default of this one."""
+    environment = os.environ if environment is None else environment
+    own = {DISCOVERY_RANGE: discovery_range(environment)}
+    if not foreign_profile(environment):
+        own |= dict.fromkeys(PROFILES, str(own_profile(environment)))
     return own
+
+
+def environment_of_any_node(environment: Mapping[str, str]) -> dict[str, str]:
+    """The same for processes that need not be of Fulmar, with the range that goes with the profile; see `RANGE_OF`.
+
+    Nodes of Fulmar read it as what it stands for, see `discovery_range`.
+    """
+    own = middleware_environment(environment)
+    range_for_profile = RANGE_OF.get(own.get(PROFILES[0], ""), own[DISCOVERY_RANGE])
+    return own | ({DISCOVERY_RANGE: range_for_profile} if own[DISCOVERY_RANGE] == OWN_HOST else {})
 
 
 def set_up_middleware() -> None:
