@@ -1,0 +1,259 @@
+"""Which part of a robot died or stuck, by how well each hypothesis explains the newest seconds.
+
+What is measured is linear in what parts should do: y = Σ share_i · expected_i + offset_i · shape_i + push, plus noise.
+A sound part has a share near 1 and no offset, a dead one a share of 0, a stuck one a share of 0 and some offset. Each
+hypothesis is a Gaussian prior of these coefficients, and the measurements of a short window give its evidence (Bayesian
+model comparison; Bishop 2006, "Pattern Recognition and Machine Learning", §3.4). What was learned before that window,
+of a constant push and of shares that are not quite 1, is the prior of them all.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+SHARE = 0.2  # spread of a sound part's share [-]
+DEAD = 0.05  # spread of a dead part's share [-]
+MEMORY_S = 20.0  # what is older counts less and less [s]
+LEARNT_S = 2.0  # length of what pushes are learned from at once [s]
+ONSETS_S = (1.0, 2.0, 3.0)  # times since when a part may be dead [s]
+LIKELIER = 8.0  # logarithm by which a hypothesis must be likelier than that of sound parts [-]
+DOUBTFUL = 1.0  # same from which nothing is learned of sound parts [-]
+APART = 4.0  # and than any of another part [-]
+LASTS_S = 0.5  # for so long [s]
+TAKEN_BACK = 6.0  # variance of a difference of changes of what is measured with a variance of 1 [-]
+CALM = 10.0  # measurements of the noise that is expected, before there are any
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """A hypothesis: parts that are dead or stuck."""
+
+    parts: tuple[int, ...]
+    stuck: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class _Measured:
+    """What was measured of one interval."""
+
+    seconds: float
+    rows: np.ndarray  # what each coefficient adds to each value, shape (m, c)
+    values: np.ndarray  # shape (m,)
+    std: np.ndarray  # shape (m,)
+
+
+class ResponseBank:
+    """Compares hypotheses for one robot.
+
+    Coefficients are the shares of the parts, their offsets, and pushes from outside.
+
+    Attributes:
+        fault: Which parts are believed dead or stuck; empty: none.
+    """
+
+    def __init__(
+        self,
+        parts: int,
+        *,
+        offsets: np.ndarray,
+        aside: np.ndarray | None = None,
+        pushes: np.ndarray | None = None,
+        changes: np.ndarray | None = None,
+        together: bool = False,
+        adds_up: bool = False,
+    ) -> None:
+        """Begin with sound parts.
+
+        Args:
+            parts: n, how many there are.
+            offsets: Largest offset of each part once it is stuck, shape (n,).
+            aside: Spread of the offsets of sound parts, shape (n,); none by default.
+            pushes: Spread of each push from outside, shape (k,); none by default.
+            changes: By how much it may change within seconds, shape (k,).
+            together: Whether all parts may be dead at once, as those of a robot that is held.
+            adds_up: Whether values are changes of something that is measured with white noise, as velocities are: the
+                noise of one change is taken back by the next.
+        """
+        pushes = np.zeros(0) if pushes is None else pushes
+        changes = np.zeros(0) if changes is None else changes
+        self._parts, self._offsets, self._adds_up = parts, offsets, adds_up
+        self._none = 1e-3 * offsets
+        spread = np.concatenate((np.full(parts, SHARE), self._none if aside is None else aside, pushes))
+        self._mean = np.concatenate((np.ones(parts), np.zeros(parts + len(pushes))))
+        self._covariance = np.diag(np.square(spread))
+        self._changes = np.diag(np.square(np.concatenate((np.zeros(2 * parts), changes))))
+        self._faults = [Fault((i,), stuck) for i in range(parts) for stuck in (False, True)]
+        if together and parts > 1:
+            self._faults.append(Fault(tuple(range(parts))))
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything."""
+        size = len(self._mean)
+        self._recent: deque[_Measured] = deque()
+        self._gone: list[_Measured] = []  # of the recent past, until they are as long as the window
+        self._past = np.zeros((size, size)), np.zeros(size)  # information and evidence
+        self._squares, self._count, self._deviations = (
+            CALM * (TAKEN_BACK if self._adds_up else 2.0),
+            CALM,
+            np.zeros(0),
+        )
+        self._prior = self._mean, self._covariance
+        self._likeliest: tuple[int, ...] = ()
+        self._lasts_s, self._doubtful = 0.0, False
+        self.fault: tuple[int, ...] = ()
+
+    def add(self, seconds: float, rows: np.ndarray, values: np.ndarray, std: np.ndarray) -> None:
+        """Take what was measured.
+
+        Args:
+            seconds: For how long it holds [s].
+            rows: What each coefficient adds to each value, shape (m, 2 n + k).
+            values: What was measured, shape (m,).
+            std: Standard deviation of each, or of what it is the change of, > 0, shape (m,).
+        """
+        self._take_noise(seconds, (values - rows @ self._prior[0]) / std)
+        self._recent.append(_Measured(seconds, rows, values, std))
+        length_s = sum(each.seconds for each in self._recent)
+        while length_s > ONSETS_S[-1] + 1e-6 and len(self._recent) > 1:
+            length_s -= self._recent[0].seconds
+            self._learn(self._recent.popleft())
+        self._decide(seconds)
+
+    def _learn(self, gone: _Measured) -> None:
+        """Learn pushes from what has left the window; what a fault does says nothing of sound parts."""
+        if self._doubtful:
+            self._gone.clear()
+            return
+        self._gone.append(gone)
+        gone_s = sum(each.seconds for each in self._gone)
+        if gone_s >= LEARNT_S:
+            keep, (matrix, vector), (variance, _) = (
+                np.exp(-gone_s / MEMORY_S),
+                self._sums(self._gone),
+                self._variance,
+            )
+            self._past = keep * self._past[0] + matrix / variance, keep * self._past[1] + vector / variance
+            self._prior = self._learned()
+            self._gone.clear()
+
+    def _take_noise(self, seconds: float, deviations: np.ndarray) -> None:
+        """Learn how much stronger noise is than expected: by what deviations differ from one to the next.
+
+        What a fault does lasts, so it does not count as noise.
+        """
+        if len(deviations) == len(self._deviations):
+            keep, jumps = np.exp(-seconds / MEMORY_S), deviations - self._deviations
+            self._squares = keep * self._squares + float(jumps @ jumps)
+            self._count = keep * self._count + len(jumps)
+        self._deviations = deviations
+
+    @property
+    def _variance(self) -> tuple[float, bool]:
+        """Variance of a value in its expected one, and whether values add up.
+
+        Changes of a velocity that differ more than its measurements err are kicks and noisy actuators: nothing takes
+        these back, so they do not add up to less.
+        """
+        jumps = self._squares / self._count
+        if not self._adds_up:
+            return max(1.0, 0.5 * jumps), False
+        kicks = 0.5 * (jumps - TAKEN_BACK)
+        return (1.0, True) if kicks <= 1.0 else (2.0 + kicks, False)
+
+    def _decide(self, seconds: float) -> None:
+        gains = self._gains()
+        best = max(gains, key=lambda parts: gains[parts])
+        rival = max((gain for parts, gain in gains.items() if parts != best), default=-np.inf)
+        self._doubtful = gains[best] > DOUBTFUL
+        clear = gains[best] > max(LIKELIER, rival + APART)
+        likeliest = best if clear else ()
+        self._lasts_s = self._lasts_s + seconds if likeliest and likeliest == self._likeliest else 0.0
+        self._likeliest = likeliest
+        if likeliest and self._lasts_s >= LASTS_S:
+            self.fault = likeliest
+        elif gains[best] < -LIKELIER:
+            self.fault = ()
+
+    def _gains(self) -> dict[tuple[int, ...], float]:
+        """By how much, as a logarithm, faults of parts explain the newest seconds better than sound parts do."""
+        gains: dict[tuple[int, ...], float] = {}
+        priors = [(fault.parts, *self._under(fault)) for fault in self._faults]
+        variance, _ = self._variance
+        for onset_s in ONSETS_S:
+            matrix, vector = self._sums(self._since(onset_s))
+            sound = _evidence(*self._prior, matrix / variance, vector / variance)
+            for parts, mean, covariance in priors:
+                gain = _evidence(mean, covariance, matrix / variance, vector / variance) - sound
+                gains[parts] = max(gains.get(parts, -np.inf), gain)
+        return gains
+
+    def _since(self, onset_s: float) -> list[_Measured]:
+        """What was measured in the newest seconds, oldest first."""
+        found, length_s = [], 0.0
+        for each in reversed(self._recent):
+            length_s += each.seconds
+            if found and length_s > onset_s + 1e-6:
+                break
+            found.append(each)
+        return found[::-1]
+
+    def _sums(self, measured: list[_Measured]) -> tuple[np.ndarray, np.ndarray]:
+        """Information and evidence of measurements, shapes (c, c) and (c,)."""
+        matrix, vector = np.zeros_like(self._covariance), np.zeros_like(self._mean)
+        _, adds_up = self._variance
+        for rows, values in _channels(measured):
+            if adds_up:
+                rows, values = np.cumsum(rows, axis=0), np.cumsum(values)
+            matrix, vector = matrix + rows.T @ rows, vector + rows.T @ values
+            if adds_up:  # the first measurement's noise is in all
+                total, share = rows.sum(axis=0), 1.0 / (len(rows) + 1)
+                matrix, vector = (
+                    matrix - share * np.outer(total, total),
+                    vector - share * total * values.sum(),
+                )
+        return matrix, vector
+
+    def _learned(self) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and covariance of the coefficients of sound parts, with the pushes of the time before."""
+        own = 2 * self._parts
+        if len(self._mean) == own:
+            return self._mean, self._covariance
+        precision = np.linalg.inv(self._covariance)
+        spread = np.linalg.inv(precision + self._past[0])
+        mean, covariance = self._mean.copy(), self._covariance.copy()
+        mean[own:] = (spread @ (precision @ self._mean + self._past[1]))[own:]
+        covariance[own:, own:] = (spread + self._changes)[own:, own:]
+        return mean, covariance
+
+    def _under(self, fault: Fault) -> tuple[np.ndarray, np.ndarray]:
+        """The same where parts are dead or stuck."""
+        mean, covariance = self._prior[0].copy(), self._prior[1].copy()
+        for part in fault.parts:
+            offset = self._offsets[part] if fault.stuck else self._none[part]
+            for index, spread in ((part, DEAD), (self._parts + part, offset)):
+                mean[index] = 0.0
+                covariance[index, index] = spread**2
+        return mean, covariance
+
+
+def _channels(measured: list[_Measured]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Rows and values of each channel over time, in its standard deviations."""
+    for channel in range(max(len(each.values) for each in measured)):
+        there = [each for each in measured if channel < len(each.values)]
+        std = np.array([each.std[channel] for each in there])
+        rows = np.stack([each.rows[channel] for each in there])
+        yield rows / std[:, None], np.array([each.values[channel] for each in there]) / std
+
+
+def _evidence(mean: np.ndarray, covariance: np.ndarray, matrix: np.ndarray, vector: np.ndarray) -> float:
+    """Logarithm of the evidence under a Gaussian prior, up to what is the same for all priors."""
+    precision = np.linalg.inv(covariance)
+    posterior, evidence = precision + matrix, precision @ mean + vector
+    volume = np.linalg.slogdet(precision)[1] - np.linalg.slogdet(posterior)[1]
+    fit = float(evidence @ np.linalg.solve(posterior, evidence))
+    return 0.5 * (float(volume) - float(mean @ precision @ mean) + fit)
