@@ -8,13 +8,14 @@ from fulmar_core.health.beliefs import BeliefReader, Beliefs, joined
 from fulmar_core.health.fault_monitor import FaultMonitor
 from fulmar_core.health.hypotheses import can_monitor
 from fulmar_core.health.losses import Losses
+from fulmar_core.health.motion_monitor import MotionMonitor
 from fulmar_core.health.thruster_health import Health, can_estimate_health
 from fulmar_core.robot import Robot
 from fulmar_core.safety.input_gate import Measurement
 
 
 class ActuatorBeliefs:
-    """Beliefs about valves or fans, whatever controls them; none about other actuators.
+    """Beliefs about valves, fans, driven wheels and propellers, whatever controls them; none about other actuators.
 
     Attributes:
         hopeless: Whether no pose can be held without those that are believed dead.
@@ -29,6 +30,8 @@ class ActuatorBeliefs:
             hz = settings.control_rate(robot)
             self._monitor = FaultMonitor(robot, applied, control_hz=hz, lockstep=settings.lockstep)
             self._losses = Losses(robot)
+        motion = MotionMonitor(robot, applied)
+        self._motion = motion if motion.watches else None
         self._estimated = Beliefs()
         self._epoch = 0
 
@@ -52,6 +55,12 @@ class ActuatorBeliefs:
         Returns:
             What is believed after it.
         """
+        if self._motion is not None:
+            if epoch != self._epoch:
+                self._motion.reset()
+                self._epoch = epoch
+            self._motion.take(measurement.state, measurement.stamp_ns)
+            return self._motion.beliefs
         if self._monitor is None or self._losses is None:
             return self._estimated
         if stands or epoch != self._epoch:

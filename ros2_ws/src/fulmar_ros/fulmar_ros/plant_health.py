@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 
 from rclpy.lifecycle import LifecycleNode
 
+from fulmar_core.health.feedback_check import ActuatorFeedback
 from fulmar_core.safety.actuator_guard import ActuatorGuard
 from fulmar_core.safety.watchdog import NO_COMMAND
 from fulmar_core.wire_check import BETWEEN, WIRE_WARNINGS
@@ -32,6 +33,7 @@ class PlantHealth:
         reason: Why it is in fault, or could not be configured.
         awaited: Subscribers without whom it does not begin.
         more: Health that a device reports; see `hardware_drivers.driver.DeviceDriver`.
+        feedback: Finds parts that do not do what is applied to them; None before the loops are made.
     """
 
     def __init__(self, robot: str) -> None:
@@ -44,6 +46,7 @@ class PlantHealth:
         self._said: tuple[object, ...] = ()
         self._said_at = 0.0
         self.more: Callable[[], dict[str, str]] = dict
+        self.feedback: ActuatorFeedback | None = None
 
     def open(self, node: LifecycleNode, identity: Mapping[str, str]) -> None:
         """Begin to publish, with the values of `node_identity`."""
@@ -76,7 +79,9 @@ class PlantHealth:
         level, message, key = self._status()
         more = self.more()
         unfit = BETWEEN.join(self._wire_watch.look())
-        warning = more.get("warning", "") or unfit
+        findings = self.feedback.findings if self.feedback is not None else ()
+        failed = [finding.words for finding in findings]
+        warning = more.get("warning", "") or "; ".join(failed) or unfit
         if warning and level == "ok":
             level, message = "warn", warning
         guard, listeners = self._guard, self._health.listeners()
@@ -88,8 +93,9 @@ class PlantHealth:
             return
         self._said, self._said_at = changed, now
         held = self._held()
-        values = self._values() | {WIRE_WARNINGS: unfit} | more
-        self._health.publish(level, message, values, warnings=[held] if held else [])
+        parts = ", ".join(finding.part for finding in findings if finding.part)
+        values = self._values() | {"failed_parts": parts, WIRE_WARNINGS: unfit} | more
+        self._health.publish(level, message, values, warnings=[*([held] if held else []), *failed])
 
     def _status(self) -> tuple[str, str, str]:
         """Level, message, and the part of the message whose change counts."""

@@ -12,6 +12,7 @@ from fulmar_core.actuators.refuge import DOWN
 from fulmar_core.backend import AirBearing, Backend, Sample
 from fulmar_core.errors import LockstepError
 from fulmar_core.flight.refuge import refuge_of
+from fulmar_core.health.feedback_check import ActuatorFeedback
 from fulmar_core.process import PLANT_PRIORITY, take_priority
 from fulmar_core.robot import Robot
 from fulmar_core.safety.actuator_guard import ActuatorGuard
@@ -36,17 +37,19 @@ class LockstepLoop:
         control_hz: float,
         answer_timeout_s: float,
         publish_bearing: Callable[[], None] = lambda: None,
+        feedback: ActuatorFeedback | None = None,
     ) -> None:
         """Step a simulator at `control_hz` [Hz], waiting at most `answer_timeout_s` [s] for each command.
 
-        `publish_bearing` publishes the state of the air bearing, and waits until every subscriber has it.
+        `publish_bearing` publishes the state of the air bearing, and waits until every subscriber has it; `feedback`
+        compares what is applied with what is measured.
         """
         self._backend, self._wires, self._guard, self._clock = backend, wires, guard, clock
         robot: Robot = backend.robot
         self._substeps = robot.timing.substeps(control_hz)
         self._dt = self._substeps * robot.timing.physics_dt
         self._answer_timeout_s = answer_timeout_s
-        self._publish_bearing = publish_bearing
+        self._publish_bearing, self._feedback = publish_bearing, feedback
         self._bearing_on: bool | None = None  # as it was published
         self._commanded = True  # whether a command came for the step that is under way
         self.steps = 0  # that a command came for
@@ -74,8 +77,13 @@ class LockstepLoop:
 
     def _step(self, command: np.ndarray) -> Sample:
         sample = self._backend.step(command, self._substeps)
+        self._compare(command, self._dt, sample)
         self._clock.advance(self._dt)
         return sample
+
+    def _compare(self, command: np.ndarray, seconds: float, sample: Sample) -> None:
+        if self._feedback is not None:
+            self._feedback.see(command, seconds, sample)
 
     def _exchange(self, sample: Sample, stop: threading.Event) -> np.ndarray | None:
         stamp = self._clock.now_ns
@@ -131,10 +139,12 @@ class ChainLoop(LockstepLoop):
     def _step(self, command: np.ndarray) -> Sample:
         dt = self._backend.robot.timing.physics_dt
         sample = self._backend.step(command, begins=self._substeps)
+        self._compare(command, dt, sample)
         self._clock.advance(dt)
         for _ in range(self._substeps - 1):
             self._wires.publish_tick(sample, self._clock.now_ns)
             sample = self._backend.step(command, begins=0)
+            self._compare(command, dt, sample)
             self._clock.advance(dt)
         return sample
 
@@ -216,8 +226,13 @@ class RealtimeLoop:
         clock: SimulatedTime | WallTime,
         *,
         rate: float,
+        feedback: ActuatorFeedback | None = None,
     ) -> None:
-        """Step a simulator or a robot; `rate` is simulated seconds a wall-clock second, > 0."""
+        """Step a simulator or a robot; `rate` is simulated seconds a wall-clock second, > 0.
+
+        `feedback` compares what is applied with what is measured.
+        """
+        self._feedback = feedback
         self._backend, self._wires, self._guard, self._clock = backend, wires, guard, clock
         self._dt = backend.robot.timing.physics_dt
         self.period_s = self._dt / rate
@@ -239,6 +254,8 @@ class RealtimeLoop:
             sample = self._backend.step(command)
             applied = command if sample.applied is None else sample.applied
             self._wires.publish_applied(applied, begun_ns)
+            if self._feedback is not None:
+                self._feedback.see(applied, self._dt, sample)
             self._clock.advance(self._dt)
             self.ticks += 1
             self._ticked_ns = time.monotonic_ns()

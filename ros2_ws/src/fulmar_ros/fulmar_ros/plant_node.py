@@ -15,6 +15,7 @@ from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.episode import Episode
 from fulmar_core.errors import BAD_USAGE, FAILED, ConfigError, FulmarError
 from fulmar_core.flight.refuge import BLIND, refuge_of
+from fulmar_core.health.feedback_check import ActuatorFeedback
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.safety.actuator_guard import ActuatorGuard
 from fulmar_core.safety.estop import EstopMonitor
@@ -237,6 +238,7 @@ class PlantNode(LifecycleNode):
         sample = self._backend.reset(episode, seed=seed, number=number)
         with self.wires.lock:
             self.guard.reset()  # actuators begin at rest, not where the episode before left them
+        self._feedback.reset()
         self._lockstep.run(sample, steps, self._stop, on_step)
 
     def fly_on(self, sample: Sample, *, ticks: int, stop: threading.Event, on_step: OnStep) -> None:
@@ -269,6 +271,7 @@ class PlantNode(LifecycleNode):
 
     def _make_loops(self, backend: Backend) -> None:
         """New loops with new counts and deadlines."""
+        self._feedback = ActuatorFeedback(self.robot, moves=self.settings.publishes_odometry)
         kind = ChainLoop if self.settings.between else LockstepLoop
         self._lockstep = kind(
             backend,
@@ -278,10 +281,14 @@ class PlantNode(LifecycleNode):
             control_hz=self.settings.control_rate(self.robot),
             answer_timeout_s=self.settings.answer_timeout_s,
             publish_bearing=self._air.publish_and_wait if self._air else lambda: None,
+            feedback=self._feedback,
         )
-        self._realtime = RealtimeLoop(backend, self.wires, self.guard, self.clock, rate=self.settings.rate)
+        self._realtime = RealtimeLoop(
+            backend, self.wires, self.guard, self.clock, rate=self.settings.rate, feedback=self._feedback
+        )
         realtime = None if self.settings.lockstep else self._realtime
         self.health.watch(self.guard, self.wires, self.clock, self._lockstep, realtime)
+        self.health.feedback = self._feedback
 
     def _halt(self) -> None:
         self._stop.set()

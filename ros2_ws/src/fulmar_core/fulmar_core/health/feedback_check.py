@@ -11,6 +11,7 @@ from fulmar_core.actuators.control_surfaces import ControlSurfaces
 from fulmar_core.actuators.differential_drive import DifferentialDrive
 from fulmar_core.actuators.propellers import Propellers
 from fulmar_core.actuators.reaction_wheels import ReactionWheels
+from fulmar_core.backend import Sample
 from fulmar_core.health.finding import Finding
 from fulmar_core.health.joint_feedback import ReactionWheelFeedback, SurfaceFeedback
 from fulmar_core.health.motion_feedback import CarFeedback, DriveFeedback, PropellerFeedback
@@ -90,3 +91,32 @@ class MotionCheck:
         if self._check is not None:
             self._check.see(command, seconds, motion)
             self.findings = self._check.findings
+
+
+class ActuatorFeedback:
+    """Compares every command of a plant with what its backend measures; any thread may read its findings.
+
+    Attributes:
+        findings: Parts that do not do what is applied to them.
+    """
+
+    def __init__(self, robot: Robot, *, moves: bool) -> None:
+        """Begin without findings; `moves`: whether the backend's odometry is the one that is published."""
+        self._joints, self._motion = JointCheck(robot), MotionCheck(robot) if moves else None
+        self.findings: tuple[Finding, ...] = ()
+
+    def reset(self) -> None:
+        """Begin anew, with an episode."""
+        self.findings = ()
+        self._joints.reset()
+        if self._motion is not None:
+            self._motion.reset()
+
+    def see(self, command: np.ndarray, seconds: float, sample: Sample) -> None:
+        """Take a command that was applied, shape (n,), for how long [s], and the sample at the end."""
+        self._joints.see(command, seconds, sample.readings)
+        if self._motion is None:
+            self.findings = self._joints.findings
+            return
+        self._motion.see(command, seconds, sample.odometry)
+        self.findings = (*self._joints.findings, *self._motion.findings)

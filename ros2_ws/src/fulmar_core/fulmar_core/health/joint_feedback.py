@@ -8,7 +8,7 @@ import numpy as np
 
 from fulmar_core.actuators.control_surfaces import ControlSurfaces, is_throttle
 from fulmar_core.actuators.reaction_wheels import ReactionWheels
-from fulmar_core.health.finding import Finding, dead, stuck
+from fulmar_core.health.finding import Finding, dead, stuck, unresponsive
 from fulmar_core.health.modelled_response import ModelledResponse
 from fulmar_core.health.response_bank import ResponseBank
 from fulmar_core.robot import Robot
@@ -19,6 +19,7 @@ MODEL = 0.05  # share of its full travel by which a model errs [-]
 NOISE = 4.0  # standard deviations of its sensor that are no deviation [-]
 OFF_S = 0.4  # deviation that lasts so long is a failure [s]
 AGREES_S = 2.0  # and agreement for so long ends it [s]
+STANDS_S = 0.2  # time in which it must have stood [s]
 STANDS = 0.02  # share of full travel within which a joint stands [-]
 
 
@@ -73,7 +74,7 @@ class SurfaceFeedback:
         if positions is None or not self._recent:
             return
         self._seen.append((seconds, positions))
-        _keep(self._seen, OFF_S)
+        _keep(self._seen, STANDS_S)
         recent = np.stack([modelled for _, modelled in self._recent])
         low, high = recent.min(axis=0), recent.max(axis=0)
         low = np.minimum(low, (1.0 - GAIN) * low) - self._off
@@ -92,10 +93,16 @@ class SurfaceFeedback:
                 self._found.pop(name, None)
             if self._off_s[i] <= OFF_S or name in self._found:
                 continue
-            where, unit = float(seen[:, i].mean()), "" if is_throttle(name) else "rad"
-            stands = span[i] <= 2.0 * self._stands[i]
-            neutral = is_throttle(name) and abs(where) <= self._stands[i]
-            self._found[name] = stuck(name, where, unit) if stands and not neutral else dead(name)
+            if span[i] <= 2.0 * self._stands[i]:
+                self._found[name] = self._stuck(i, float(seen[:, i].mean()))
+            elif self._off_s[i] > 2.0 * OFF_S:
+                self._found[name] = unresponsive(name)
+
+    def _stuck(self, number: int, where: float) -> Finding:
+        name = self._names[number]
+        if not is_throttle(name):
+            return stuck(name, where, "rad")
+        return dead(name) if abs(where) <= self._stands[number] else stuck(name, where, "")
 
 
 LOOK_S = 0.1  # least time between two speeds that are compared [s]
