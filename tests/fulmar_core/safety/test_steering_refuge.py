@@ -140,3 +140,15 @@ def test_a_plant_that_is_about_to_end_takes_no_command_and_counts_no_silence(gua
     assert not guard.handed_over
     guard.offer(NAMES, GOOD, 3000 * MS)
     assert applied(guard, 3000 * MS) == GOOD
+
+
+def test_a_failed_surface_hands_over_until_the_next_reset(guard):
+    guard.offer(NAMES, GOOD, 0)
+    guard.fail("elevator is stuck", 5 * MS)
+    guard.offer(NAMES, GOOD, 10 * MS)
+    assert applied(guard, 10 * MS) == STEERED
+    guard.fail("rudder is stuck", 15 * MS)
+    assert guard.failed == "elevator is stuck"
+    guard.reset()
+    guard.offer(NAMES, GOOD, 20 * MS)
+    assert applied(guard, 20 * MS) == GOOD

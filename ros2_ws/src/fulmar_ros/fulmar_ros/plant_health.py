@@ -106,6 +106,8 @@ class PlantHealth:
         held = self._held()
         if held:
             return "error", f"{held}: {self._refuge()} until `{GIVE_BACK_BY}`", held
+        if self._guard.failed and self.mode == "running":
+            return "error", f"{self._guard.failed}: {self._refuge()}", "failed"
         contested = self._contested()
         if contested:
             self._unnamed_looks = self._unnamed_looks + 1 if UNNAMED in contested else 0

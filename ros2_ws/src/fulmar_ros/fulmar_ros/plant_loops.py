@@ -82,8 +82,7 @@ class LockstepLoop:
         return sample
 
     def _compare(self, command: np.ndarray, seconds: float, sample: Sample) -> None:
-        if self._feedback is not None:
-            self._feedback.see(command, seconds, sample)
+        _compare(self._feedback, self._guard, self._wires, command, seconds, sample)
 
     def _exchange(self, sample: Sample, stop: threading.Event) -> np.ndarray | None:
         stamp = self._clock.now_ns
@@ -254,8 +253,7 @@ class RealtimeLoop:
             sample = self._backend.step(command)
             applied = command if sample.applied is None else sample.applied
             self._wires.publish_applied(applied, begun_ns)
-            if self._feedback is not None:
-                self._feedback.see(applied, self._dt, sample)
+            _compare(self._feedback, self._guard, self._wires, applied, self._dt, sample)
             self._clock.advance(self._dt)
             self.ticks += 1
             self._ticked_ns = time.monotonic_ns()
@@ -278,3 +276,20 @@ class RealtimeLoop:
         with self._wires.lock:
             self._guard.see_refusal(sample.refusal)
             return self._guard.output(time.monotonic_ns(), sample.odometry, plant_ns=self._clock.steady_ns)
+
+
+def _compare(
+    feedback: ActuatorFeedback | None,
+    guard: ActuatorGuard,
+    wires: PlantWires,
+    command: np.ndarray,
+    seconds: float,
+    sample: Sample,
+) -> None:
+    """Compare what was applied for a time [s] with what is measured; a wing with a failed surface is handed over."""
+    if feedback is None:
+        return
+    feedback.see(command, seconds, sample)
+    if feedback.grounds:
+        with wires.lock:
+            guard.fail(feedback.grounds, time.monotonic_ns())

@@ -103,7 +103,13 @@ class ActuatorFeedback:
     def __init__(self, robot: Robot, *, moves: bool) -> None:
         """Begin without findings; `moves`: whether the backend's odometry is the one that is published."""
         self._joints, self._motion = JointCheck(robot), MotionCheck(robot) if moves else None
+        self._vital = robot.actuators.names[: robot.actuators.positions] if robot.flies else ()
         self.findings: tuple[Finding, ...] = ()
+
+    @property
+    def grounds(self) -> str:
+        """Why no controller may fly on, in words: a surface has failed; empty if none has."""
+        return next((finding.words for finding in self.findings if finding.part in self._vital), "")
 
     def reset(self) -> None:
         """Begin anew, with an episode."""

@@ -20,6 +20,7 @@ NOISE = 4.0  # standard deviations of its sensor that are no deviation [-]
 OFF_S = 0.4  # deviation that lasts so long is a failure [s]
 AGREES_S = 2.0  # and agreement for so long ends it [s]
 STANDS_S = 0.2  # time in which it must have stood [s]
+IDLES = 0.1  # level below which a motor gives nothing that counts [-]
 STANDS = 0.02  # share of full travel within which a joint stands [-]
 
 
@@ -102,12 +103,12 @@ class SurfaceFeedback:
         name = self._names[number]
         if not is_throttle(name):
             return stuck(name, where, "rad")
-        return dead(name) if abs(where) <= self._stands[number] else stuck(name, where, "")
+        return dead(name) if where <= IDLES else stuck(name, where, "")
 
 
 LOOK_S = 0.1  # least time between two speeds that are compared [s]
 ERRS = 0.05  # share of a change of speed by which its model errs [-]
-FRICTION, CHANGES = 0.005, 0.0005  # torque that no model explains, and its changes, of full torque [-]
+FRICTION, CHANGES = 0.003, 0.0005  # torque that no model explains, and its changes, of full torque [-]
 
 
 class ReactionWheelFeedback:

@@ -18,12 +18,15 @@ import numpy as np
 SHARE = 0.2  # spread of a sound part's share [-]
 DEAD = 0.05  # spread of a dead part's share [-]
 MEMORY_S = 20.0  # what is older counts less and less [s]
+NOISE_MEMORY_S = 5.0  # same of noise [s]
 LEARNT_S = 2.0  # length of what pushes are learned from at once [s]
 ONSETS_S = (1.0, 2.0, 3.0)  # times since when a part may be dead [s]
 LIKELIER = 8.0  # logarithm by which a hypothesis must be likelier than that of sound parts [-]
 DOUBTFUL = 1.0  # same from which nothing is learned of sound parts [-]
 APART = 4.0  # and than any of another part [-]
-LASTS_S = 0.5  # for so long [s]
+LASTS_S = 1.0  # for so long [s]
+ROUGH = 2.0  # times as much where the variance of noise is as many times that of the sensors, or more [-]
+RARER = 3.0  # by which a part sticks more rarely than it dies, as a logarithm [-]
 TAKEN_BACK = 6.0  # variance of a difference of changes of what is measured with a variance of 1 [-]
 CALM = 10.0  # measurements of the noise that is expected, before there are any
 
@@ -97,11 +100,8 @@ class ResponseBank:
         self._recent: deque[_Measured] = deque()
         self._gone: list[_Measured] = []  # of the recent past, until they are as long as the window
         self._past = np.zeros((size, size)), np.zeros(size)  # information and evidence
-        self._squares, self._count, self._deviations = (
-            CALM * (TAKEN_BACK if self._adds_up else 2.0),
-            CALM,
-            np.zeros(0),
-        )
+        self._squares, self._count = CALM * (TAKEN_BACK if self._adds_up else 2.0), CALM
+        self._deviations = np.zeros(0)
         self._prior = self._mean, self._covariance
         self._likeliest: tuple[int, ...] = ()
         self._lasts_s, self._doubtful = 0.0, False
@@ -132,11 +132,8 @@ class ResponseBank:
         self._gone.append(gone)
         gone_s = sum(each.seconds for each in self._gone)
         if gone_s >= LEARNT_S:
-            keep, (matrix, vector), (variance, _) = (
-                np.exp(-gone_s / MEMORY_S),
-                self._sums(self._gone),
-                self._variance,
-            )
+            keep, (variance, _) = np.exp(-gone_s / MEMORY_S), self._variance
+            matrix, vector = self._sums(self._gone)
             self._past = keep * self._past[0] + matrix / variance, keep * self._past[1] + vector / variance
             self._prior = self._learned()
             self._gone.clear()
@@ -147,7 +144,7 @@ class ResponseBank:
         What a fault does lasts, so it does not count as noise.
         """
         if len(deviations) == len(self._deviations):
-            keep, jumps = np.exp(-seconds / MEMORY_S), deviations - self._deviations
+            keep, jumps = np.exp(-seconds / NOISE_MEMORY_S), deviations - self._deviations
             self._squares = keep * self._squares + float(jumps @ jumps)
             self._count = keep * self._count + len(jumps)
         self._deviations = deviations
@@ -170,7 +167,9 @@ class ResponseBank:
         best = max(gains, key=lambda parts: gains[parts])
         rival = max((gain for parts, gain in gains.items() if parts != best), default=-np.inf)
         self._doubtful = gains[best] > DOUBTFUL
-        clear = gains[best] > max(LIKELIER, rival + APART)
+        variance, _ = self._variance
+        needed = LIKELIER if variance < ROUGH else ROUGH * LIKELIER
+        clear = gains[best] > max(needed, rival + APART)
         likeliest = best if clear else ()
         self._lasts_s = self._lasts_s + seconds if likeliest and likeliest == self._likeliest else 0.0
         self._likeliest = likeliest
@@ -182,19 +181,20 @@ class ResponseBank:
     def _gains(self) -> dict[tuple[int, ...], float]:
         """By how much, as a logarithm, faults of parts explain the newest seconds better than sound parts do."""
         gains: dict[tuple[int, ...], float] = {}
-        priors = [(fault.parts, *self._under(fault)) for fault in self._faults]
+        priors = [(fault, *self._under(fault)) for fault in self._faults]
         variance, _ = self._variance
         for onset_s in ONSETS_S:
             matrix, vector = self._sums(self._since(onset_s))
             sound = _evidence(*self._prior, matrix / variance, vector / variance)
-            for parts, mean, covariance in priors:
+            for fault, mean, covariance in priors:
                 gain = _evidence(mean, covariance, matrix / variance, vector / variance) - sound
-                gains[parts] = max(gains.get(parts, -np.inf), gain)
+                gains[fault.parts] = max(gains.get(fault.parts, -np.inf), gain - RARER * fault.stuck)
         return gains
 
     def _since(self, onset_s: float) -> list[_Measured]:
         """What was measured in the newest seconds, oldest first."""
-        found, length_s = [], 0.0
+        found: list[_Measured] = []
+        length_s = 0.0
         for each in reversed(self._recent):
             length_s += each.seconds
             if found and length_s > onset_s + 1e-6:

@@ -86,6 +86,7 @@ class ActuatorGuard:
         self._asked_ns: int | None = (
             None  # since when the controller of what cannot stop commands what is safe
         )
+        self.failed, self._failed_ns = "", 0
         self._steering_ns: int | None = None  # by the plant's clock, since when the safe controller steers
         self._handed_over_ns: int | None = None  # since when the safe controller has the actuators for good
         self.watchdog.reset()
@@ -107,6 +108,11 @@ class ActuatorGuard:
         """
         if self._handed_over_ns is None:
             self._handed_over_ns = now_ns
+
+    def fail(self, words: str, now_ns: int) -> None:
+        """Hand over to the safe controller until the next reset, for a part that has failed, in words [ns]."""
+        if not self.failed:
+            self.failed, self._failed_ns = words, now_ns
 
     def offer(
         self,
@@ -240,8 +246,9 @@ class ActuatorGuard:
         return self.refuge.command(since_s, self._applied_last, state)
 
     def _ended_by_decision(self, now_ns: int) -> int | None:
-        """Since when the plant's end, the e-stop, a second publisher or the controller has ended the command [ns]."""
-        ends = [self._handed_over_ns, self._stopped(now_ns), self._asked_ns]
+        """Since when the plant's end, a failure, the e-stop, a second publisher or the controller ended the command."""
+        failed_ns = self._failed_ns if self.failed else None
+        ends = [self._handed_over_ns, failed_ns, self._stopped(now_ns), self._asked_ns]
         return min((end for end in ends if end is not None), default=None)
 
     def _ended_ns(self, now_ns: int) -> int | None:

@@ -1,0 +1,59 @@
+"""A plant of an aircraft with a surface that has failed: the loop hands it over to the safe controller."""
+
+from __future__ import annotations
+
+import threading
+from contextlib import nullcontext
+from types import SimpleNamespace
+
+import numpy as np
+
+from fulmar_core.backend import Sample
+from fulmar_core.health.feedback_check import ActuatorFeedback
+from fulmar_core.robot import load_robot
+from fulmar_core.sensors.reading import Reading
+from fulmar_core.sensors.surfaces import SurfacePositions
+from fulmar_ros.plant_clock import SimulatedTime
+from fulmar_ros.plant_loops import RealtimeLoop
+
+ROBOT = load_robot("airship_v7")
+
+
+def grounded_by(positions: np.ndarray) -> tuple[list[str], ActuatorFeedback]:
+    """Why the guard was told to hand over, while a constant command is applied and this is measured."""
+    reading = Reading(SurfacePositions(ROBOT.actuators.names, positions))
+    sample, told = Sample({"surfaces": reading}, None), []
+
+    def ignore(*_arguments):
+        """There is no subscriber."""
+
+    command = 0.5 * ROBOT.actuators.scale
+    guard = SimpleNamespace(output=lambda *_, **__: command, fail=lambda words, _now_ns: told.append(words))
+    wires = SimpleNamespace(lock=nullcontext(), publish_sample=ignore, publish_applied=ignore)
+    backend = SimpleNamespace(robot=ROBOT, step=lambda _command: sample)
+    feedback = ActuatorFeedback(ROBOT, moves=True)
+    RealtimeLoop(backend, wires, guard, SimulatedTime(), rate=50.0, feedback=feedback).run(
+        sample, 100, threading.Event()
+    )
+    return told, feedback
+
+
+def test_a_stuck_surface_grounds_an_aircraft():
+    positions = 0.5 * ROBOT.actuators.scale
+    positions[0] = -positions[0]
+    told, feedback = grounded_by(positions)
+    assert told and told[0].startswith("elevator is stuck at -0.17 rad")
+    assert [finding.part for finding in feedback.findings] == ["elevator"]
+
+
+def test_a_lost_propeller_is_named_and_leaves_the_controller_its_craft():
+    positions = 0.5 * ROBOT.actuators.scale
+    positions[-1] = 0.0
+    told, feedback = grounded_by(positions)
+    assert told == []
+    assert [finding.part for finding in feedback.findings] == [ROBOT.actuators.names[-1]]
+
+
+def test_surfaces_that_follow_ground_nobody():
+    told, feedback = grounded_by(0.5 * ROBOT.actuators.scale)
+    assert (told, feedback.findings) == ([], ())
