@@ -28,7 +28,11 @@ def grounded_by(positions: np.ndarray) -> tuple[list[str], ActuatorFeedback]:
         """There is no subscriber."""
 
     command = 0.5 * ROBOT.actuators.scale
-    guard = SimpleNamespace(output=lambda *_, **__: command, fail=lambda words, _now_ns: told.append(words))
+    guard = SimpleNamespace(
+        output=lambda *_, **__: command,
+        fail=lambda words, _now_ns: told.append(words),
+        see_refusal=ignore,
+    )
     wires = SimpleNamespace(lock=nullcontext(), publish_sample=ignore, publish_applied=ignore)
     backend = SimpleNamespace(robot=ROBOT, step=lambda _command: sample)
     feedback = ActuatorFeedback(ROBOT, moves=True)
