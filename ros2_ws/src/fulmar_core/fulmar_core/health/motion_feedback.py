@@ -20,6 +20,9 @@ LOOK_S = 0.1  # least time between two measurements that are compared, [s]
 MODEL = 0.1  # share of its value by which the model of a wheel errs [-]
 PUSH = 0.1  # force and torque from outside that are no surprise, of what the robot's own can be [-]
 GUST = 0.02  # by which these change within a window [-]
+PROPELLER_LOOK_S = 0.2  # same, of propellers [s]
+ONSETS_S = (0.6, 1.2, 1.8, 2.4, 3.0)  # times since when a propeller may be lost [s]
+FADES = 0.7  # share of full thrust from which one that is lost comes to rest, about [-]
 ASIDE = 0.05  # steering that is no surprise where none is asked for, of the largest [-]
 ROLLS = 0.1  # share of top speed from which steering shows [-]
 BLOCKED = "the robot does not move, whatever its wheels are commanded: it is held, blocked or without power"
@@ -138,9 +141,18 @@ class PropellerFeedback:
         added = robot.hydrodynamics.planar_added_mass if robot.hydrodynamics is not None else (0.0, 0.0, 0.0)
         self._inertia = np.array([robot.body.mass + added[0], robot.body.inertia[2] + added[2]])
         able = np.array([robot.performance.force, robot.performance.torque])
-        count = len(robot.actuators.names)
+        count, slew = len(robot.actuators.names), robot.actuators.response.slew
+        fades_s = FADES / min(slew) if slew else 0.0
         most = np.full(count, np.abs(robot.actuators.curve).max())
-        self._bank = ResponseBank(count, offsets=most, pushes=PUSH * able, changes=GUST * able, adds_up=True)
+        self._bank = ResponseBank(
+            count,
+            offsets=most,
+            pushes=PUSH * able,
+            changes=GUST * able,
+            adds_up=True,
+            onsets_s=ONSETS_S,
+            fades_s=fades_s,
+        )
         self.reset()
 
     def reset(self) -> None:
@@ -167,7 +179,7 @@ class PropellerFeedback:
             return
         now = PlanarState.from_rigid(motion)
         if self._before is not None:
-            if self._since_s < LOOK_S - 1e-6:
+            if self._since_s < PROPELLER_LOOK_S - 1e-6:
                 return
             self._compare(self._before, now)
         self._before, self._since_s = now, 0.0

@@ -20,8 +20,7 @@ DEAD = 0.05  # spread of a dead part's share [-]
 MEMORY_S = 20.0  # what is older counts less and less [s]
 NOISE_MEMORY_S = 5.0  # same of noise [s]
 LEARNT_S = 2.0  # length of what pushes are learned from at once [s]
-ONSETS_S = (1.0, 2.0, 3.0)  # times since when a part may be dead [s]
-LIKELIER = 8.0  # logarithm by which a hypothesis must be likelier than that of sound parts [-]
+LIKELIER = 7.0  # logarithm by which a hypothesis must be likelier than that of sound parts [-]
 DOUBTFUL = 1.0  # same from which nothing is learned of sound parts [-]
 APART = 4.0  # and than any of another part [-]
 LASTS_S = 1.0  # for so long [s]
@@ -37,6 +36,7 @@ class Fault:
 
     parts: tuple[int, ...]
     stuck: bool = False
+    fades: bool = False  # dead parts come to rest as slowly as they follow commands, not at once
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +47,15 @@ class _Measured:
     rows: np.ndarray  # what each coefficient adds to each value, shape (m, c)
     values: np.ndarray  # shape (m,)
     std: np.ndarray  # shape (m,)
+
+
+@dataclass(frozen=True, slots=True)
+class _Sums:
+    """What measurements say of the coefficients."""
+
+    matrix: np.ndarray  # information, shape (c, c)
+    vector: np.ndarray  # evidence, shape (c,)
+    squares: float  # of the values
 
 
 class ResponseBank:
@@ -68,6 +77,8 @@ class ResponseBank:
         changes: np.ndarray | None = None,
         together: bool = False,
         adds_up: bool = False,
+        onsets_s: tuple[float, ...] = (1.0, 2.0, 3.0),
+        fades_s: float = 0.0,
     ) -> None:
         """Begin with sound parts.
 
@@ -80,7 +91,10 @@ class ResponseBank:
             together: Whether all parts may be dead at once, as those of a robot that is held.
             adds_up: Whether values are changes of something that is measured with white noise, as velocities are: the
                 noise of one change is taken back by the next.
+            onsets_s: Times since when a part may be dead, shortest first [s].
+            fades_s: Time in which a dead part may come to rest [s].
         """
+        self._onsets_s, self._fades_s = onsets_s, fades_s
         pushes = np.zeros(0) if pushes is None else pushes
         changes = np.zeros(0) if changes is None else changes
         self._parts, self._offsets, self._adds_up = parts, offsets, adds_up
@@ -90,6 +104,8 @@ class ResponseBank:
         self._covariance = np.diag(np.square(spread))
         self._changes = np.diag(np.square(np.concatenate((np.zeros(2 * parts), changes))))
         self._faults = [Fault((i,), stuck) for i in range(parts) for stuck in (False, True)]
+        if fades_s:
+            self._faults += [Fault((i,), fades=True) for i in range(parts)]
         if together and parts > 1:
             self._faults.append(Fault(tuple(range(parts))))
         self.reset()
@@ -119,7 +135,7 @@ class ResponseBank:
         self._take_noise(seconds, (values - rows @ self._prior[0]) / std)
         self._recent.append(_Measured(seconds, rows, values, std))
         length_s = sum(each.seconds for each in self._recent)
-        while length_s > ONSETS_S[-1] + 1e-6 and len(self._recent) > 1:
+        while length_s > self._onsets_s[-1] + 1e-6 and len(self._recent) > 1:
             length_s -= self._recent[0].seconds
             self._learn(self._recent.popleft())
         self._decide(seconds)
@@ -133,8 +149,8 @@ class ResponseBank:
         gone_s = sum(each.seconds for each in self._gone)
         if gone_s >= LEARNT_S:
             keep, (variance, _) = np.exp(-gone_s / MEMORY_S), self._variance
-            matrix, vector = self._sums(self._gone)
-            self._past = keep * self._past[0] + matrix / variance, keep * self._past[1] + vector / variance
+            gone_by = self._sums(self._gone, variance)
+            self._past = keep * self._past[0] + gone_by.matrix, keep * self._past[1] + gone_by.vector
             self._prior = self._learned()
             self._gone.clear()
 
@@ -183,11 +199,13 @@ class ResponseBank:
         gains: dict[tuple[int, ...], float] = {}
         priors = [(fault, *self._under(fault)) for fault in self._faults]
         variance, _ = self._variance
-        for onset_s in ONSETS_S:
-            matrix, vector = self._sums(self._since(onset_s))
-            sound = _evidence(*self._prior, matrix / variance, vector / variance)
+        for onset_s in self._onsets_s:
+            since = self._since(onset_s)
+            usual = self._sums(since, variance)
+            sound = _evidence(*self._prior, usual)
             for fault, mean, covariance in priors:
-                gain = _evidence(mean, covariance, matrix / variance, vector / variance) - sound
+                sums = self._sums(self._without(since, fault.parts[0]), variance) if fault.fades else usual
+                gain = _evidence(mean, covariance, sums) - sound
                 gains[fault.parts] = max(gains.get(fault.parts, -np.inf), gain - RARER * fault.stuck)
         return gains
 
@@ -202,21 +220,30 @@ class ResponseBank:
             found.append(each)
         return found[::-1]
 
-    def _sums(self, measured: list[_Measured]) -> tuple[np.ndarray, np.ndarray]:
-        """Information and evidence of measurements, shapes (c, c) and (c,)."""
-        matrix, vector = np.zeros_like(self._covariance), np.zeros_like(self._mean)
+    def _without(self, measured: list[_Measured], part: int) -> list[_Measured]:
+        """Measurements less what a part does that fades since the first of them."""
+        first, left, past_s = measured[0], [], 0.0
+        for each in measured:
+            faded = max(0.0, 1.0 - (past_s + 0.5 * each.seconds) / self._fades_s)
+            does = faded * each.seconds / first.seconds * first.rows[: len(each.values), part]
+            left.append(_Measured(each.seconds, each.rows, each.values - does, each.std))
+            past_s += each.seconds
+        return left
+
+    def _sums(self, measured: list[_Measured], variance: float) -> _Sums:
+        """What measurements say whose noise has a variance."""
+        matrix, vector, squares = np.zeros_like(self._covariance), np.zeros_like(self._mean), 0.0
         _, adds_up = self._variance
         for rows, values in _channels(measured):
             if adds_up:
                 rows, values = np.cumsum(rows, axis=0), np.cumsum(values)
             matrix, vector = matrix + rows.T @ rows, vector + rows.T @ values
+            squares += float(values @ values)
             if adds_up:  # the first measurement's noise is in all
-                total, share = rows.sum(axis=0), 1.0 / (len(rows) + 1)
-                matrix, vector = (
-                    matrix - share * np.outer(total, total),
-                    vector - share * total * values.sum(),
-                )
-        return matrix, vector
+                total, height, share = rows.sum(axis=0), values.sum(), 1.0 / (len(rows) + 1)
+                matrix, vector = matrix - share * np.outer(total, total), vector - share * height * total
+                squares -= float(share * height * height)
+        return _Sums(matrix / variance, vector / variance, squares / variance)
 
     def _learned(self) -> tuple[np.ndarray, np.ndarray]:
         """Mean and covariance of the coefficients of sound parts, with the pushes of the time before."""
@@ -250,10 +277,10 @@ def _channels(measured: list[_Measured]) -> Iterator[tuple[np.ndarray, np.ndarra
         yield rows / std[:, None], np.array([each.values[channel] for each in there]) / std
 
 
-def _evidence(mean: np.ndarray, covariance: np.ndarray, matrix: np.ndarray, vector: np.ndarray) -> float:
-    """Logarithm of the evidence under a Gaussian prior, up to what is the same for all priors."""
+def _evidence(mean: np.ndarray, covariance: np.ndarray, sums: _Sums) -> float:
+    """Logarithm of the evidence of measurements under a Gaussian prior, up to what is the same for all priors."""
     precision = np.linalg.inv(covariance)
-    posterior, evidence = precision + matrix, precision @ mean + vector
+    posterior, evidence = precision + sums.matrix, precision @ mean + sums.vector
     volume = np.linalg.slogdet(precision)[1] - np.linalg.slogdet(posterior)[1]
     fit = float(evidence @ np.linalg.solve(posterior, evidence))
-    return 0.5 * (float(volume) - float(mean @ precision @ mean) + fit)
+    return 0.5 * (float(volume) - sums.squares - float(mean @ precision @ mean) + fit)
