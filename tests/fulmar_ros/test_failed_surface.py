@@ -32,6 +32,7 @@ def grounded_by(positions: np.ndarray) -> tuple[list[str], ActuatorFeedback]:
         output=lambda *_, **__: command,
         fail=lambda words, _now_ns: told.append(words),
         see_refusal=ignore,
+        handed_over=False,
     )
     wires = SimpleNamespace(lock=nullcontext(), publish_sample=ignore, publish_applied=ignore)
     backend = SimpleNamespace(robot=ROBOT, step=lambda _command: sample)

@@ -36,7 +36,13 @@ def test_the_guard_receives_the_newest_measured_state_and_a_steady_time_for_safe
 
     backend = SimpleNamespace(robot=ROBOT, step=lambda _command: samples[len(received)])
     wires = SimpleNamespace(lock=nullcontext(), publish_sample=ignore, publish_applied=ignore)
-    loop = RealtimeLoop(backend, wires, SimpleNamespace(output=output, see_refusal=ignore), clock, rate=50.0)
+    loop = RealtimeLoop(
+        backend,
+        wires,
+        SimpleNamespace(output=output, see_refusal=ignore, handed_over=False),
+        clock,
+        rate=50.0,
+    )
     loop.run(samples[0], 2, threading.Event())
     assert np.allclose(received, [1.0, 2.0])
     first, second = (plant_ns for _, plant_ns in asked_ns)

@@ -101,13 +101,13 @@ class PlantHealth:
         """Level, message, and the part of the message whose change counts."""
         if self.mode == "fault":
             return "error", self.reason, "fault"
+        if self._guard.failed and self.mode == "running":
+            return "error", f"{self._guard.failed}: {self._refuge()}", "failed"
         if self.mode == "running" and self._guard.handed_over:
             return "warn", f"the plant is about to end: {self._refuge()}", "ends"
         held = self._held()
         if held:
             return "error", f"{held}: {self._refuge()} until `{GIVE_BACK_BY}`", held
-        if self._guard.failed and self.mode == "running":
-            return "error", f"{self._guard.failed}: {self._refuge()}", "failed"
         contested = self._contested()
         if contested:
             self._unnamed_looks = self._unnamed_looks + 1 if UNNAMED in contested else 0

@@ -18,7 +18,6 @@ import numpy as np
 SHARE = 0.2  # spread of a sound part's share [-]
 DEAD = 0.05  # spread of a dead part's share [-]
 MEMORY_S = 20.0  # what is older counts less and less [s]
-NOISE_MEMORY_S = 5.0  # same of noise [s]
 LEARNT_S = 2.0  # length of what pushes are learned from at once [s]
 LIKELIER = 7.0  # logarithm by which a hypothesis must be likelier than that of sound parts [-]
 DOUBTFUL = 1.0  # same from which nothing is learned of sound parts [-]
@@ -27,7 +26,8 @@ LASTS_S = 1.0  # for so long [s]
 ROUGH = 2.0  # times as much where the variance of noise is as many times that of the sensors, or more [-]
 RARER = 3.0  # by which a part sticks more rarely than it dies, as a logarithm [-]
 TAKEN_BACK = 6.0  # variance of a difference of changes of what is measured with a variance of 1 [-]
-CALM = 10.0  # measurements of the noise that is expected, before there are any
+MEDIANS = (0.455, 0.693)  # of the mean square of one or two numbers whose variance is 1 [-]
+JUMPS, CALM = 30, 15  # differences that noise is learned from; of them, as expected, to begin with
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,7 +116,9 @@ class ResponseBank:
         self._recent: deque[_Measured] = deque()
         self._gone: list[_Measured] = []  # of the recent past, until they are as long as the window
         self._past = np.zeros((size, size)), np.zeros(size)  # information and evidence
-        self._squares, self._count = CALM * (TAKEN_BACK if self._adds_up else 2.0), CALM
+        usual = TAKEN_BACK if self._adds_up else 2.0
+        self._jumps = deque([usual] * CALM, maxlen=JUMPS)
+        self._variance = self._variance_by(usual)
         self._deviations = np.zeros(0)
         self._prior = self._mean, self._covariance
         self._likeliest: tuple[int, ...] = ()
@@ -132,7 +134,7 @@ class ResponseBank:
             values: What was measured, shape (m,).
             std: Standard deviation of each, or of what it is the change of, > 0, shape (m,).
         """
-        self._take_noise(seconds, (values - rows @ self._prior[0]) / std)
+        self._take_noise((values - rows @ self._prior[0]) / std)
         self._recent.append(_Measured(seconds, rows, values, std))
         length_s = sum(each.seconds for each in self._recent)
         while length_s > self._onsets_s[-1] + 1e-6 and len(self._recent) > 1:
@@ -154,25 +156,23 @@ class ResponseBank:
             self._prior = self._learned()
             self._gone.clear()
 
-    def _take_noise(self, seconds: float, deviations: np.ndarray) -> None:
+    def _take_noise(self, deviations: np.ndarray) -> None:
         """Learn how much stronger noise is than expected: by what deviations differ from one to the next.
 
-        What a fault does lasts, so it does not count as noise.
+        What a fault does lasts, and its onset is one of many, so neither counts as noise.
         """
         if len(deviations) == len(self._deviations):
-            keep, jumps = np.exp(-seconds / NOISE_MEMORY_S), deviations - self._deviations
-            self._squares = keep * self._squares + float(jumps @ jumps)
-            self._count = keep * self._count + len(jumps)
+            jumps = deviations - self._deviations
+            self._jumps.append(float(jumps @ jumps) / len(jumps) / MEDIANS[min(len(jumps), 2) - 1])
+            self._variance = self._variance_by(float(np.median(self._jumps)))
         self._deviations = deviations
 
-    @property
-    def _variance(self) -> tuple[float, bool]:
-        """Variance of a value in its expected one, and whether values add up.
+    def _variance_by(self, jumps: float) -> tuple[float, bool]:
+        """Variance of a value in its expected one, and whether values add up, by the variance of differences.
 
         Changes of a velocity that differ more than its measurements err are kicks and noisy actuators: nothing takes
         these back, so they do not add up to less.
         """
-        jumps = self._squares / self._count
         if not self._adds_up:
             return max(1.0, 0.5 * jumps), False
         kicks = 0.5 * (jumps - TAKEN_BACK)

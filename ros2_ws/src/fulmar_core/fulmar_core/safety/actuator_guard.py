@@ -86,7 +86,7 @@ class ActuatorGuard:
         self._asked_ns: int | None = (
             None  # since when the controller of what cannot stop commands what is safe
         )
-        self.failed, self._failed_ns = "", 0
+        self.failed = ""
         self._steering_ns: int | None = None  # by the plant's clock, since when the safe controller steers
         self._handed_over_ns: int | None = None  # since when the safe controller has the actuators for good
         self.watchdog.reset()
@@ -102,8 +102,9 @@ class ActuatorGuard:
         return self._handed_over_ns is not None
 
     def hand_over(self, now_ns: int) -> None:
-        """Give the actuators to the safe controller until `reset`, whatever is commanded: the plant is about to end.
+        """Give the actuators to the safe controller until `reset`, whatever is commanded.
 
+        The plant is about to end, or a part has failed.
         From then on no command is due, so that no silence counts as a trip. `now_ns` is by the steady clock [ns].
         """
         if self._handed_over_ns is None:
@@ -111,8 +112,8 @@ class ActuatorGuard:
 
     def fail(self, words: str, now_ns: int) -> None:
         """Hand over to the safe controller until the next reset, for a part that has failed, in words [ns]."""
-        if not self.failed:
-            self.failed, self._failed_ns = words, now_ns
+        self.failed = self.failed or words
+        self.hand_over(now_ns)
 
     def offer(
         self,
@@ -246,9 +247,8 @@ class ActuatorGuard:
         return self.refuge.command(since_s, self._applied_last, state)
 
     def _ended_by_decision(self, now_ns: int) -> int | None:
-        """Since when the plant's end, a failure, the e-stop, a second publisher or the controller ended the command."""
-        failed_ns = self._failed_ns if self.failed else None
-        ends = [self._handed_over_ns, failed_ns, self._stopped(now_ns), self._asked_ns]
+        """Since when the plant's end, the e-stop, a second publisher or the controller has ended the command [ns]."""
+        ends = [self._handed_over_ns, self._stopped(now_ns), self._asked_ns]
         return min((end for end in ends if end is not None), default=None)
 
     def _ended_ns(self, now_ns: int) -> int | None:
