@@ -14,6 +14,7 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu
 
 from fulmar_core.errors import ConfigError
+from fulmar_core.estimation.frozen import POSE_FROZEN
 from fulmar_core.topics import IMU, MOCAP, ODOMETRY, Wire
 from fulmar_ros.convert import PoseWriter, stamp_of
 from fulmar_ros.estimator_node import EstimatorNode
@@ -43,17 +44,30 @@ class Sources:
             Odometry, ODOMETRY.name, self.odometry.append, subscriber_qos(ODOMETRY, reliable=True, depth=50)
         )
         self.now_ns = 1_000 * MS
+        self.rng = np.random.default_rng(0)
         until(lambda: bool(self.poses.get_subscription_count() and self.readings.get_subscription_count()))
 
-    def tick(self, *, pose: bool = True, x: float = 0.0, frame: str = "odom", bad: bool = False) -> None:
-        """20 ms of a robot at rest."""
+    def tick(
+        self,
+        *,
+        pose: bool = True,
+        x: float = 0.0,
+        frame: str = "odom",
+        bad: bool = False,
+        frozen: bool = False,
+    ) -> None:
+        """20 ms of a robot at rest, measured with noise; a frozen motion capture has none."""
         self.now_ns += 20 * MS
+        noise = 1e-4 * self.rng.standard_normal(8)
         reading = Imu()
         reading.header.stamp = stamp_of(self.now_ns)
-        reading.linear_acceleration.z = float("nan") if bad else 9.81
+        force, turn = reading.linear_acceleration, reading.angular_velocity
+        force.x, force.y, force.z = noise[0], noise[1], float("nan") if bad else 9.81
+        turn.x, turn.y, turn.z = noise[2:5].tolist()
         self.readings.publish(reading)
         if pose:
-            message = PoseWriter().write(planar_state(x, 0.0, 0.5), self.now_ns)
+            off = np.zeros(3) if frozen else noise[5:]
+            message = PoseWriter().write(planar_state(x + off[0], off[1], 0.5 + off[2]), self.now_ns)
             message.header.frame_id = frame
             self.poses.publish(message)
 
@@ -93,6 +107,24 @@ def test_odometry_has_frames_the_stamp_of_what_it_is_about_and_covariances(sourc
     assert 0.0 < covariance[0, 0] < 0.15**2
     assert 0.0 < np.array(message.pose.covariance).reshape(6, 6)[5, 5] < 0.1
     assert abs(message.twist.twist.linear.x) < 0.2
+
+
+def test_a_frozen_motion_capture_makes_no_odometry_and_is_a_warning_by_name(sources: Sources) -> None:
+    sources.until_odometry()
+
+    def frozen() -> bool:
+        sources.tick(frozen=True)
+        time.sleep(0.01)
+        return bool(sources.said[1].get("warnings")) and sources.said[1]["stale"] == "true"
+
+    until(frozen)
+    assert sources.said[0] == sources.said[1]["warnings"] == POSE_FROZEN
+    count = len(sources.odometry)
+    for _ in range(20):
+        sources.tick(frozen=True)
+        time.sleep(0.01)
+    assert len(sources.odometry) == count
+    sources.until_odometry()
 
 
 @pytest.mark.parametrize("wire", [MOCAP, IMU], ids=lambda wire: wire.name)

@@ -1,4 +1,4 @@
-"""A robot in MuJoCo that an estimator of motion capture and inertial readings steers: no ROS, no clock.
+"""A robot in MuJoCo that is steered by what is made of its sensors: no ROS, no clock.
 
 So an hour takes minutes, and a source can fail at any moment.
 """
@@ -7,10 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
+from fulmar_core.backend import Sample
 from fulmar_core.control_loop import ControlLoop
 from fulmar_core.controllers.controller import Controller
 from fulmar_core.disturbances.scenario import Scenario
@@ -18,7 +19,7 @@ from fulmar_core.episode import draw_episode
 from fulmar_core.estimation.estimator import Estimator
 from fulmar_core.goal import goal_in_float64
 from fulmar_core.robot import Robot
-from fulmar_core.sensors.imu import ImuSample
+from fulmar_core.safety.input_gate import InputGate, Measurement
 from fulmar_core.sensors.reading import Reading
 from fulmar_core.state import RigidBodyState
 from fulmar_core.tasks import Task
@@ -26,72 +27,129 @@ from sim_nodes.mujoco_backend import MujocoBackend
 
 NEW_GOAL_S = 20.0  # after which a robot that moves gets another goal
 BEGIN_NS = 1_000_000_000
-Change = Callable[
-    [float, Any], Any
-]  # time since the fault [s], and a pose (7,) or an `ImuSample`, to what is reported
+# Time since a fault [s], and a pose (7,), an `ImuSample` or an odometry's `RigidBodyState`, to what is reported.
+Change = Callable[[float, Any], Any]
+
+
+def unchanged(_since_s: float, value: Any) -> Any:
+    """What a sound source reports."""
+    return value
 
 
 @dataclass(frozen=True)
 class SourceFault:
     """How sources fail from some time on."""
 
-    pose: Change = lambda _t, pose: pose
-    imu: Change = lambda _t, sample: sample
+    pose: Change = unchanged
+    imu: Change = unchanged
+    odometry: Change = unchanged
 
 
 NO_FAULT = SourceFault()
 
 
+class Follower(Protocol):
+    """What makes a state of sensors."""
+
+    def take(self, tick: int, stamp_ns: int, sample: Sample, fault: SourceFault, since_s: float) -> None:
+        """Take what the sensors report at a tick; `since_s`: time since the fault, negative before it [s]."""
+
+    def state(self, stamp_ns: int) -> RigidBodyState | None:
+        """The state at a time; None: it is not known."""
+
+    def warnings(self) -> tuple[str, ...]:
+        """What endangers the robot."""
+
+
+class EstimatedState:
+    """By an estimator of motion capture and inertial readings."""
+
+    def __init__(self, estimator: Estimator, *, every: int = 1) -> None:
+        """Take a pose with every so many ticks."""
+        self.estimator, self._every = estimator, every
+
+    def take(self, tick: int, stamp_ns: int, sample: Sample, fault: SourceFault, since_s: float) -> None:
+        """See `Follower.take`; motion capture sees what the odometry measures."""
+        imu, pose = (fault.imu, fault.pose) if since_s >= 0.0 else (unchanged, unchanged)
+        if "imu" in sample.readings:
+            self.estimator.take("imu", Reading(imu(since_s, sample.readings["imu"].value), stamp_ns))
+        if tick % self._every == 0:
+            seen: RigidBodyState = sample.readings["odometry"].value
+            value = pose(since_s, np.concatenate((seen.position_in_world, seen.quat_xyzw)))
+            self.estimator.take("mocap", Reading(value, stamp_ns))
+
+    def state(self, stamp_ns: int) -> RigidBodyState | None:
+        """See `Follower.state`."""
+        estimate = self.estimator.estimate(stamp_ns)
+        return None if estimate is None else estimate.value
+
+    def warnings(self) -> tuple[str, ...]:
+        """See `Follower.warnings`."""
+        return self.estimator.warnings()
+
+
+class GatedOdometry:
+    """By the odometry, as far as a controller's gate lets it in."""
+
+    def __init__(self, gate: InputGate) -> None:
+        self._gate = gate
+        self._state: RigidBodyState | None = None
+
+    def take(self, _tick: int, stamp_ns: int, sample: Sample, fault: SourceFault, since_s: float) -> None:
+        """See `Follower.take`."""
+        state = sample.readings["odometry"].value
+        state = fault.odometry(since_s, state) if since_s >= 0.0 else state
+        problem = self._gate.problem(Measurement(stamp_ns, "odom", "base_link", state))
+        self._state = None if problem else state
+
+    def state(self, _stamp_ns: int) -> RigidBodyState | None:
+        """See `Follower.state`."""
+        return self._state
+
+    def warnings(self) -> tuple[str, ...]:
+        """See `Follower.warnings`."""
+        return (self._gate.warning,) if self._gate.warning else ()
+
+
 @dataclass
 class Outcome:
-    """What happened after a fault, or without one."""
+    """What happened; times are since the fault, or since the beginning."""
 
-    times_s: list[float] = field(default_factory=list)  # of the fault, at every control step
-    speeds: list[float] = field(default_factory=list)  # true [m/s]
-    turn_rates: list[float] = field(default_factory=list)  # true [rad/s]
-    errors: list[float] = field(default_factory=list)  # of the estimated place; NaN without an estimate [m]
-    works: list[bool] = field(default_factory=list)  # whether a command other than the safe one was applied
     warnings: dict[str, float] = field(default_factory=dict)  # and when each came first [s]
-    blind_s: float = 0.0  # without an estimate, once there was one [s]
-    epochs: int = 0
-    outliers: int = 0
-
-    @property
-    def last_work_s(self) -> float:
-        """When the actuators did something for the last time, after the fault; -inf: never [s]."""
-        return max(
-            (t for t, work in zip(self.times_s, self.works, strict=True) if work and t >= 0.0),
-            default=-np.inf,
-        )
+    last_command_s: float = (
+        -np.inf
+    )  # when a command was applied that is not the safe one, for the last time [s]
+    blind_s: float = 0.0  # without a state, once there was one [s]
+    speed: float = 0.0  # at the fault [m/s]
+    most_speed: float = 0.0  # true, after the fault [m/s]
+    error: float = 0.0  # of the place that was believed, at most [m]
 
 
-class EstimatedLoop:
-    """One robot, its estimator and its controller."""
+class SteeredRobot:
+    """One robot, what makes a state of its sensors, and its controller."""
 
     def __init__(
         self,
         robot: Robot,
         task: Task,
         scenario: Scenario,
-        estimator: Estimator,
+        follower: Follower,
         controller: Controller,
         *,
         seed: int,
-        pose_hz: float = 0.0,
     ) -> None:
-        """Begin an episode; poses come with each tick, or `pose_hz` times a second [Hz]."""
+        """Begin an episode."""
         self._robot, self._task, self._scenario, self._seed = robot, task.fitted(robot), scenario, seed
         self._backend = MujocoBackend.of(robot, self._task, scenario)
-        self._estimator, self._loop = estimator, ControlLoop(robot, self._task, controller)
+        self._follower, self._loop = follower, ControlLoop(robot, self._task, controller)
         self._dt = robot.timing.physics_dt
-        self._every = max(1, round(1.0 / (pose_hz * self._dt))) if pose_hz else 1
         self._hold = robot.timing.substeps(controller.control_hz)
         self._safe = np.array(robot.actuators.safe_command, dtype=float)
         self._sample = self._backend.reset(self._episode(0), seed=seed)
         self._loop.begin(self._goal(0))
 
     def run(
-        self, seconds: float, *, moves: bool = True, fault: SourceFault = NO_FAULT, fault_s: float = np.inf
+        self, seconds: float, *, moves: bool = True, fault: SourceFault = NO_FAULT, fault_s: float = 0.0
     ) -> Outcome:
         """Let time pass.
 
@@ -104,55 +162,40 @@ class EstimatedLoop:
         found, command, begun = Outcome(), self._safe, False
         for tick in range(1, round(seconds / self._dt) + 1):
             t = tick * self._dt
-            self._sample = self._backend.step(
-                command, 1, begins=self._hold if (tick - 1) % self._hold == 0 else 0
-            )
-            self._measure(tick, t, fault, t - fault_s)
+            begins = self._hold if (tick - 1) % self._hold == 0 else 0
+            self._sample = self._backend.step(command, 1, begins=begins)
+            stamp_ns = BEGIN_NS + round(1e9 * t)
+            self._follower.take(tick, stamp_ns, self._sample, fault, t - fault_s)
+            for words in self._follower.warnings():
+                found.warnings.setdefault(words, t - fault_s)
             if tick % self._hold:
                 continue
-            if moves and tick % round(NEW_GOAL_S / self._dt) == 0:
+            if moves and tick % round(NEW_GOAL_S / self._dt) == 0 and self._task.goal_topic == "goal_pose":
                 self._loop.begin(self._goal(round(t / NEW_GOAL_S)))
-            estimate = self._estimator.estimate(BEGIN_NS + round(1e9 * t))
-            begun = begun or estimate is not None
+            state = self._follower.state(stamp_ns)
+            begun = begun or state is not None
+            found.blind_s += self._hold * self._dt * (begun and state is None)
             command = self._safe
-            if estimate is not None and moves:
-                state = self._robot.state_type.from_rigid(estimate.value)[None]
-                command = self._loop.step(state, BEGIN_NS + round(1e9 * t)).command[0]
-            for words in self._estimator.warnings():
-                found.warnings.setdefault(words, t - fault_s)
-            found.blind_s += self._hold * self._dt * (begun and estimate is None)
-            self._note(found, t - fault_s, None if estimate is None else estimate.value, command)
-        found.epochs, found.outliers = self._estimator.epoch, self._estimator.outliers
+            if state is not None and moves:
+                command = self._loop.step(self._robot.state_type.from_rigid(state)[None], stamp_ns).command[0]
+            self._note(found, t - fault_s, state, command)
         return found
 
-    def _measure(self, tick: int, t: float, fault: SourceFault, since_s: float) -> None:
-        stamp_ns = BEGIN_NS + round(1e9 * t)
-        readings = self._sample.readings
-        if (imu := readings.get("imu")) is not None:
-            value: ImuSample = imu.value
-            self._estimator.take(
-                "imu", Reading(fault.imu(since_s, value) if since_s >= 0.0 else value, stamp_ns)
-            )
-        if tick % self._every == 0:
-            seen: RigidBodyState = readings["odometry"].value
-            pose = np.concatenate((seen.position_in_world, seen.quat_xyzw))
-            pose = fault.pose(since_s, pose) if since_s >= 0.0 else pose
-            self._estimator.take("mocap", Reading(pose, stamp_ns))
-
     def _note(
-        self, found: Outcome, since_s: float, believed: RigidBodyState | None, command: np.ndarray
+        self, found: Outcome, since_s: float, state: RigidBodyState | None, command: np.ndarray
     ) -> None:
         true = self._sample.truth
         assert true is not None
-        found.times_s.append(since_s)
-        found.speeds.append(float(np.linalg.norm(true.velocity_in_world)))
-        found.turn_rates.append(float(np.linalg.norm(true.angular_velocity_in_body)))
-        found.errors.append(
-            np.nan
-            if believed is None
-            else float(np.linalg.norm(believed.position_in_world - true.position_in_world))
-        )
-        found.works.append(not np.array_equal(command, self._safe))
+        speed = float(np.linalg.norm(true.velocity_in_world))
+        if since_s < 0.0:
+            found.speed = speed
+            return
+        found.most_speed = max(found.most_speed, speed)
+        if state is not None:
+            error = float(np.linalg.norm(state.position_in_world - true.position_in_world))
+            found.error = max(found.error, error)
+        if not np.array_equal(command, self._safe):
+            found.last_command_s = since_s
 
     def _episode(self, number: int) -> Any:
         return draw_episode(self._robot, self._task, self._scenario, seed=self._seed, number=number)

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fulmar_core.robot import Limits
-from fulmar_core.safety.input_gate import InputGate, Measurement
+from fulmar_core.robot import Limits, load_robot
+from fulmar_core.safety.input_gate import CONTRADICTION, FROZEN, InputGate, Measurement
 from fulmar_core.sensors.repetition import FROZEN_AFTER
 from fulmar_core.state import RigidBodyState
 from tests.states import planar_state
@@ -176,3 +176,100 @@ def test_what_turns_freely_must_not_tumble_faster_about_any_axis(rate):
     assert reason == f"odom turn rate {np.linalg.norm(rate):.2f} rad/s is beyond the possible 6 rad/s"
     slower = measurement(state=state(angular_velocity_in_body=np.array(rate) * 6.0 / 7.0))
     assert InputGate(LIMITS, turns_freely=True).problem(slower) is None
+
+
+ODOMETRY = load_robot("turtlebot2").sensors.odometry
+TICK_NS = 20_000_000
+
+
+class Drive:
+    """A base that drives circles or stands, and its odometry, which a gate is given."""
+
+    def __init__(self, *, v: float = 0.3, yaw_rate: float = 0.2) -> None:
+        self.gate = InputGate(LIMITS, odometry=ODOMETRY)
+        self.rng = np.random.default_rng(3)
+        self.v, self.yaw_rate = v, yaw_rate
+        self.x = self.y = self.yaw = 0.0
+        self.ticks = 0
+
+    def run(
+        self, seconds: float, *, change=lambda _t, pose, twist: (pose, twist)
+    ) -> tuple[float | None, str]:
+        """Drive with odometry that is changed; returns when the gate refused first [s], and its last words."""
+        first, reason = None, ""
+        for tick in range(round(seconds / 0.02)):
+            self.ticks += 1
+            self.yaw += 0.02 * self.yaw_rate
+            vx, vy = self.v * np.cos(self.yaw), self.v * np.sin(self.yaw)
+            self.x, self.y = self.x + 0.02 * vx, self.y + 0.02 * vy
+            noise = self.rng.standard_normal(6) * (0.002, 0.002, 0.003, 0.01, 0.01, 0.01)
+            pose = np.array([self.x, self.y, self.yaw]) + noise[:3]
+            pose, twist = change(0.02 * tick, pose, np.array([vx, vy, self.yaw_rate]) + noise[3:])
+            state = planar_state(*pose, vx=twist[0], vy=twist[1], yaw_rate=twist[2])
+            problem = self.gate.problem(measurement(self.ticks * TICK_NS, state=state))
+            reason = problem or ""
+            if first is None and reason:
+                first = 0.02 * tick
+        return first, reason
+
+    def standing_pose(self):
+        at = np.array([self.x, self.y, self.yaw])
+        return lambda _t, pose, twist: (at + 0.002 * self.rng.standard_normal(3), twist)
+
+
+@pytest.mark.parametrize(("v", "yaw_rate"), [(0.3, 0.2), (0.0, 0.0), (0.0, 1.0), (0.8, 0.0)])
+def test_odometry_whose_pose_moves_as_its_twist_says_passes(v, yaw_rate):
+    assert Drive(v=v, yaw_rate=yaw_rate).run(20.0) == (None, "")
+
+
+@pytest.mark.parametrize(("v", "yaw_rate"), [(0.3, 0.0), (0.0, 0.5)])
+def test_a_pose_that_stands_with_noise_while_the_twist_says_motion_is_refused(v, yaw_rate):
+    drive = Drive(v=v, yaw_rate=yaw_rate)
+    drive.run(6.0)
+    first, reason = drive.run(5.0, change=drive.standing_pose())
+    assert first < 1.0
+    assert (reason, drive.gate.warning) == (CONTRADICTION, CONTRADICTION)
+
+
+def test_a_twist_that_stands_while_the_pose_moves_is_refused():
+    drive = Drive()
+    drive.run(6.0)
+    first, reason = drive.run(5.0, change=lambda _t, pose, twist: (pose, 0.001 * twist))
+    assert first < 1.0
+    assert reason == CONTRADICTION
+
+
+def test_a_position_that_creeps_away_is_refused():
+    drive = Drive(v=0.0, yaw_rate=0.0)
+    drive.run(6.0)
+    first, _ = drive.run(6.0, change=lambda t, pose, twist: (pose + np.array([0.1 * t, 0.0, 0.0]), twist))
+    assert first < 3.0
+
+
+def test_one_correction_of_a_fix_is_no_contradiction():
+    drive = Drive()
+    drive.run(6.0)
+    corrected = np.array([0.5, 0.3, 0.1])
+    assert drive.run(8.0, change=lambda _t, pose, twist: (pose + corrected, twist)) == (None, "")
+
+
+def test_after_a_contradiction_odometry_passes_once_pose_and_twist_agree_on_a_motion():
+    drive = Drive()
+    drive.run(6.0)
+    drive.run(1.5, change=drive.standing_pose())
+    rate, speed = drive.yaw_rate, drive.v
+    drive.yaw_rate = drive.v = 0.0
+    assert drive.run(10.0)[1] == CONTRADICTION  # both stand: that proves nothing
+    drive.yaw_rate, drive.v = rate, speed
+    assert drive.run(12.0)[1] == ""
+    assert drive.run(1.0) == (None, "")
+    assert drive.gate.warning == ""
+
+
+def test_a_source_that_is_stuck_is_named_in_words_that_stay_the_same():
+    gate = InputGate(LIMITS)
+    for i in range(1, FROZEN_AFTER + 4):
+        gate.problem(measurement(i))
+    assert gate.warning == FROZEN
+    gate.problem(measurement(100, x=0.001))
+    assert gate.warning == ""

@@ -17,6 +17,7 @@ MOST_COPIES = 3
 POLICY = "policy"  # the controller that runs a bundle, which another one may follow while the node runs
 # Of a plant whose states of the actuators may come late or get lost, before nothing is learned
 MISSED_TICKS = 5
+FROZEN_STEPS = 5  # repeats of one measurement in lock step, one a control step, that no noisy sensor gives
 
 
 @dataclass(frozen=True)
@@ -98,20 +99,15 @@ class ControllerSettings:
         return round(1e9 * longest_s)
 
     def input_gate(self, robot: Robot) -> InputGate:
-        """What lets measurements in; in lock step they may repeat themselves, and episodes begin anywhere."""
-        if self.lockstep:
-            return InputGate(
-                robot.limits,
-                frozen_after=0,
-                turns_freely=robot.state_type is SpatialState,
-                turns_only=robot.actuators.turns_only,
-            )
+        """What lets measurements in; in lock step episodes begin anywhere."""
         odometry = robot.sensors.odometry
         repeats = self.odometry_may_repeat or not is_noisy(odometry.position, odometry.heading)
+        frozen_after = FROZEN_STEPS if self.lockstep else FROZEN_AFTER
         return InputGate(
             robot.limits,
-            frozen_after=0 if repeats else FROZEN_AFTER,
-            jump_m=JUMP_M,
+            frozen_after=0 if repeats else frozen_after,
+            jump_m=math.inf if self.lockstep else JUMP_M,
             turns_freely=robot.state_type is SpatialState,
             turns_only=robot.actuators.turns_only,
+            odometry=None if robot.actuators.turns_only else odometry,
         )

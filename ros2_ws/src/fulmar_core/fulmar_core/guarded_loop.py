@@ -123,6 +123,11 @@ class GuardedLoop:
         return self._gate.epoch
 
     @property
+    def input_warning(self) -> str:
+        """What is wrong with the source of the odometry now, in words that stay the same; empty if nothing."""
+        return self._gate.warning
+
+    @property
     def bearing_known(self) -> bool:
         """Whether the state of the air bearing has come, or there is none."""
         return self._bearing is not None

@@ -74,6 +74,7 @@ class ControllerStatus:
             beliefs.open,
             len(beliefs.words),
             guard.flags.unconverged,
+            guard.input_warning,
             self.contested,
             self._swap.requests,
         )
@@ -122,5 +123,6 @@ class ControllerStatus:
         }
         warnings = BETWEEN.join([*self.wire_problems, *beliefs.words])
         message = decision.reason or warnings or decision.mode.value
-        warned = [*beliefs.warnings, *(words for words in (unconverged, self.contested) if words)]
+        its = unconverged, self.contested, guard.input_warning
+        warned = [*beliefs.warnings, *(words for words in its if words)]
         health.publish(level, message, values, warnings=warned)

@@ -8,12 +8,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from fulmar_core.robot import Limits
+from fulmar_core.safety.motion_agreement import MotionAgreement
+from fulmar_core.sensors.odometer import OdometrySpec
 from fulmar_core.sensors.repetition import FROZEN_AFTER, RepetitionCheck
 from fulmar_core.state import RigidBodyState
 
 BACK_NS = 1_000_000_000  # further back than this is no reordering: whoever measures has begun again
 JUMP_M = 1.0  # beyond what speed explains: a correction of a fix or of a filter is less
 FORWARD_NS = 10_000_000_000  # further ahead than this is no gap: it is another clock, or one wrong stamp
+FROZEN = "odom does not change: its source is stuck"
+CONTRADICTION = (
+    "odom contradicts itself: its pose does not move as its twist says. One of them stands or drifts"
+)
 
 PLACE = ("position", "velocity")  # parts of odometry that a robot needs which moves from place to place
 TURNING = ("attitude", "turn rate")  # that every robot needs
@@ -35,6 +41,9 @@ class InputGate:
 
     A jump of time or place is reported once and begins a new epoch, so that neither a restarted plant nor one wrong
     stamp shuts the gate for ever. `epoch` counts these jumps.
+
+    Attributes:
+        warning: What is wrong with the source of the measurements now, in words that stay the same; empty if nothing.
     """
 
     def __init__(
@@ -45,6 +54,7 @@ class InputGate:
         jump_m: float = math.inf,
         turns_freely: bool = False,
         turns_only: bool = False,
+        odometry: OdometrySpec | None = None,
     ) -> None:
         """Check against a robot's limits.
 
@@ -56,13 +66,17 @@ class InputGate:
                 episodes may begin anywhere [m].
             turns_freely: Whether the robot turns about any axis; the limit then counts for the length of its turn rate.
             turns_only: Whether nothing moves the robot from its place, which its source then need not know.
+            odometry: How noisy the source is, where its pose must move as its twist says; once it did not, it is
+                refused until both show a motion. None: it need not.
         """
         self._needs = TURNING if turns_only else (*PLACE, *TURNING)
         self._turns_freely = turns_freely
         self._limits, self._jump_m = limits, jump_m
         self._repetition = RepetitionCheck(after=frozen_after)
+        self._agreement = MotionAgreement(odometry) if odometry is not None else None
+        self._contradicts = False
         self._last: Measurement | None = None
-        self.epoch = 0
+        self.epoch, self.warning = 0, ""
 
     def problem(self, measurement: Measurement) -> str | None:
         """Reason, for people, why the next measurement is rejected; None if it may be used."""
@@ -74,14 +88,16 @@ class InputGate:
         if reason is None and self._last is not None:
             reason = self._stamp_problem(measurement, measurement.stamp_ns - self._last.stamp_ns)
         if reason is None:
-            reason = self._frozen_problem(measurement)
+            frozen, contradiction = self._frozen_problem(measurement), self._contradiction(measurement)
+            reason = frozen or contradiction
+            self.warning = (FROZEN if frozen else contradiction) or ""
             self._last = measurement
         return reason
 
     def forget(self) -> None:
         """Begin anew, as after a time jump that is known."""
         self._last = None
-        self._repetition.forget()
+        self._forget_source()
 
     def _frame_problem(self, measurement: Measurement) -> str | None:
         if measurement.frame != "odom" or measurement.child_frame != "base_link":
@@ -135,9 +151,26 @@ class InputGate:
     def _new_epoch(self, measurement: Measurement, reason: str) -> str:
         self.epoch += 1
         self._last = measurement
-        self._repetition.forget()
+        self._forget_source()
         self._is_frozen(measurement)
+        self._contradiction(measurement)
         return f"{reason}: a new epoch begins"
+
+    def _forget_source(self) -> None:
+        self._repetition.forget()
+        self._contradicts, self.warning = False, ""
+        if self._agreement is not None:
+            self._agreement.forget()
+
+    def _contradiction(self, measurement: Measurement) -> str | None:
+        if self._agreement is None:
+            return None
+        if not self._agreement.agrees(measurement.stamp_ns, measurement.state):
+            self._contradicts = True
+            self._agreement.forget()  # what follows must prove itself
+        elif self._agreement.proves:
+            self._contradicts = False
+        return CONTRADICTION if self._contradicts else None
 
     def _frozen_problem(self, measurement: Measurement) -> str | None:
         if not self._is_frozen(measurement):
