@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 
@@ -24,7 +23,7 @@ from fulmar_core.simulation import BatchSimulation
 from fulmar_core.spatial import SpatialState
 from fulmar_core.tasks import load_task
 
-TICK_NS = 100_000_000
+TICK_NS = 50_000_000  # as plants measure, twice in a control step
 BEGIN_NS = 1_000_000_000_000
 # A reading's name, its value and the time in the run [s], to what arrives in its place; None: nothing.
 Spoil = Callable[[str, Reading, float], Reading | None]
@@ -65,10 +64,7 @@ def fly(
     seed: int = 0,
     spoil: Spoil = nothing,
     angle_deg: float | None = None,
-    stop: bool = True,
     goals_s: float = 0.0,
-    estimator: Any = None,
-    rates: Callable[[np.ndarray, np.random.Generator], Reading] | None = None,
 ) -> Flight:
     """Let an estimator's attitude control a satellite, as its controller does: without an estimate its torques are 0.
 
@@ -81,32 +77,29 @@ def fly(
         seed: Of everything.
         spoil: What happens to readings on their way.
         angle_deg: From the start to the goal; by default the task's.
-        stop: Whether a controller stops without an estimate, else the test's own law goes on from the truth.
         goals_s: Time after which another goal is given, again and again; 0: never [s].
-        estimator: In place of a new one.
-        rates: Makes a rate of events from the true turn rate; None: no event cameras run.
     """
     robot, the_task, the_scenario = load_robot(name), load_task(task), load_scenario(scenario)
     if angle_deg is not None:
         the_task = replace(the_task, start=replace(the_task.start, angle_deg=(angle_deg, angle_deg)))
-    simulation = BatchSimulation(robot, the_task, the_scenario, worlds=1, seed=seed, dtype=np.float64)
+    simulation = BatchSimulation(
+        robot, the_task, the_scenario, worlds=1, seed=seed, control_hz=20.0, dtype=np.float64
+    )
     sensors = SimulatedSensors(sensors_in(robot, the_scenario), noisy=the_scenario.sensor_noise)
     sensors.reset(seed, 0)
-    estimator = estimator or make_estimator("attitude", robot, exact_sensors=not the_scenario.sensor_noise)
+    estimator = make_estimator("attitude", robot, exact_sensors=not the_scenario.sensor_noise)
     excites = law == "excite"
     controller = excite_of(robot, the_task) if excites else load_classical(robot, the_task, law=law)
     loop = ControlLoop(robot, the_task, controller)
     loop.begin(simulation.goal)
-    flight, rng, goals = Flight(), np.random.default_rng(seed), 0
-    for number in range(round(10 * seconds)):
-        now_s, now_ns = 0.1 * number, BEGIN_NS + number * TICK_NS
-        truth = (
-            simulation.truth.to_rigid() if simulation.truth.x.ndim == 0 else simulation.truth[0].to_rigid()
-        )
+    command = robot.actuators.safe_command
+    flight, goals = Flight(), 0
+    for number in range(round(1e9 * seconds / TICK_NS)):
+        now_ns = BEGIN_NS + number * TICK_NS
+        now_s = 1e-9 * number * TICK_NS
+        truth = simulation.truth[0].to_rigid()
         wheels = WheelSpeeds(robot.actuators.wheel_names, simulation.wheels[0].copy())
         readings = sensors.measure(Truth(truth, np.zeros(3), wheels=wheels), now_s)
-        if rates is not None and number % 2 == 0:
-            readings["rate"] = rates(truth.angular_velocity_in_body, rng)
         for which, reading in sorted(readings.items()):
             stamped = replace(reading, stamp_ns=reading.stamp(now_ns))
             arrived = spoil(which, stamped, now_s)
@@ -117,14 +110,16 @@ def fly(
         estimate = estimator.estimate(now_ns)
         for words in (*estimator.warnings(), *([estimator.problem] if estimator.problem else [])):
             flight.said.setdefault(words, now_s)
-        command = robot.actuators.safe_command
         error = np.nan
         if estimate is not None:
             off = rotation_error(tuple(truth.quat_xyzw), tuple(estimate.value.quat_xyzw))
             error = float(np.degrees(np.linalg.norm(off)))
-            command = loop.step(SpatialState.from_rigid(estimate.value)[None], now_ns).command[0]
         elif flight.errors_deg and np.isfinite(flight.errors_deg).any():
-            flight.stopped_s += 0.1
+            flight.stopped_s += 1e-9 * TICK_NS
+        if number % 2 == 0:
+            command = robot.actuators.safe_command
+            if estimate is not None:
+                command = loop.step(SpatialState.from_rigid(estimate.value)[None], now_ns).command[0]
         flight.errors_deg.append(error)
         flight.rates_deg.append(float(np.degrees(np.linalg.norm(truth.angular_velocity_in_body))))
         flight.pointing_deg.append(
@@ -133,7 +128,9 @@ def fly(
         simulation.move(np.asarray(command)[None])
         if goals_s and now_s >= goals_s * (goals + 1):
             goals += 1
-            drawn = BatchSimulation(robot, the_task, the_scenario, worlds=1, seed=1000 * seed + goals)
+            drawn = BatchSimulation(
+                robot, the_task, the_scenario, worlds=1, seed=1000 * seed + goals, dtype=np.float64
+            )
             simulation.goal = drawn.goal
             loop.begin(drawn.goal)
     flight.outliers, flight.epochs, flight.status = estimator.outliers, estimator.epoch, estimator.status()

@@ -283,7 +283,7 @@ def test_no_satellite_follows_a_frozen_or_a_drifting_star_tracker(name, seed, ta
     ):
         flight = fly(name, spoil=spoil, **how)
         assert flight.first(words) - 20.0 <= most_s
-        assert np.nanmax(flight.errors_deg[20:]) < 0.03
+        assert np.nanmax(flight.errors_deg[40:]) < 0.03
         assert flight.epochs == 0
 
 
@@ -293,7 +293,7 @@ def test_no_satellite_follows_a_frozen_or_a_drifting_star_tracker(name, seed, ta
 def test_no_satellite_is_misled_by_a_frozen_gyroscope_or_frozen_wheels(name, which):
     flight = fly(name, spoil=frozen(which, 20.0), task="slew", seconds=60.0, angle_deg=40.0)
     assert flight.first("repeats itself") - 20.0 <= 1.1
-    assert np.nanmax(flight.errors_deg[20:]) < 0.05
+    assert np.nanmax(flight.errors_deg[40:]) < 0.05
     assert flight.pointing_deg[-1] < 1.0
     assert flight.stopped_s == 0.0
 

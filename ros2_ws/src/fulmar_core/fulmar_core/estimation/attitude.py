@@ -167,7 +167,8 @@ class AttitudeEstimator:
         residual = np.array(rotation_error(tuple(believed), tuple(quat)))
         if not self._correct(residual, TURN, noise, gated=True):
             variance = float(np.linalg.eigvalsh(noise)[-1])
-            if self._trust.stranger(believed, quat, variance, stamp_ns, self._rate_alone()):
+            source = self._rate_alone()
+            if self._trust.stranger(believed, quat, variance, self._speed, stamp_ns, source):
                 self._begin(quat, noise, stamp_ns)
                 self.epoch += 1
                 return ""
@@ -176,8 +177,13 @@ class AttitudeEstimator:
         self._attitude_ns = stamp_ns
         self._trust.match()
         if self.rate_source == "gyroscope":
-            self._trust.see_bias(self._bias, self._P[BIAS, BIAS], stamp_ns)
+            self._trust.see_bias(self._bias, self._P[BIAS, BIAS], self._speed, stamp_ns)
         return ""
+
+    @property
+    def _speed(self) -> float:
+        """Size of the turn rate [rad/s]."""
+        return float(np.linalg.norm(self._turning))
 
     def _rate_alone(self) -> str:
         """What the turn rate comes from, for people; empty where gyroscope and event cameras agree on it."""
