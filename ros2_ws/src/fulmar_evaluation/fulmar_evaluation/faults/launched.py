@@ -8,34 +8,68 @@ from __future__ import annotations
 
 import json
 import os
-import pickle
 import signal
 import sys
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from types import FrameType
 from typing import Any
 
+import numpy as np
+
 from fulmar_bringup.planning import RunRequest
 from fulmar_bringup.run_executor import execute
+from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.standing_system import keep_up
+from fulmar_core.config import load_config
 from fulmar_core.errors import FAILED, FulmarError
+from fulmar_core.goal import goal_at
 from fulmar_core.process import end_with
 
 LAUNCHERS = RUN, UP = ("run", "up")
 ENDS = "stopped"  # the last event
+Rows = tuple[tuple[float, ...], ...]
+
+
+@dataclass(frozen=True)
+class WrittenRequest:
+    """A `RunRequest` of a task without things, as a file has it."""
+
+    plan: RunPlan
+    goal: tuple[float, ...] | None
+    record: str
+    command: str
+    targets: Rows
+    obstacles: Rows
+
+    @property
+    def request(self) -> RunRequest:
+        """What is asked for."""
+        obstacles = np.array(self.obstacles) if self.obstacles else None
+        mission = goal_at(*self.targets, obstacles=obstacles)
+        return RunRequest(self.plan, self.goal, Path(self.record), self.command, mission)
 
 
 def command_of(launcher: str, request: RunRequest, folder: Path) -> list[str]:
     """Command line of a launcher of a request, which is written into a folder."""
-    path = folder / "request.pickle"
-    path.write_bytes(pickle.dumps(request))
+    mission = request.mission
+    written = WrittenRequest(
+        request.plan,
+        request.goal,
+        str(request.record),
+        request.command,
+        np.asarray(mission.targets).tolist(),
+        np.asarray(mission.obstacles).tolist(),
+    )
+    path = folder / "request.json"
+    path.write_text(json.dumps(asdict(written)), encoding="utf-8")
     return [sys.executable, "-m", __name__, launcher, str(path)]
 
 
 def main() -> None:
     """Run or keep up the request of a file until its end, or until SIGINT or SIGTERM."""
     launcher, path = sys.argv[1:]
-    request: RunRequest = pickle.loads(Path(path).read_bytes())
+    request = load_config(WrittenRequest, Path(path)).request
     signal.signal(signal.SIGTERM, _on_terminate)
     end_with(os.getppid(), signal.SIGTERM)
     failure = ""
