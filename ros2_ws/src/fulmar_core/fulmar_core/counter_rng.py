@@ -121,7 +121,7 @@ class Draws:
         return cls(seed, np.asarray([number]), np.asarray([repeat]), stream)
 
     def branch(self, number: int) -> Draws:
-        """Other numbers for the same worlds, which leave these as they are; `number` >= 1 tells branches apart."""
+        """Other numbers for the same worlds, which leave these as they are; each branch has a `number` >= 1."""
         other = object.__new__(type(self))
         first, second = words(self._keys, MASK - number, 2)
         other._keys, other.worlds = (first, second), self.worlds

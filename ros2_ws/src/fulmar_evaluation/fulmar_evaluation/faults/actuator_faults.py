@@ -19,7 +19,7 @@ from fulmar_evaluation.faults.live_system import LiveSystem, NothingShown
 from fulmar_evaluation.faults.observer import wait_for
 
 MEASURED_S = 5.0  # until a part is named whose motion is measured
-BELIEVED_S = 15.0  # until it is stopped or at its goal, where only the robot's motion tells of it
+BELIEVED_S = 15.0  # until it is stopped or at its goal, where only the motion of the robot shows it
 HIGH_M = 15.0  # for an aircraft to come back to level flight
 COMES_S = 30.0  # by then the scenario has begun to do it
 

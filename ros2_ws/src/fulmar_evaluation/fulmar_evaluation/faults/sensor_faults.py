@@ -29,7 +29,7 @@ from fulmar_ros.qos import publisher_qos
 NOISE_S = 1.0  # beyond the watchdog: what repeats of a noisy value, or slow drifts, take to tell
 REPEATS = FEWEST + 2  # readings of a slow sensor until it is known to be frozen, the one under way among them
 DRIFT_DEG = 0.05  # per second, of a star tracker [deg/s]
-TOLD_S = 20.0  # until a drift that slow has left the noise of gyroscope and wheels
+SAID_S = 20.0  # until a drift that slow has left the noise of gyroscope and wheels
 CREEP = 0.3  # of a position from satellites, with a velocity that knows nothing of it [m/s]
 ASIDE_M = 0.5  # of a second odometry
 STRANGER_S = 0.02  # between its messages
@@ -71,7 +71,7 @@ def star_tracker_frozen(live: LiveSystem) -> Outcome:
     """The star tracker repeats its last attitude, under new stamps."""
     rate_hz = live.robot.sensors.specs["star_tracker"].rate_hz
     slow_s = REPEATS / rate_hz if rate_hz else 0.0
-    return _told(live, frozen(), live.watchdog_s + NOISE_S + slow_s)
+    return _said(live, frozen(), live.watchdog_s + NOISE_S + slow_s)
 
 
 def star_tracker_drifts(live: LiveSystem) -> Outcome:
@@ -80,7 +80,7 @@ def star_tracker_drifts(live: LiveSystem) -> Outcome:
     def drift(message: Any, passed_s: float) -> None:
         turned_by(message, math.radians(DRIFT_DEG) * passed_s)
 
-    return _told(live, since_first(drift), TOLD_S)
+    return _said(live, since_first(drift), SAID_S)
 
 
 def turned_by(message: Any, angle: float) -> None:
@@ -95,7 +95,7 @@ def gnss_creeps(live: LiveSystem) -> Outcome:
     def creep(message: Odometry, passed_s: float) -> None:
         message.pose.pose.position.y += CREEP * passed_s
 
-    return intercept(live, since_first(creep), live.watchdog_s + TOLD_S)
+    return intercept(live, since_first(creep), live.watchdog_s + SAID_S)
 
 
 def two_odometries(live: LiveSystem) -> Outcome:
@@ -135,7 +135,7 @@ def two_odometries(live: LiveSystem) -> Outcome:
     return replace(outcome, detected_by=named.who, reaction=named.text)
 
 
-def _told(live: LiveSystem, change: Injection, limit_s: float) -> Outcome:
+def _said(live: LiveSystem, change: Injection, limit_s: float) -> Outcome:
     """Somebody says it in time; the satellite then stops, or copes by its gyroscope and wheels."""
     distance = DistanceWatch(live)
     live.until_it_moves()
@@ -154,7 +154,7 @@ def _without_stars(robot: Robot) -> str:
 
 def _without_satellites(robot: Robot) -> str:
     outdoors = robot.flies or robot.hydrodynamics is not None
-    return "" if outdoors else "satellites do not tell it where it is"
+    return "" if outdoors else "no satellite navigation is in its loop"
 
 
 SENSOR_FAULTS = (
