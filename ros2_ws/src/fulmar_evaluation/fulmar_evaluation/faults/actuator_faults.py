@@ -79,7 +79,8 @@ def _when(live: LiveSystem, from_s: float) -> float:
     Raises:
         NothingShown: It did not.
     """
-    live.until_it_moves()
+    if live.flight is None:  # an aircraft begins in level flight, and may be out of it by then
+        live.until_it_moves()
     due_ns = SIMULATION_START_NS + int(1e9 * from_s)
     if not wait_for(lambda: bool((live.observer.received()[1] >= due_ns).any()), COMES_S):
         raise NothingShown(f"the plant's clock did not reach {from_s:.1f} s, so the fault would show nothing")

@@ -62,7 +62,7 @@ def supervisor_killed(live: LiveSystem) -> Outcome:
     words = f"{left} of {len(nodes)} nodes are left over" if left else "every node ended with its launcher"
     if live.flight is not None:
         flown, level = live.flight.since(since_s)
-        words, ends_safe = f"{words}; {flown}", ends_safe and level
+        words, ends_safe = f"{words}; {flown}", level
     # The recorder of an aircraft ends before its plant, which flies it down.
     away = (killed_s, math.inf) if live.flight is not None else None
     return Outcome("nodes" if not left else "", words, ends_safe and not left, safe_s, limit_s, away)
