@@ -128,7 +128,9 @@ class ReactionWheelFeedback:
         self._model = ModelledResponse(robot)
         most = np.array([robot.actuators.torque / robot.actuators.spin_inertia])
         self._banks = [
-            ResponseBank(1, offsets=most, pushes=FRICTION * most, changes=CHANGES * most, adds_up=True)
+            ResponseBank(
+                1, offsets=most, pushes=FRICTION * most, changes=CHANGES * most, sticks=False, adds_up=True
+            )
             for _ in robot.actuators.wheels
         ]
         self.reset()

@@ -9,6 +9,7 @@ of a constant push and of shares that are not quite 1, is the prior of them all.
 
 from __future__ import annotations
 
+import functools
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -23,9 +24,11 @@ LIKELIER = 7.0  # logarithm by which a hypothesis must be likelier than that of 
 DOUBTFUL = 1.0  # same from which nothing is learned of sound parts [-]
 APART = 4.0  # and than any of another part [-]
 LASTS_S = 1.0  # for so long [s]
-ROUGH = 2.0  # times as much where the variance of noise is as many times that of the sensors, or more [-]
+ROUGH = 2.0  # times as much where noise has so much more variance, or kicks add up [-]
+KICKED = 0.3  # variance of kicks from which evidence has to be as much clearer, in the measurements' own [-]
 RARER = 3.0  # by which a part sticks more rarely than it dies, as a logarithm [-]
-TAKEN_BACK = 6.0  # variance of a difference of changes of what is measured with a variance of 1 [-]
+# Variance of a difference of changes of what is measured with a variance of 1, and a sixth more for chance [-].
+TAKEN_BACK = 7.0
 MEDIANS = (0.455, 0.693)  # of the mean square of one or two numbers whose variance is 1 [-]
 JUMPS, CALM = 30, 15  # differences that noise is learned from; of them, as expected, to begin with
 
@@ -76,6 +79,7 @@ class ResponseBank:
         pushes: np.ndarray | None = None,
         changes: np.ndarray | None = None,
         together: bool = False,
+        sticks: bool = True,
         adds_up: bool = False,
         onsets_s: tuple[float, ...] = (1.0, 2.0, 3.0),
         fades_s: float = 0.0,
@@ -89,6 +93,7 @@ class ResponseBank:
             pushes: Spread of each push from outside, shape (k,); none by default.
             changes: By how much it may change within seconds, shape (k,).
             together: Whether all parts may be dead at once, as those of a robot that is held.
+            sticks: Whether a part may also stand at some value, whatever it is commanded.
             adds_up: Whether values are changes of something that is measured with white noise, as velocities are: the
                 noise of one change is taken back by the next.
             onsets_s: Times since when a part may be dead, shortest first [s].
@@ -103,7 +108,8 @@ class ResponseBank:
         self._mean = np.concatenate((np.ones(parts), np.zeros(parts + len(pushes))))
         self._covariance = np.diag(np.square(spread))
         self._changes = np.diag(np.square(np.concatenate((np.zeros(2 * parts), changes))))
-        self._faults = [Fault((i,), stuck) for i in range(parts) for stuck in (False, True)]
+        kinds = (False, True) if sticks else (False,)
+        self._faults = [Fault((i,), stuck) for i in range(parts) for stuck in kinds]
         if fades_s:
             self._faults += [Fault((i,), fades=True) for i in range(parts)]
         if together and parts > 1:
@@ -118,7 +124,7 @@ class ResponseBank:
         self._past = np.zeros((size, size)), np.zeros(size)  # information and evidence
         usual = TAKEN_BACK if self._adds_up else 2.0
         self._jumps = deque([usual] * CALM, maxlen=JUMPS)
-        self._variance = self._variance_by(usual)
+        self._variance, self._kicks = 1.0, 0.0  # of a value; of what adds up, in the measurements' own [-]
         self._deviations = np.zeros(0)
         self._prior = self._mean, self._covariance
         self._likeliest: tuple[int, ...] = ()
@@ -150,8 +156,7 @@ class ResponseBank:
         self._gone.append(gone)
         gone_s = sum(each.seconds for each in self._gone)
         if gone_s >= LEARNT_S:
-            keep, (variance, _) = np.exp(-gone_s / MEMORY_S), self._variance
-            gone_by = self._sums(self._gone, variance)
+            keep, gone_by = np.exp(-gone_s / MEMORY_S), self._sums(self._gone)
             self._past = keep * self._past[0] + gone_by.matrix, keep * self._past[1] + gone_by.vector
             self._prior = self._learned()
             self._gone.clear()
@@ -164,27 +169,27 @@ class ResponseBank:
         if len(deviations) == len(self._deviations):
             jumps = deviations - self._deviations
             self._jumps.append(float(jumps @ jumps) / len(jumps) / MEDIANS[min(len(jumps), 2) - 1])
-            self._variance = self._variance_by(float(np.median(self._jumps)))
+            self._take_variance(float(np.median(self._jumps)))
         self._deviations = deviations
 
-    def _variance_by(self, jumps: float) -> tuple[float, bool]:
-        """Variance of a value in its expected one, and whether values add up, by the variance of differences.
+    def _take_variance(self, jumps: float) -> None:
+        """Take the variance of differences, in the expected variance of values.
 
         Changes of a velocity that differ more than its measurements err are kicks and noisy actuators: nothing takes
-        these back, so they do not add up to less.
+        these back, so they add up over the window.
         """
-        if not self._adds_up:
-            return max(1.0, 0.5 * jumps), False
-        kicks = 0.5 * (jumps - TAKEN_BACK)
-        return (1.0, True) if kicks <= 1.0 else (2.0 + kicks, False)
+        if self._adds_up:
+            self._kicks = max(0.0, 0.5 * (jumps - TAKEN_BACK))
+        else:
+            self._variance = max(1.0, 0.5 * jumps)
 
     def _decide(self, seconds: float) -> None:
         gains = self._gains()
         best = max(gains, key=lambda parts: gains[parts])
         rival = max((gain for parts, gain in gains.items() if parts != best), default=-np.inf)
         self._doubtful = gains[best] > DOUBTFUL
-        variance, _ = self._variance
-        needed = LIKELIER if variance < ROUGH else ROUGH * LIKELIER
+        rough = self._variance >= ROUGH or self._kicks > KICKED
+        needed = ROUGH * LIKELIER if rough else LIKELIER
         clear = gains[best] > max(needed, rival + APART)
         likeliest = best if clear else ()
         self._lasts_s = self._lasts_s + seconds if likeliest and likeliest == self._likeliest else 0.0
@@ -198,13 +203,12 @@ class ResponseBank:
         """By how much, as a logarithm, faults of parts explain the newest seconds better than sound parts do."""
         gains: dict[tuple[int, ...], float] = {}
         priors = [(fault, *self._under(fault)) for fault in self._faults]
-        variance, _ = self._variance
         for onset_s in self._onsets_s:
             since = self._since(onset_s)
-            usual = self._sums(since, variance)
+            usual = self._sums(since)
             sound = _evidence(*self._prior, usual)
             for fault, mean, covariance in priors:
-                sums = self._sums(self._without(since, fault.parts[0]), variance) if fault.fades else usual
+                sums = self._sums(self._without(since, fault.parts[0])) if fault.fades else usual
                 gain = _evidence(mean, covariance, sums) - sound
                 gains[fault.parts] = max(gains.get(fault.parts, -np.inf), gain - RARER * fault.stuck)
         return gains
@@ -230,20 +234,16 @@ class ResponseBank:
             past_s += each.seconds
         return left
 
-    def _sums(self, measured: list[_Measured], variance: float) -> _Sums:
-        """What measurements say whose noise has a variance."""
+    def _sums(self, measured: list[_Measured]) -> _Sums:
+        """What measurements say of the coefficients."""
         matrix, vector, squares = np.zeros_like(self._covariance), np.zeros_like(self._mean), 0.0
-        _, adds_up = self._variance
         for rows, values in _channels(measured):
-            if adds_up:
-                rows, values = np.cumsum(rows, axis=0), np.cumsum(values)
+            if self._adds_up:
+                whiten = _whitening(len(values), round(self._kicks, 1))
+                rows, values = whiten @ np.cumsum(rows, axis=0), whiten @ np.cumsum(values)
             matrix, vector = matrix + rows.T @ rows, vector + rows.T @ values
             squares += float(values @ values)
-            if adds_up:  # the first measurement's noise is in all
-                total, height, share = rows.sum(axis=0), values.sum(), 1.0 / (len(rows) + 1)
-                matrix, vector = matrix - share * np.outer(total, total), vector - share * height * total
-                squares -= float(share * height * height)
-        return _Sums(matrix / variance, vector / variance, squares / variance)
+        return _Sums(matrix / self._variance, vector / self._variance, squares / self._variance)
 
     def _learned(self) -> tuple[np.ndarray, np.ndarray]:
         """Mean and covariance of the coefficients of sound parts, with the pushes of the time before."""
@@ -266,6 +266,17 @@ class ResponseBank:
                 mean[index] = 0.0
                 covariance[index, index] = spread**2
         return mean, covariance
+
+
+@functools.lru_cache(maxsize=256)
+def _whitening(count: int, kicks: float) -> np.ndarray:
+    """What makes sums of so many changes independent, each of variance 1, shape (count, count).
+
+    Each has noise of its own, that of the first measurement in common, and the kicks so far, whose variance is given.
+    """
+    number = np.arange(1, count + 1)
+    covariance = np.eye(count) + 1.0 + kicks * np.minimum(number[:, None], number)
+    return np.asarray(np.linalg.inv(np.linalg.cholesky(covariance)))
 
 
 def _channels(measured: list[_Measured]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
