@@ -1,23 +1,27 @@
-"""Closed loops in the core's batch whose valves or fans fail on the way, each watched by a `FaultMonitor`."""
+"""Closed loops whose valves or fans fail on the way, each watched by the guards of a controller node."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
+from fulmar_core.backend import Sample
 from fulmar_core.control_loop import ControlLoop
 from fulmar_core.disturbances.parts import Stuck
 from fulmar_core.disturbances.scenario import Scenario, load_scenario
+from fulmar_core.episode import draw_episodes
 from fulmar_core.goal import goal_in_float64
 from fulmar_core.health.applied import AppliedHistory
 from fulmar_core.health.fault_monitor import FaultMonitor
 from fulmar_core.health.losses import Losses
-from fulmar_core.robot import load_robot
+from fulmar_core.robot import Robot, load_robot
 from fulmar_core.safety.convergence import ConvergenceMonitor
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.state import RigidBodyState
-from fulmar_core.tasks import load_task
+from fulmar_core.tasks import Task, load_task
 from policy_server.controllers import Choice, load_controller
 
 PARTS = ("position_in_world", "quat_xyzw", "velocity_in_world", "angular_velocity_in_body")
@@ -73,6 +77,83 @@ def sticking(at: float, *, from_s: tuple[float, float] = (1.0, 4.0), scenario: s
     return replace(usual, actuation=replace(usual.actuation, stuck=stuck))
 
 
+class Simulators:
+    """MuJoCo side by side, with what `watch` needs of a `BatchSimulation`."""
+
+    def __init__(
+        self, robot: Robot, task: Task, scenario: Scenario, *, worlds: int, seed: int, control_hz: float
+    ) -> None:
+        from sim_nodes.mujoco_backend import MujocoBackend
+
+        task = task.fitted(robot)
+        self._form, self._ticks = task.state_type, robot.timing.substeps(control_hz)
+        drawn = draw_episodes(robot, task, scenario, seed=seed, numbers=np.arange(worlds))
+        self.goal, self.world = drawn.goal, drawn.world
+        self._backends = [MujocoBackend.of(robot, task, scenario) for _ in range(worlds)]
+        self._take([each.reset(drawn[i], seed=seed, number=i) for i, each in enumerate(self._backends)])
+
+    def move(self, commands: np.ndarray) -> None:
+        """Apply one command each for one control step."""
+        self._take(
+            [each.step(command, self._ticks) for each, command in zip(self._backends, commands, strict=True)]
+        )
+
+    def _take(self, samples: list[Sample]) -> None:
+        form = self._form
+        self.measured = form.stack([form.from_rigid(sample.measured) for sample in samples])
+        self.truth = form.stack([form.from_rigid(sample.truth) for sample in samples])
+
+
+def in_core(
+    robot: Robot, task: Task, scenario: Scenario, *, worlds: int, seed: int, control_hz: float
+) -> BatchSimulation[Any]:
+    """The core's batch."""
+    return BatchSimulation(
+        robot, task, scenario, worlds=worlds, seed=seed, control_hz=control_hz, dtype=np.float64
+    )
+
+
+class Watching:
+    """What the guards of one robot's controller node say of it, step by step."""
+
+    def __init__(self, robot: Robot, control_hz: float) -> None:
+        self._applied = AppliedHistory(round(2e9 / control_hz))
+        self._monitor = FaultMonitor(robot, self._applied, control_hz=control_hz, lockstep=True)
+        self._losses = Losses(robot)
+        self.dead: dict[str, float] = {}
+        self.open: dict[str, float] = {}
+        self.said: dict[str, None] = {}
+        self.unconverged_s: float | None = None
+        self.at_goal_s: float | None = None
+        self.hopeless = False
+
+    @property
+    def suspects(self) -> bool:
+        """Whether an actuator is believed dead now."""
+        return bool(self._monitor.beliefs.dead)
+
+    def see(self, state: RigidBodyState, stamp_ns: int) -> None:
+        """Take a measurement."""
+        self._monitor.take(state, stamp_ns)
+        beliefs = self._monitor.beliefs
+        for names, known in ((beliefs.dead, self.dead), (beliefs.open, self.open)):
+            for name in names:
+                known.setdefault(name, 1e-9 * stamp_ns)
+        self.said |= dict.fromkeys(beliefs.words)
+        self.hopeless = self._losses.hopeless(beliefs.dead, stamp_ns)
+
+    def follow(self, command: np.ndarray, stamp_ns: int, *, late: bool, there: bool) -> None:
+        """Take what is applied from now on, whether it is late, and whether the robot is at its goal."""
+        self._applied.add(stamp_ns, np.array(command, dtype=float))
+        now_s = 1e-9 * stamp_ns
+        if (late or self.hopeless) and self.unconverged_s is None:
+            self.unconverged_s = now_s
+        if not there:
+            self.at_goal_s = None
+        elif self.at_goal_s is None:
+            self.at_goal_s = now_s
+
+
 def watch(
     robot_name: str,
     task_name: str,
@@ -82,67 +163,44 @@ def watch(
     episodes: int,
     seconds: float,
     seed: int = 0,
+    simulator: Callable[..., Any] = in_core,
 ) -> list[Watched]:
     """Run episodes of a seed side by side."""
     robot, task = load_robot(robot_name), load_task(task_name)
     acts = load_controller(controller, robot, task, Choice(robot.timing.control_hz))
-    batch = BatchSimulation(
-        robot,
-        task,
-        scenario,
-        worlds=episodes,
-        seed=seed,
-        control_hz=acts.control_hz,
-        dtype=np.float64,
-    )
+    worlds = simulator(robot, task, scenario, worlds=episodes, seed=seed, control_hz=acts.control_hz)
     loop = ControlLoop(robot, task, acts, robots=episodes)
     loop.reset()
-    loop.begin(goal_in_float64(batch.goal))
-    hold_ns = round(2e9 * loop.dt)
-    histories = [AppliedHistory(hold_ns) for _ in range(episodes)]
-    monitors = [FaultMonitor(robot, each, control_hz=acts.control_hz, lockstep=True) for each in histories]
-    named: list[tuple[dict[str, float], dict[str, float]]] = [({}, {}) for _ in range(episodes)]
-    said: list[dict[str, None]] = [{} for _ in range(episodes)]
-    at_goal: list[float | None] = [None] * episodes
-    losses = [Losses(robot) for _ in range(episodes)]
-    convergence, unconverged = ConvergenceMonitor(robot, loop.task, loop.dt), [None] * episodes
+    loop.begin(goal_in_float64(worlds.goal))
+    convergence = ConvergenceMonitor(robot, loop.task, loop.dt)
+    watched = [Watching(robot, acts.control_hz) for _ in range(episodes)]
     for number in range(round(seconds / loop.dt)):
-        time_s, stamp_ns = number * loop.dt, round(1e9 * number * loop.dt)
-        measured = batch.measured.to_rigid()
-        for i, monitor in enumerate(monitors):
-            monitor.take(
-                RigidBodyState(*(np.asarray(getattr(measured, part))[i] for part in PARTS)), stamp_ns
-            )
-            for names, known in zip((monitor.beliefs.dead, monitor.beliefs.open), named[i], strict=True):
-                for name in names:
-                    known.setdefault(name, time_s)
-            said[i] |= dict.fromkeys(monitor.beliefs.words)
-        inputs = loop.inputs(batch.measured, stamp_ns)
-        step = loop.act(inputs)
-        convergence.see(inputs.state, inputs.goal, step.command)
-        suspected = np.array([bool(monitor.beliefs.dead) for monitor in monitors])
-        late = convergence.late(suspected)
-        for i, monitor in enumerate(monitors):
-            late[i] |= losses[i].hopeless(monitor.beliefs.dead, stamp_ns)
-        for i, stops in enumerate(late):
-            unconverged[i] = time_s if stops and unconverged[i] is None else unconverged[i]
-        for history, command in zip(histories, step.command, strict=True):
-            history.add(stamp_ns, np.array(command, dtype=float))
-        within = loop.task.tolerance.holds(loop.task.errors(batch.truth, loop.goal))
-        for i, there in enumerate(np.asarray(within)):
-            at_goal[i] = (time_s if at_goal[i] is None else at_goal[i]) if there else None
-        batch.move(step.command)
-    alive = np.asarray(batch.world.alive)
-    parts = np.asarray(batch.world.stuck_part).astype(int)
+        stamp_ns = round(1e9 * number * loop.dt)
+        measured = worlds.measured.to_rigid()
+        for i, each in enumerate(watched):
+            each.see(RigidBodyState(*(np.asarray(getattr(measured, part))[i] for part in PARTS)), stamp_ns)
+        inputs = loop.inputs(worlds.measured, stamp_ns)
+        commands = loop.act(inputs).command
+        convergence.see(inputs.state, inputs.goal, commands)
+        late = convergence.late(np.array([each.suspects for each in watched]))
+        there = np.asarray(loop.task.tolerance.holds(loop.task.errors(worlds.truth, loop.goal)))
+        for i, each in enumerate(watched):
+            each.follow(commands[i], stamp_ns, late=bool(late[i]), there=bool(there[i]))
+        worlds.move(commands)
+    names, alive = robot.actuators.names, np.asarray(worlds.world.alive)
+    parts, from_s = np.asarray(worlds.world.stuck_part).astype(int), np.asarray(worlds.world.stuck_from)
+    if alive.shape[0] != len(names):
+        alive = alive.T
     return [
         Watched(
-            robot.actuators.names[parts[i]] if parts[i] >= 0 else "",
-            float(np.asarray(batch.world.stuck_from)[i]),
-            *named[i],
-            tuple(said[i]),
-            unconverged[i],
-            at_goal[i],
-            tuple(name for name, works in zip(robot.actuators.names, alive[:, i], strict=True) if not works),
+            names[parts[i]] if parts[i] >= 0 else "",
+            float(from_s[i]),
+            each.dead,
+            each.open,
+            tuple(each.said),
+            each.unconverged_s,
+            each.at_goal_s,
+            tuple(name for name, works in zip(names, alive[:, i], strict=True) if not works),
         )
-        for i in range(episodes)
+        for i, each in enumerate(watched)
     ]
