@@ -128,6 +128,11 @@ class GuardedLoop:
         return self._gate.warning
 
     @property
+    def strives(self) -> bool:
+        """Whether the controller means to meet the goal; those that excite a robot do not."""
+        return _strives(self.loop.controller)
+
+    @property
     def bearing_known(self) -> bool:
         """Whether the state of the air bearing has come, or there is none."""
         return self._bearing is not None
@@ -269,7 +274,7 @@ class GuardedLoop:
         """Let the controller act; see `ControlLoop.act`."""
         step = self.loop.act(inputs)
         self.acted += 1
-        if _strives(self.loop.controller):
+        if self.strives:
             self._convergence.see(inputs, step.command)
         return step
 

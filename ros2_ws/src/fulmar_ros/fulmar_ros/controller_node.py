@@ -376,7 +376,9 @@ class ControllerNode(LifecycleNode):
         )
         dead = [word for word in self._beliefs.warnings if word.endswith(DEAD)]
         guard.suspect(", ".join(dead), hopeless=self._actuator_beliefs.hopeless)
-        if self._beliefs.open and decision.may_act and not guard.flags.latched_fault:
+        # A controller that excites a robot is there to learn how far its file is wrong.
+        acts = decision.may_act and guard.strives and not guard.flags.latched_fault
+        if self._beliefs.open and acts:
             self._fail(f"{self._beliefs.words[0]}. Close its supply.")
 
     def _give_up(self, reason: str, stamp: int) -> None:
