@@ -10,6 +10,7 @@ import numpy as np
 
 from fulmar_core.backend import Sample
 from fulmar_core.control_loop import ControlLoop
+from fulmar_core.controllers.controller import Controller
 from fulmar_core.disturbances.parts import Stuck
 from fulmar_core.disturbances.scenario import Scenario, load_scenario
 from fulmar_core.episode import draw_episodes
@@ -116,7 +117,9 @@ def in_core(
 class Watching:
     """What the guards of one robot's controller node say of it, step by step."""
 
-    def __init__(self, robot: Robot, control_hz: float) -> None:
+    def __init__(self, robot: Robot, controller: Controller) -> None:
+        control_hz = controller.control_hz
+        self._knows = controller.estimator is not None  # which actuators work
         self._applied = AppliedHistory(round(2e9 / control_hz))
         self._monitor = FaultMonitor(robot, self._applied, control_hz=control_hz, lockstep=True)
         self._losses = Losses(robot)
@@ -127,11 +130,6 @@ class Watching:
         self.at_goal_s: float | None = None
         self.hopeless = False
 
-    @property
-    def suspects(self) -> bool:
-        """Whether an actuator is believed dead now."""
-        return bool(self._monitor.beliefs.dead)
-
     def see(self, state: RigidBodyState, stamp_ns: int) -> None:
         """Take a measurement."""
         self._monitor.take(state, stamp_ns)
@@ -140,7 +138,7 @@ class Watching:
             for name in names:
                 known.setdefault(name, 1e-9 * stamp_ns)
         self.said |= dict.fromkeys(beliefs.words)
-        self.hopeless = self._losses.hopeless(beliefs.dead, stamp_ns)
+        self.hopeless = not self._knows and self._losses.hopeless(beliefs.dead, stamp_ns)
 
     def follow(self, command: np.ndarray, stamp_ns: int, *, late: bool, there: bool) -> None:
         """Take what is applied from now on, whether it is late, and whether the robot is at its goal."""
@@ -173,7 +171,7 @@ def watch(
     loop.reset()
     loop.begin(goal_in_float64(worlds.goal))
     convergence = ConvergenceMonitor(robot, loop.task, loop.dt)
-    watched = [Watching(robot, acts.control_hz) for _ in range(episodes)]
+    watched = [Watching(robot, acts) for _ in range(episodes)]
     for number in range(round(seconds / loop.dt)):
         stamp_ns = round(1e9 * number * loop.dt)
         measured = worlds.measured.to_rigid()
@@ -181,8 +179,7 @@ def watch(
             each.see(RigidBodyState(*(np.asarray(getattr(measured, part))[i] for part in PARTS)), stamp_ns)
         inputs = loop.inputs(worlds.measured, stamp_ns)
         commands = loop.act(inputs).command
-        convergence.see(inputs.state, inputs.goal, commands)
-        late = convergence.late(np.array([each.suspects for each in watched]))
+        late = convergence.see(inputs.state, inputs.goal, commands)
         there = np.asarray(loop.task.tolerance.holds(loop.task.errors(worlds.truth, loop.goal)))
         for i, each in enumerate(watched):
             each.follow(commands[i], stamp_ns, late=bool(late[i]), there=bool(there[i]))

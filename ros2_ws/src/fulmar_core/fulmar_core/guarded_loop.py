@@ -299,13 +299,15 @@ class GuardedLoop:
         return self._follow_switch(before)
 
     def suspect(self, actuators: str, *, hopeless: bool = False) -> None:
-        """Give a robot less time to converge, some of whose actuators are believed dead.
+        """Know of actuators that are believed dead, for the case that the robot does not converge.
 
         Args:
             actuators: Which, in words; empty for none.
-            hopeless: Whether no pose can be held without them: then a task of poses stops at once.
+            hopeless: Whether no pose can be held without them: then a task of poses stops at once, unless its
+                controller estimates by itself which actuators work.
         """
-        self._convergence.suspicion, self._convergence.hopeless = actuators, hopeless
+        knows = self.loop.controller.estimator is not None
+        self._convergence.dead, self._convergence.hopeless = actuators, hopeless and not knows
 
     def fall_back(self, reason: str) -> bool:
         """Let the fallback go on in place of a controller that raised; false if there is none."""

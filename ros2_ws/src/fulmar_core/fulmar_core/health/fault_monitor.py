@@ -18,7 +18,7 @@ from fulmar_core.robot import Robot
 from fulmar_core.state import RigidBodyState
 
 LEAST_S = 0.1  # between two measurements that are compared [s]
-LONGEST_S = 1.0  # a longer gap tells nothing [s]
+LONGEST_S = 1.0  # nothing is learned from a longer gap [s]
 WAITING = 32  # measurements that may wait for what the actuators did
 # What is named: what has been so likely for so long, as long as the best hypothesis explains what is measured.
 LIKELY_DEAD, LIKELY_OPEN, LIKELY_OTHER = 0.97, 0.995, 0.95  # [-]

@@ -144,15 +144,7 @@ class ConvergenceMonitor:
         self._tries = share >= self._enough
         self.late_s = self._waited + np.maximum(now - self._best, 0.0)
         self.patience_s = self._least_s + PATIENCE * self._anchor
-        return self.late(np.zeros(now.shape, dtype=bool))
-
-    def late(self, suspected: np.ndarray) -> np.ndarray:
-        """Which robots do not converge; those of which an actuator is believed dead are given the least time only.
-
-        Args:
-            suspected: Which these are, shape (n,).
-        """
-        return np.asarray(self.late_s > np.where(suspected, self._least_s, self.patience_s))
+        return np.asarray(self.late_s > self.patience_s)
 
     def _shift(self, state: State, goal: Goal, now: np.ndarray) -> np.ndarray | float:
         """What the target's own motion since the last step adds to the time to it [s]."""
@@ -168,7 +160,7 @@ class ConvergenceWatch:
 
     Attributes:
         problem: How it does not converge, in words; empty while it does.
-        suspicion: Which actuators are believed dead, in words; empty for none.
+        dead: Which actuators are believed dead, in words; empty for none.
         hopeless: Whether no pose can be held without these.
     """
 
@@ -184,7 +176,7 @@ class ConvergenceWatch:
         self._monitor, self._applied = ConvergenceMonitor(robot, task, control_dt), applied
         self._alike = ALIKE * robot.actuators.scale
         self._own: deque[np.ndarray] = deque(maxlen=OWN)
-        self.problem = self.suspicion = ""
+        self.problem = self.dead = ""
         self.hopeless = False
         limits = task.tolerance
         self._wants_pose = bool(limits.position) and bool(limits.heading_deg or limits.attitude_deg)
@@ -200,15 +192,15 @@ class ConvergenceWatch:
         if self._is_moved_by_others(inputs):
             self.reset()
         self._own.append(command[0])
-        self._monitor.see(inputs.state, inputs.goal, command)
+        late = bool(self._monitor.see(inputs.state, inputs.goal, command)[0])
         if self.hopeless and self._wants_pose:
             self.problem = (
-                f"{UNCONVERGED}: the {self.suspicion}, and no pose can be held without it. Repair it, then give a new "
+                f"{UNCONVERGED}: the {self.dead}, and no pose can be held without it. Repair it, then give a new "
                 "goal."
             )
-        elif bool(self._monitor.late(np.array([bool(self.suspicion)]))[0]):
+        elif late:
             late_s = float(self._monitor.late_s[0])
-            cause = f"The {self.suspicion}." if self.suspicion else MAY_BE
+            cause = f"The {self.dead}." if self.dead else MAY_BE
             self.problem = (
                 f"{UNCONVERGED}: {late_s:.0f} s of commands have brought the robot no nearer to its goal. {cause} "
                 "Look at it, then give a new goal."
