@@ -83,11 +83,13 @@ class FaultBank:
         self._spread = np.clip(0.3 * (self._factors[1] - self._factors[0]), 0.05, 0.5)
         #: Largest force and moment of one actuator that can move the body [N, N·m].
         self.one_actuator = _one_actuator(robot)
-        self._filters = _filters(robot, self._settings, self.one_actuator)
+        self._filters, one = _filters(robot, self._settings, self.one_actuator)
         #: 1 for hypotheses that go on with the push that is left beside them.
         self._for_long = np.array([float(each.for_long) for each in self.hypotheses.all])[:, None]
         easy = np.array([each.kind is Kind.PUSHED for each in self.hypotheses.all], dtype=int)
         group = np.array([MOVING] * self._moving + [TURNING] * (len(self._axes) - self._moving))
+        #: Acceleration of each axis by one actuator.
+        self._unit = one[group]
         self._which = 2 * easy[:, None] + group  # filter of each hypothesis and axis
         self._gains: tuple[Gains, Gains] | None = None  # of the filters, and of each hypothesis and axis
         self.reset()
@@ -119,6 +121,15 @@ class FaultBank:
         rotation = self._last.rotation if self._last is not None else np.eye(3)
         wrench[3:] = rotation @ self._inertia @ rotation.T @ wrench[3:]
         return wrench
+
+    def needs_less_push(self, number: int, other: int) -> bool:
+        """Whether a hypothesis needs less push from outside than another one to explain the mean motion of late."""
+        push = self._state[2, number] / self._unit
+        between = (
+            self._by_axis(self._factor)[number] * (self._usual[other] - self._usual[number]) / self._unit
+        )
+        rest = push - between
+        return bool(push @ push <= rest @ rest)
 
     def take(self, state: RigidBodyState, applied: Applied | None) -> None:
         """Take a measurement.
@@ -290,8 +301,14 @@ def _one_actuator(robot: Robot) -> tuple[float, float]:
     return force, moment
 
 
-def _filters(robot: Robot, s: BankSettings, one_actuator: tuple[float, float]) -> AxisFilters:
-    """Filters of both groups for most hypotheses, and of both for a push that changes as it likes."""
+def _filters(
+    robot: Robot, s: BankSettings, one_actuator: tuple[float, float]
+) -> tuple[AxisFilters, np.ndarray]:
+    """Filters of both groups for most hypotheses, and of both for a push that changes as it likes.
+
+    Returns:
+        The filters, and the acceleration of both groups by one actuator, shape (2,).
+    """
     odometry = robot.sensors.odometry
     pose = [max(s.position, odometry.position.std), max(s.heading, odometry.heading.std)]
     velocity = [max(s.velocity, odometry.velocity.std), max(s.yaw_rate, odometry.yaw_rate.std)]
@@ -299,10 +316,11 @@ def _filters(robot: Robot, s: BankSettings, one_actuator: tuple[float, float]) -
     one = np.array(one_actuator) / (robot.body.mass, inertia)
     twice = np.concatenate((one, one))
     shares = np.repeat([[s.push, s.drift], [s.sudden, s.sudden]], 2, axis=0)
-    return AxisFilters(
+    filters = AxisFilters(
         np.array(pose * 2),
         np.array(velocity * 2),
         s.model * twice,
         shares[:, 0] * twice,
         shares[:, 1] * twice,
     )
+    return filters, one

@@ -80,6 +80,14 @@ class FaultMonitor:
         self._stuck = np.zeros((len(every), len(self._names)))
         for row, each in enumerate(every):
             self._stuck[row, list(each.stuck)] = 1.0
+        rows = {(each.kind, each.stuck, each.level, each.for_long): row for row, each in enumerate(every)}
+        #: For each single actuator that is dead, the row in which it is open, and the other way round; -1: none.
+        self._twin = np.full(len(every), -1)
+        for row, each in enumerate(every):
+            if len(each.stuck) == 1:
+                twin = (Kind.DEAD, each.stuck, 0.0, False)
+                twin = (Kind.OPEN, each.stuck, 1.0, False) if each.kind is Kind.DEAD else twin
+                self._twin[row] = rows[twin]
         self._force, self._moment = self.bank.one_actuator
         self.reset()
 
@@ -124,22 +132,29 @@ class FaultMonitor:
         """Name what is likely."""
         chance = self.bank.chance * (self.bank.misfit <= WORST_FIT)
         dead, opened = chance * self._kinds[Kind.DEAD], chance * self._kinds[Kind.OPEN]
-        self._dead.update(dead @ self._stuck, passed_s)
-        self._open.update((opened * self._alone()) @ self._stuck, passed_s)
+        explained = self._explained()
+        self._dead.update((dead * explained) @ self._stuck, passed_s)
+        self._open.update((opened * explained) @ self._stuck, passed_s)
         # That something pushes is sure where the chances of several open valves add up to it.
         pushed = float(chance[self._kinds[Kind.PUSHED]].sum()) * self._about_one() + float(opened.sum())
         powerless = float(chance[self._kinds[Kind.POWERLESS]].sum())
         self._others.update(np.array([pushed, powerless]), passed_s)
         self.beliefs = self._beliefs()
 
-    def _alone(self) -> np.ndarray:
-        """For each hypothesis, whether little pushes beside what it says, shape (hypotheses,)."""
+    def _explained(self) -> np.ndarray:
+        """For each hypothesis, whether little pushes beside what it says, shape (hypotheses,).
+
+        A valve that is dead and the same valve stuck open differ by a constant push. What needs less of it is believed.
+        """
         best = int(np.argmax(self.bank.chance))
-        small = np.ones(len(self.bank.chance))
-        push = self.bank.push(best)
-        beside = max(np.linalg.norm(push[:3]) / self._force, np.linalg.norm(push[3:]) / self._moment)
-        small[best] = float(beside < BESIDE)
-        return small
+        found = np.ones(len(self.bank.chance))
+        twin = int(self._twin[best])
+        if twin >= 0:
+            push = self.bank.push(best)
+            beside = max(np.linalg.norm(push[:3]) / self._force, np.linalg.norm(push[3:]) / self._moment)
+            alone = self._kinds[Kind.DEAD][best] or beside < BESIDE
+            found[best] = float(alone and self.bank.needs_less_push(best, twin))
+        return found
 
     def _about_one(self) -> float:
         """Whether a push from outside is about that of one actuator: 1 or 0."""
