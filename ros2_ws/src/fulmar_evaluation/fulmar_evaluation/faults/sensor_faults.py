@@ -30,7 +30,9 @@ NOISE_S = 1.0  # beyond the watchdog: what repeats of a noisy value, or slow dri
 REPEATS = FEWEST + 2  # readings of a slow sensor until it is known to be frozen, the one under way among them
 DRIFT_DEG = 0.05  # per second, of a star tracker [deg/s]
 SAID_S = 20.0  # until a drift that slow has left the noise of gyroscope and wheels
-CREEP = 0.3  # of a position from satellites, with a velocity that knows nothing of it [m/s]
+# Of a position from satellites, with a velocity that knows nothing of it. At the speed of an aircraft a creep that
+# slow is within the error of its velocity [m/s].
+CREEP, CREEP_IN_FLIGHT = 0.3, 3.0
 ASIDE_M = 0.5  # of a second odometry
 STRANGER_S = 0.02  # between its messages
 FIRST_S = 5.0  # for a message that it repeats
@@ -92,8 +94,10 @@ def turned_by(message: Any, angle: float) -> None:
 def gnss_creeps(live: LiveSystem) -> Outcome:
     """A position from satellites creeps away, along y, while the velocity knows nothing of it."""
 
+    speed = CREEP if live.flight is None else CREEP_IN_FLIGHT
+
     def creep(message: Odometry, passed_s: float) -> None:
-        message.pose.pose.position.y += CREEP * passed_s
+        message.pose.pose.position.y += speed * passed_s
 
     return intercept(live, since_first(creep), live.watchdog_s + SAID_S)
 
