@@ -93,7 +93,6 @@ def turned_by(message: Any, angle: float) -> None:
 
 def gnss_creeps(live: LiveSystem) -> Outcome:
     """A position from satellites creeps away, along y, while the velocity knows nothing of it."""
-
     speed = CREEP if live.flight is None else CREEP_IN_FLIGHT
 
     def creep(message: Odometry, passed_s: float) -> None:
