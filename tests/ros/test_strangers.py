@@ -137,11 +137,13 @@ def test_a_container_of_another_user_on_the_own_host_is_heard_without_opening_th
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("transport", [{}, {TRANSPORTS: UDP_ONLY}], ids=["memory_and_udp", "udp"])
 @pytest.mark.parametrize(("peer", "arrives"), [(STRANGER, ALL), ("10.77.0.9", "")])
 def test_with_a_static_peer_that_host_is_heard_and_no_other(
-    hosts: TwoHosts, ros_domain: RosDomain, peer: str, arrives: str
+    hosts: TwoHosts, ros_domain: RosDomain, peer: str, arrives: str, transport: dict[str, str]
 ) -> None:
-    assert heard_from_the_other_host(hosts, ros_domain, **{STATIC_PEERS: peer}) == arrives
+    of_robot = {STATIC_PEERS: peer, **transport}
+    assert heard_from_the_other_host(hosts, ros_domain, **of_robot) == arrives
 
 
 @pytest.mark.parametrize(
