@@ -129,8 +129,19 @@ def unheard(other: Node, wanted: dict[str, type]) -> set[str]:
     return missing
 
 
+QUICK = {
+    "plant",
+    "recorder",
+    "goals",
+    "estimator mocap_imu",
+    "controller floating_platform",
+}  # one of each kind
+
+
 @pytest.mark.real_time
-@pytest.mark.parametrize("name", nodes())
+@pytest.mark.parametrize(
+    "name", [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in nodes()]
+)
 def test_a_node_receives_each_of_its_wires_from_publishers_of_every_quality(
     name: str, other: Node, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
@@ -146,7 +157,11 @@ def test_a_node_receives_each_of_its_wires_from_publishers_of_every_quality(
             node.stop()
 
 
-@pytest.mark.parametrize("wire", [ESTOP, IMU, SWAP], ids=lambda wire: wire.name)
+@pytest.mark.parametrize(
+    "wire",
+    [ESTOP, IMU, pytest.param(SWAP, marks=pytest.mark.slow)],
+    ids=lambda wire: getattr(wire, "name", ""),
+)
 @pytest.mark.parametrize("offer", OFFERS)
 def test_a_message_of_every_quality_comes_once_and_in_order(wire: Any, offer: str, other: Node) -> None:
     kind = message_class(wire)
