@@ -81,7 +81,10 @@ def claimed_domain(name: str, part: str = "") -> Iterator[int]:
                 "Wait for it to end, give this robot another --name, or set ROS_DOMAIN_ID to another number."
             )
         give_back_abandoned_memory()
-        yield domain
+        try:
+            yield domain
+        finally:  # of nodes that were killed meanwhile
+            give_back_abandoned_memory()
 
 
 @contextlib.contextmanager

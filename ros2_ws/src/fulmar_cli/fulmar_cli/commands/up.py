@@ -64,10 +64,11 @@ def up(
     Starts a plant, a controller and a recorder, and waits for goals: from `fulmar goals`, or from any ROS node that
     publishes one. Goals follow one another; `fulmar swap` changes the policy; `fulmar estop` stops the robot until its
     reset, after which it waits for a new goal. The shutdown is orderly: actuators go to their safe state first, the bag
-    is closed last. Exit code: 0 stopped, 1 a node failed or ended.
+    is closed last. An aircraft lands first; a second Ctrl-C ends it at once. Recorder, markers and the e-stop node are
+    started again when they end. Exit code: 0 stopped, 1 a node failed or ended that the robot cannot do without.
 
     Events of --json: started, goal, goal_refused, target, reached, swapped, swap_refused, estop, reset, fault,
-    recovered, stopping, stopped; each has `event`, `wall_s` (Unix time) and its own fields.
+    recovered, restarted, stopping, stopped; each has `event`, `wall_s` (Unix time) and its own fields.
 
     Try:
 
