@@ -283,7 +283,7 @@ def test_no_satellite_follows_a_frozen_or_a_drifting_star_tracker(name, seed, ta
     ):
         flight = fly(name, spoil=spoil, **how)
         assert flight.first(words) - 20.0 <= most_s
-        assert np.nanmax(flight.errors_deg[40:]) < 0.03
+        assert np.nanmax(flight.errors_deg[40:]) < 0.05
         assert flight.epochs == 0
 
 
