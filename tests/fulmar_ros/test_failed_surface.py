@@ -20,9 +20,9 @@ ROBOT = load_robot("airship_v7")
 
 
 def grounded_by(positions: np.ndarray) -> tuple[list[str], ActuatorFeedback]:
-    """Why the guard was told to hand over, while a constant command is applied and this is measured."""
+    """Why the guard had to hand over, while a constant command is applied and this is measured."""
     reading = Reading(SurfacePositions(ROBOT.actuators.names, positions))
-    sample, told = Sample({"surfaces": reading}, None), []
+    sample, reasons = Sample({"surfaces": reading}, None), []
 
     def ignore(*_arguments):
         """There is no subscriber."""
@@ -30,7 +30,7 @@ def grounded_by(positions: np.ndarray) -> tuple[list[str], ActuatorFeedback]:
     command = 0.5 * ROBOT.actuators.scale
     guard = SimpleNamespace(
         output=lambda *_, **__: command,
-        fail=lambda words, _now_ns: told.append(words),
+        fail=lambda words, _now_ns: reasons.append(words),
         see_refusal=ignore,
         handed_over=False,
     )
@@ -40,25 +40,25 @@ def grounded_by(positions: np.ndarray) -> tuple[list[str], ActuatorFeedback]:
     RealtimeLoop(backend, wires, guard, SimulatedTime(), rate=50.0, feedback=feedback).run(
         sample, 100, threading.Event()
     )
-    return told, feedback
+    return reasons, feedback
 
 
 def test_a_stuck_surface_grounds_an_aircraft():
     positions = 0.5 * ROBOT.actuators.scale
     positions[0] = -positions[0]
-    told, feedback = grounded_by(positions)
-    assert told and told[0].startswith("elevator is stuck at -0.17 rad")
+    reasons, feedback = grounded_by(positions)
+    assert reasons and reasons[0].startswith("elevator is stuck at -0.17 rad")
     assert [finding.part for finding in feedback.findings] == ["elevator"]
 
 
 def test_a_lost_propeller_is_named_and_leaves_the_controller_its_craft():
     positions = 0.5 * ROBOT.actuators.scale
     positions[-1] = 0.0
-    told, feedback = grounded_by(positions)
-    assert told == []
+    reasons, feedback = grounded_by(positions)
+    assert reasons == []
     assert [finding.part for finding in feedback.findings] == [ROBOT.actuators.names[-1]]
 
 
 def test_surfaces_that_follow_ground_nobody():
-    told, feedback = grounded_by(0.5 * ROBOT.actuators.scale)
-    assert (told, feedback.findings) == ([], ())
+    reasons, feedback = grounded_by(0.5 * ROBOT.actuators.scale)
+    assert (reasons, feedback.findings) == ([], ())

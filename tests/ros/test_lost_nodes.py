@@ -167,7 +167,7 @@ def run_without_its_recorder(domain: RosDomain, folder: Path) -> tuple[dict[str,
 def test_a_launcher_that_is_stopped_is_reported_by_its_nodes_and_takes_no_control_away(
     ros_domain: RosDomain, tmp_path: Path
 ) -> None:
-    """Nor does it when it goes on, after a time in which it has heard of nobody."""
+    """Nor does it when it goes on, after a time in which it has received from nobody."""
     words = ("run", "floating_platform", "--controller", "lqr", "--backend", "mock", "--duration", "20")
     more = ("--rate", "0.5", "--start", "1,0,0", "--goal", "0,0,0", "--json", "--record", "bag")
     with launched((*words, *more), environment=ros_domain.env, folder=tmp_path) as command:

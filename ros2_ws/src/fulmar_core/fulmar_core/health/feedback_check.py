@@ -12,7 +12,7 @@ from fulmar_core.actuators.differential_drive import DifferentialDrive
 from fulmar_core.actuators.propellers import Propellers
 from fulmar_core.actuators.reaction_wheels import ReactionWheels
 from fulmar_core.backend import Sample
-from fulmar_core.health.finding import Finding
+from fulmar_core.health.failed_part import Finding
 from fulmar_core.health.joint_feedback import ReactionWheelFeedback, SurfaceFeedback
 from fulmar_core.health.motion_feedback import CarFeedback, DriveFeedback, PropellerFeedback
 from fulmar_core.planar import PlanarState

@@ -8,7 +8,7 @@ import numpy as np
 
 from fulmar_core.actuators.control_surfaces import ControlSurfaces, is_throttle
 from fulmar_core.actuators.reaction_wheels import ReactionWheels
-from fulmar_core.health.finding import Finding, dead, stuck, unresponsive
+from fulmar_core.health.failed_part import Finding, dead, stuck, unresponsive
 from fulmar_core.health.modelled_response import ModelledResponse
 from fulmar_core.health.response_bank import ResponseBank
 from fulmar_core.robot import Robot

@@ -9,7 +9,7 @@ from fulmar_core.actuators.differential_drive import DifferentialDrive
 from fulmar_core.actuators.propellers import Propellers
 from fulmar_core.dynamics.free_body import free_body_step
 from fulmar_core.dynamics.linear_model import nominal_worlds
-from fulmar_core.health.finding import Finding, standard_deviations, unresponsive
+from fulmar_core.health.failed_part import Finding, standard_deviations, unresponsive
 from fulmar_core.health.modelled_response import ModelledResponse
 from fulmar_core.health.response_bank import ResponseBank
 from fulmar_core.planar import PlanarState, to_body

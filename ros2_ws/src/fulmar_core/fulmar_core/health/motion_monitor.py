@@ -10,7 +10,7 @@ from fulmar_core.health.feedback_check import MotionCheck
 from fulmar_core.robot import Robot
 from fulmar_core.state import RigidBodyState
 
-LONGEST_S = 1.0  # a longer gap between measurements tells nothing [s]
+LONGEST_S = 1.0  # a longer gap between measurements teaches nothing [s]
 
 
 class MotionMonitor:
