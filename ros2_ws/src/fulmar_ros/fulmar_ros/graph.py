@@ -58,7 +58,7 @@ class WriterWatch:
     def look(self, now_ns: int) -> str:
         """Why no input is followed at a time of a steady clock; empty if all may be; takes 2 us [ns].
 
-        `alarm` has the same words for reports. It waits a second for the name of a node that discovery has not reported.
+        `alarm` has the same words for reports. It waits a second for the name of a node that is not discovered yet.
         """
         reason = ""
         for subscriptions, writers in self._inputs:
