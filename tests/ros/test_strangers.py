@@ -35,13 +35,13 @@ WIRES = {"goal_pose": PoseStamped, "actuators/command": JointState, "controller/
 VICTIM = f"""{WIRES}
 import sys
 from fulmar_ros.runtime import ros_node
-heard = set()
+received = set()
 with ros_node("victim", lambda error: None, namespace="/boat") as node:
     for name, kind in WIRES.items():
-        node.create_subscription(kind, name, lambda _message, name=name: heard.add(name), 10)
+        node.create_subscription(kind, name, lambda _message, name=name: received.add(name), 10)
     print("ready", flush=True)
     sys.stdin.readline()
-print(" ".join(sorted(heard)), flush=True)
+print(" ".join(sorted(received)), flush=True)
 """
 ATTACK = f"""{WIRES}
 import time
@@ -95,11 +95,11 @@ def victim(hosts: TwoHosts, env: dict[str, str], code: str = VICTIM) -> Iterator
             child.kill()
 
 
-def heard_from_the_other_host(hosts: TwoHosts, domain: RosDomain, **of_robot: str) -> str:
+def received_from_the_other_host(hosts: TwoHosts, domain: RosDomain, **of_robot: str) -> str:
     """Names of the wires on which a stranger's messages arrive, who knows the robot's address."""
     attacker = environment(domain) | {DISCOVERY_RANGE: "SUBNET", STATIC_PEERS: ROBOT, TRANSPORTS: UDP_ONLY}
     command = in_container(hosts.other, attack(PLAIN), other_user=False)
-    return heard(hosts, command, attacker, environment(domain, **of_robot))
+    return received(hosts, command, attacker, environment(domain, **of_robot))
 
 
 def attack(init: str) -> list[str]:
@@ -107,7 +107,7 @@ def attack(init: str) -> list[str]:
     return [sys.executable, "-c", code]
 
 
-def heard(hosts: TwoHosts, command: list[str], attacker: dict[str, str], robot: dict[str, str]) -> str:
+def received(hosts: TwoHosts, command: list[str], attacker: dict[str, str], robot: dict[str, str]) -> str:
     """Names of the wires on which the messages of a command arrive."""
     with victim(hosts, robot) as node:
         subprocess.run(command, env=attacker, check=True, timeout=60.0)
@@ -117,33 +117,33 @@ def heard(hosts: TwoHosts, command: list[str], attacker: dict[str, str], robot: 
 def test_nothing_of_another_host_arrives_with_default_settings(
     hosts: TwoHosts, ros_domain: RosDomain
 ) -> None:
-    assert heard_from_the_other_host(hosts, ros_domain) == ""
+    assert received_from_the_other_host(hosts, ros_domain) == ""
 
 
-def test_every_host_of_the_network_is_heard_with_subnet(hosts: TwoHosts, ros_domain: RosDomain) -> None:
+def test_every_host_of_the_network_is_received_with_subnet(hosts: TwoHosts, ros_domain: RosDomain) -> None:
     """The attack works: the tests beside this one can fail."""
     open_to_all = {DISCOVERY_RANGE: "SUBNET", TRANSPORTS: UDP_ONLY}
-    assert heard_from_the_other_host(hosts, ros_domain, **open_to_all) == ALL
+    assert received_from_the_other_host(hosts, ros_domain, **open_to_all) == ALL
 
 
-def test_a_container_of_another_user_on_the_own_host_is_heard_without_opening_the_network(
+def test_a_container_of_another_user_on_the_own_host_is_received_without_opening_the_network(
     hosts: TwoHosts, ros_domain: RosDomain
 ) -> None:
     """By UDP on loopback, since the two share no memory."""
     udp = environment(ros_domain) | {TRANSPORTS: UDP_ONLY}
     logs = {"ROS_LOG_DIR": "/tmp", "HOME": "/tmp"}
     command = in_container(hosts.robot, attack(OURS), other_user=True)
-    assert heard(hosts, command, udp | logs, udp) == ALL
+    assert received(hosts, command, udp | logs, udp) == ALL
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("transport", [{}, {TRANSPORTS: UDP_ONLY}], ids=["memory_and_udp", "udp"])
 @pytest.mark.parametrize(("peer", "arrives"), [(STRANGER, ALL), ("10.77.0.9", "")])
-def test_with_a_static_peer_that_host_is_heard_and_no_other(
+def test_with_a_static_peer_that_host_is_received_and_no_other(
     hosts: TwoHosts, ros_domain: RosDomain, peer: str, arrives: str, transport: dict[str, str]
 ) -> None:
     of_robot = {STATIC_PEERS: peer, **transport}
-    assert heard_from_the_other_host(hosts, ros_domain, **of_robot) == arrives
+    assert received_from_the_other_host(hosts, ros_domain, **of_robot) == arrives
 
 
 @pytest.mark.parametrize(
