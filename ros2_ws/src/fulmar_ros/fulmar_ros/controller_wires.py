@@ -16,7 +16,6 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, String
 from visualization_msgs.msg import MarkerArray
 
-from fulmar_core.health.hypotheses import can_monitor
 from fulmar_core.health.thruster_health import can_estimate_health
 from fulmar_core.robot import Robot
 from fulmar_core.tasks import Task
@@ -83,7 +82,7 @@ class ControllerWires:
             on_estop: Receives whether the e-stop is pressed.
             on_estop_released: Receives each reset of the e-stop.
             on_swap: Receives the folder of the policy that shall take over.
-            on_applied: Receives what the actuators do, serialised, of robots with valves or fans that can be monitored.
+            on_applied: Receives what the actuators do, serialised.
             on_bearing: Receives whether the air bearing is on; None where there is none.
             lockstep: Ask for lost odometry again, since the plant waits, and wait for readers that lag behind.
         """
@@ -122,10 +121,9 @@ class ControllerWires:
         # Before the odometry: of two messages that wait, an executor takes that of the older subscription first.
         if on_bearing is not None:
             self.followed[AIR_BEARING.name] = self._every(Bool, AIR_BEARING, on_bearing)
-        if can_monitor(robot):
-            applied = subscriber_qos(ACTUATORS_STATE, reliable=lockstep, depth=APPLIED_DEPTH)
-            made = node.create_subscription(JointState, ACTUATORS_STATE.name, on_applied, applied, raw=True)
-            self._follow(ACTUATORS_STATE, made, lockstep=lockstep)
+        applied = subscriber_qos(ACTUATORS_STATE, reliable=lockstep, depth=APPLIED_DEPTH)
+        made = node.create_subscription(JointState, ACTUATORS_STATE.name, on_applied, applied, raw=True)
+        self._follow(ACTUATORS_STATE, made, lockstep=lockstep)
         made = node.create_subscription(Odometry, ODOMETRY.name, on_odometry, odometry_qos, raw=True)
         self._follow(ODOMETRY, made, lockstep=lockstep)
         self._every(Bool, ESTOP, on_estop)
