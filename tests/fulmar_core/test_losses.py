@@ -48,3 +48,9 @@ def test_a_robot_that_can_do_without_it_goes_on():
     losses = Losses(load_robot("spacecraft_16"))
     known(losses, ("thruster_3",), 0)
     assert not known(losses, ("thruster_3",), 60 * S)
+
+
+def test_in_lock_step_the_answer_is_there_at_once():
+    losses = Losses(load_robot("int_ball2"), waits=True)
+    assert not losses.hopeless(("fan_3",), 0)
+    assert losses.hopeless(("fan_3",), 2 * S)

@@ -29,7 +29,7 @@ class ActuatorBeliefs:
         if can_monitor(robot):
             hz = settings.control_rate(robot)
             self._monitor = FaultMonitor(robot, applied, control_hz=hz, lockstep=settings.lockstep)
-            self._losses = Losses(robot)
+            self._losses = Losses(robot, waits=settings.lockstep)
         motion = MotionMonitor(robot, applied)
         self._motion = motion if motion.watches else None
         self._estimated = Beliefs()

@@ -26,9 +26,9 @@ def can_hold_without(robot: Robot, lost: tuple[int, ...]) -> bool:
 class Losses:
     """Finds out beside the control loop, which the first answer would hold up for half a second."""
 
-    def __init__(self, robot: Robot) -> None:
-        """Prepare for a robot with valves or fans."""
-        self._robot = robot
+    def __init__(self, robot: Robot, *, waits: bool = False) -> None:
+        """Prepare for a robot with valves or fans; in lock step the loop waits for the answer."""
+        self._robot, self._waits = robot, waits
         self._numbers = {name: number for number, name in enumerate(robot.actuators.names)}
         self._holds: dict[tuple[str, ...], bool] = {}  # without these actuators
         self._asked: set[tuple[str, ...]] = set()
@@ -48,7 +48,10 @@ class Losses:
             return False
         if dead not in self._asked:
             self._asked.add(dead)
-            threading.Thread(target=self._find, args=(dead,), name="losses", daemon=True).start()
+            thread = threading.Thread(target=self._find, args=(dead,), name="losses", daemon=True)
+            thread.start()
+            if self._waits:
+                thread.join()
         sure = stamp_ns - self._since_ns >= 1e9 * SURE_S
         return sure and not self._holds.get(dead, True)
 
