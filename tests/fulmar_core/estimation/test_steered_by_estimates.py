@@ -40,12 +40,18 @@ def test_a_robot_on_its_way_whose_sources_fail_stops_within_what_the_noise_allow
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("robot", [PLATFORM, SPACECRAFT, "turtlebot2", "jetbot", "kingfisher"])
+@pytest.mark.parametrize("robot", [PLATFORM, SPACECRAFT, "int_ball2", "turtlebot2", "kingfisher"])
 @pytest.mark.parametrize("odometry", [True, False], ids=["odometry", "estimator"])
 def test_sound_sources_are_never_suspected(robot, odometry):
     for moves in (True, False):
         found = run(robot, scenario="nominal", seed=1, seconds=60.0, odometry=odometry, moves=moves)
         assert found.warnings == {}
+
+
+def test_poses_that_are_as_late_as_the_robots_file_says_are_no_contradiction():
+    found = run("int_ball2", scenario="nominal", seed=0, seconds=8.0, odometry=False, moves=True)
+    assert found.warnings == {}
+    assert found.error < 0.01
 
 
 @pytest.mark.slow

@@ -24,7 +24,6 @@ class Noise:
     gyroscope: bool = False
     pose_held_s: float = 0.0  # [s]
     inertial_held_s: float = 0.0  # [s]
-    pose_late_s: float = 0.0  # how late poses may come, beside the latency of the settings [s]
 
 
 EXACT = Noise()
@@ -39,7 +38,6 @@ def noise_of(sensors: Sensors) -> Noise:
         is_noisy(imu.gyroscope),
         SLOWEST / odometry.rate_hz if odometry.rate_hz else 0.0,
         SLOWEST / imu.rate_hz if imu.rate_hz else 0.0,
-        odometry.delay_s,
     )
 
 

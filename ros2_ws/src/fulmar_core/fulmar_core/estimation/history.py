@@ -98,7 +98,7 @@ class HistoryEstimator(ABC, Generic[S]):
         self._predictions = InertialPredictions(
             lambda: self._new_filter(self._first_pose),
             gap_ns=READING_LASTS_NS,
-            late_std_s=LATE_STD_S + noise.pose_late_s,
+            late_std_s=LATE_STD_S,
         )
         self._latency_ns = round(1e9 * settings.latency_s)  # from capture of a pose to its stamp
         self._kinds: Mapping[str, tuple[int, Callable[[Reading], Any]]] = {

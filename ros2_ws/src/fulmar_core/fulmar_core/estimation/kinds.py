@@ -71,11 +71,13 @@ class EstimatorKind:
 
 
 def _fitted(settings: Motion, robot: Robot) -> Motion:
-    """Settings whose poses have the noise of a robot's file, where that is far above theirs."""
+    """Settings whose poses have the noise and the delay of a robot's file, where those are above theirs."""
     odometry = robot.sensors.odometry
     turn = "heading_std" if isinstance(settings, PlanarMotionSettings) else "attitude_std"
     theirs = {"position_std": odometry.position.std, turn: odometry.heading.std}
     more = {name: std for name, std in theirs.items() if std > FAR_ABOVE * getattr(settings, name)}
+    if odometry.delay_s > settings.latency_s:
+        more["latency_s"] = odometry.delay_s
     return replace(settings, **more) if more else settings  # type: ignore[arg-type]
 
 
