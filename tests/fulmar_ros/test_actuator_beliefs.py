@@ -49,5 +49,5 @@ def test_after_a_jump_and_without_air_nothing_is_believed_of_before(what):
     assert held.go(2, **what) == Beliefs()
 
 
-def test_actuators_that_are_measured_are_none_of_its_business():
-    assert Held("turtlebot2").go(30) == Beliefs()
+def test_reaction_wheels_which_are_measured_are_none_of_its_business():
+    assert Held("cubesat_wheels").go(30) == Beliefs()
