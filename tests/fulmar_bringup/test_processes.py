@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 import time
+from dataclasses import replace
+from pathlib import Path
 
 import psutil
 import pytest
 import yaml
 
 from fulmar_bringup import processes
-from fulmar_bringup.processes import Ended, ProcessGroup, child_environment, command_line
+from fulmar_bringup.processes import YIELDING, Ended, ProcessGroup, child_environment, command_line
 from fulmar_bringup.run_plan import NodeSpec
+from fulmar_core.yielding import AUTOGROUP, BEHIND
 
 
 def spec(**parameters) -> NodeSpec:
@@ -25,6 +29,13 @@ def test_a_node_is_started_as_a_module_of_this_very_interpreter():
 
 def test_namespace_and_name_are_remapped():
     assert command_line(spec())[4:] == ["-r", "__ns:=/boat", "-r", "__node:=plant"]
+
+
+def test_only_a_node_of_ours_can_be_started_as_one_that_gives_way():
+    helper = replace(spec(), module="fulmar_ros.recorder_node")
+    assert command_line(helper, yielding=True)[2:5] == [YIELDING, helper.module, "--ros-args"]
+    assert command_line(helper)[2:4] == [helper.module, "--ros-args"]
+    assert command_line(spec(), yielding=True) == command_line(spec())
 
 
 @pytest.mark.parametrize(
@@ -112,6 +123,60 @@ def test_a_child_is_started_again_in_its_place_also_where_it_hangs(start):
     assert group.process("first").pid != hangs.pid
     assert not group.is_stopped("first")
     assert list(group.specs) == ["first", "second"]  # which is stopped last, and first
+
+
+NICE_VALUES = """
+import os, pathlib, sys
+from fulmar_core.yielding import AUTOGROUP, take_place
+
+def nice():
+    return os.getpriority(os.PRIO_PROCESS, 0)
+
+def of_session():
+    group = pathlib.Path(AUTOGROUP)
+    return group.read_text().split()[-1] if group.exists() else "none"
+
+IMPORTED = nice()
+
+def main():
+    print(sys.argv[1:3])
+    before = of_session()
+    take_place()
+    print("nice", IMPORTED, nice(), before, of_session())
+
+if __name__ == "__main__":
+    main()
+"""
+
+
+def test_a_child_that_is_started_again_gives_way_while_it_imports_its_modules_and_not_later(
+    start, capfd, monkeypatch
+):
+    monkeypatch.setattr(processes, "GLUE", "")
+    group = start("helper", NICE_VALUES)
+    group.process("helper").wait(10.0)
+    words = [group.last_words("helper", ended=True)]
+    group.start_again(group.specs["helper"])
+    group.process("helper").wait(10.0)
+    words.append(group.last_words("helper", ended=True))
+    own = os.getpriority(os.PRIO_PROCESS, 0)
+    lower = min(own + BEHIND, 19)
+    kernel_shares = Path(AUTOGROUP).exists()
+    sessions = [("0", "0"), (str(BEHIND), "0")] if kernel_shares else [("none", "none")] * 2
+    assert words == [
+        f"nice {own} {own} {' '.join(sessions[0])}",
+        f"nice {lower} {own} {' '.join(sessions[1])}",
+    ]
+    assert capfd.readouterr().err.count("['--ros-args', '-r']") == 2
+
+
+def test_a_child_that_gives_way_and_cannot_be_imported_ends_with_its_error(start, monkeypatch):
+    monkeypatch.setattr(processes, "GLUE", "")
+    group = start("helper", "raise ValueError('no such thing')")
+    group.process("helper").wait(10.0)
+    group.start_again(group.specs["helper"])
+    assert group.process("helper").wait(10.0) == 1
+    assert group.last_words("helper", ended=True) == "ValueError: no such thing"
 
 
 def test_the_last_words_of_a_child_are_printed_before_stop_returns(start, capfd):

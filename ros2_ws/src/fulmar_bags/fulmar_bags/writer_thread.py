@@ -20,12 +20,12 @@ from typing import Any, Protocol
 
 from fulmar_bags.writer import BagCounts
 from fulmar_core.errors import BagError
+from fulmar_core.yielding import BEHIND
 
 MAX_QUEUED = 100_000  # messages that may wait for the thread
 MAX_WAITING = 64 << 20  # bytes that may wait for the thread, and as many for a disk that refuses them
 EMPTY_EVERY_S = 0.05  # longer batches wake the processor less often, shorter ones lose nothing less
 SLOW_S = 1.0  # a disk that takes longer for half a second of messages is a slow one
-NICE = 10  # compression and disk give way to everything that controls
 RECORDING = "fulmar_recording"  # entry of `custom_data`: JSON of `Account`
 
 
@@ -149,7 +149,7 @@ class BagThread:
 
     def _run(self) -> None:
         with contextlib.suppress(OSError, AttributeError):
-            os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), NICE)
+            os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), BEHIND)  # compression and disk
         while not self._stop.wait(EMPTY_EVERY_S):
             self._empty()
             self._note(complete=False)

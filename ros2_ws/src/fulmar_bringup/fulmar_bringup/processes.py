@@ -24,6 +24,8 @@ from fulmar_ros.middleware import environment_of_any_node, middleware_environmen
 
 PATIENCE_S = 4.0  # for an orderly end, before it is no longer asked for
 KILL_S = 2.0  # for a process to be gone after SIGKILL [s]
+GLUE = "fulmar_ros."  # package whose modules have a `main` that runs a node
+YIELDING = "fulmar_ros.yielding_start"
 LAST_WORDS_S = 1.0  # for what a child that ended has left in the pipe; a grandchild may keep it open
 
 
@@ -57,10 +59,10 @@ class ProcessGroup:
         self._relays: dict[str, _Relay] = {}
         self._specs: dict[str, NodeSpec] = {}
 
-    def start(self, spec: NodeSpec) -> None:
-        """Start one node in a process of its own."""
+    def start(self, spec: NodeSpec, *, yielding: bool = False) -> None:
+        """Start one node in a process of its own; `yielding`: beside a robot that moves, see `command_line`."""
         child = psutil.Popen(
-            command_line(spec),
+            command_line(spec, yielding=yielding),
             env=self._environment,
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
@@ -78,7 +80,7 @@ class ProcessGroup:
         if old.poll() is None:
             old.kill()
             old.wait(KILL_S)
-        self.start(spec)
+        self.start(spec, yielding=True)
 
     def process(self, name: str) -> psutil.Popen:
         """A child that was started."""
@@ -145,8 +147,13 @@ class ProcessGroup:
         return text.partition("]: ")[2] if text.startswith("[") and "]: " in text else text
 
 
-def command_line(spec: NodeSpec) -> list[str]:
-    """Command that starts a node as a module of this interpreter, in its network namespace."""
+def command_line(spec: NodeSpec, *, yielding: bool = False) -> list[str]:
+    """Command that starts a node as a module of this interpreter, in its network namespace.
+
+    Args:
+        spec: Row of the node.
+        yielding: Whether its start gives way to what runs already; a system's own module is a script, and does not.
+    """
     arguments = ["-r", f"__ns:={spec.namespace}", "-r", f"__node:={spec.name}"]
     for key, value in spec.parameters.items():
         arguments += ["-p", f"{key}:={_yaml(value)}"]
@@ -154,7 +161,8 @@ def command_line(spec: NodeSpec) -> list[str]:
         arguments += ["-r", f"{topic}:={other}"]
     arguments += ["--log-level", "warn"] if spec.quiet else []
     elsewhere = ["ip", "netns", "exec", spec.network] if spec.network else []
-    return [*elsewhere, sys.executable, "-m", spec.module, "--ros-args", *arguments]
+    giving_way = [YIELDING] if yielding and spec.module.startswith(GLUE) else []
+    return [*elsewhere, sys.executable, "-m", *giving_way, spec.module, "--ros-args", *arguments]
 
 
 def child_environment() -> dict[str, str]:

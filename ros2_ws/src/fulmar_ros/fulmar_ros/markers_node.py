@@ -29,6 +29,7 @@ from fulmar_core.topics import (
     STATUS,
     goal_wires,
 )
+from fulmar_core.yielding import BEHIND
 from fulmar_ros.goal_messages import TYPES, GoalMessage
 from fulmar_ros.health import Health
 from fulmar_ros.marker_messages import scene_message
@@ -41,7 +42,6 @@ PERIOD_S = 0.1  # of a look for changes: at most 10 messages a second
 HEALTH_S = 1.0
 SILENT_S = 1.0  # a plant that publishes nothing for so long: what its actuators do is not known
 NOT_YET = ("inactive", "waiting")  # modes of a plant that waits for its subscribers
-NICE = 10  # of the process: nodes that control come first
 
 
 @dataclass(frozen=True)
@@ -146,7 +146,7 @@ class MarkersNode(Node):
 
 def main() -> None:
     """Draw until stopped."""
-    os.nice(NICE)
+    os.nice(BEHIND)  # nodes that control come first
     sys.exit(run_node(MarkersNode))
 
 

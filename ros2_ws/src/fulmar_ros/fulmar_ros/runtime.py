@@ -27,6 +27,7 @@ from rclpy.task import Future
 
 from fulmar_core.errors import BAD_USAGE, DONE, FAILED, FulmarError
 from fulmar_core.process import LAUNCHER_PID, end_with
+from fulmar_core.yielding import take_place
 from fulmar_ros.middleware import range_for_rclpy, set_up_middleware, static_peers, strangers_can_send
 from fulmar_ros.peer_filter import PeerFilter
 from fulmar_ros.private_memory import PRIVATE, keep_memory_private
@@ -148,6 +149,7 @@ def _spin(node: Node, exit_codes: queue.SimpleQueue[int]) -> int:
 
     with spinning(node, on_error):
         settle_memory()
+        take_place()
         asked = exit_codes.get()
         _bring_down(node, exit_codes)
         stopped = _stop(node)
