@@ -40,6 +40,8 @@ from tests.spaces import robot_for, task_for
 SEED = 5
 LASTS_S = {"track_velocities": 14.0, "track_velocities_3d": 14.0}  # long enough for a second velocity
 BRIEFLY_S = 6.0  # short enough to leave no geofence and to touch no obstacle
+TURNS_S = 3.0  # soon after, the guard stops what turns ever further from its goal
+
 FLIES_S = 2.0  # of aircraft, which are commanded more often
 # A second task of a kind with other figures brings nothing new onto the wires; tests/conftest.py has more of them.
 ALIKE = {
@@ -122,11 +124,17 @@ def nodes(
         yield plant, controller, overseer
 
 
+def _lasts_s(robot: Robot, task: Task) -> float:
+    if task.turns_only:
+        return TURNS_S
+    return LASTS_S.get(task.name, FLIES_S if robot.flies else BRIEFLY_S)
+
+
 def check_pair(robot: Robot, task: Task, make: Callable[[Robot, Task], Controller] = Wanderer) -> None:
     """Run the same two episodes with and without ROS; the second shows that nothing of the first is left."""
     scenario = load_scenario("nominal")
     dt = 1.0 / robot.timing.control_hz
-    steps = round(LASTS_S.get(task.name, FLIES_S if robot.flies else BRIEFLY_S) / dt)
+    steps = round(_lasts_s(robot, task) / dt)
     ways: list[list[tuple[float, ...]]] = [[], []]
     with nodes(robot, task, make) as (plant, _, overseer):
         for number in range(2):
