@@ -7,6 +7,7 @@ from contextlib import nullcontext
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
 from fulmar_core.backend import Sample
 from fulmar_core.health.feedback_check import ActuatorFeedback
@@ -19,8 +20,8 @@ from fulmar_ros.plant_loops import RealtimeLoop
 ROBOT = load_robot("airship_v7")
 
 
-def grounded_by(positions: np.ndarray) -> tuple[list[str], ActuatorFeedback]:
-    """Why the guard had to hand over, while a constant command is applied and this is measured."""
+def grounded_by(positions: np.ndarray) -> tuple[list[tuple], ActuatorFeedback]:
+    """Why the guard had to hand over and for what, while a constant command is applied and this is measured."""
     reading = Reading(SurfacePositions(ROBOT.actuators.names, positions))
     sample, reasons = Sample({"surfaces": reading}, None), []
 
@@ -30,7 +31,7 @@ def grounded_by(positions: np.ndarray) -> tuple[list[str], ActuatorFeedback]:
     command = 0.5 * ROBOT.actuators.scale
     guard = SimpleNamespace(
         output=lambda *_, **__: command,
-        fail=lambda words, _now_ns: reasons.append(words),
+        fail=lambda words, _now_ns, stuck: reasons.append((words, stuck)),
         see_refusal=ignore,
         handed_over=False,
     )
@@ -47,7 +48,9 @@ def test_a_stuck_surface_grounds_an_aircraft():
     positions = 0.5 * ROBOT.actuators.scale
     positions[0] = -positions[0]
     reasons, feedback = grounded_by(positions)
-    assert reasons and reasons[0].startswith("elevator is stuck at -0.17 rad")
+    words, stuck = reasons[0]
+    assert words.startswith("elevator is stuck at -0.17 rad")
+    assert stuck == ("elevator", pytest.approx(positions[0]))
     assert [finding.part for finding in feedback.findings] == ["elevator"]
 
 

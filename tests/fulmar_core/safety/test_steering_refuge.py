@@ -152,3 +152,13 @@ def test_a_failed_surface_hands_over_until_the_next_reset(guard):
     guard.reset()
     guard.offer(NAMES, GOOD, 20 * MS)
     assert applied(guard, 20 * MS) == GOOD
+
+
+def test_the_safe_controller_knows_what_stands_until_the_next_reset(guard, glide):
+    guard.fail("rudder is stuck", 5 * MS, ("rudder", 0.13))
+    applied(guard, 10 * MS)
+    assert glide.stuck == ("rudder", 0.13)
+    guard.reset()
+    guard.offer(NAMES, SAFE, 20 * MS)
+    applied(guard, 20 * MS)
+    assert glide.stuck is None

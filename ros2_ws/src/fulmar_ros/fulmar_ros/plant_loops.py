@@ -290,6 +290,8 @@ def _compare(
     if feedback is None:
         return
     feedback.see(command, seconds, sample)
-    if feedback.grounds:
+    failed = feedback.grounds
+    if failed is not None:
+        stuck = None if failed.value is None else (failed.part, failed.value)
         with wires.lock:
-            guard.fail(feedback.grounds, time.monotonic_ns())
+            guard.fail(failed.words, time.monotonic_ns(), stuck)

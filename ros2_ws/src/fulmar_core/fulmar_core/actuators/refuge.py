@@ -24,10 +24,12 @@ class Refuge(Protocol):
         longest_s: Time after which its command is the safe one, whatever came before; infinite where it goes on
             controlling [s].
         doing: What it does, in words; empty where it does not steer.
+        stuck: Name of an actuator that stands, and where, for one that steers; None while none is known to.
     """
 
     longest_s: float
     doing: str
+    stuck: tuple[str, float] | None
 
     def command(self, since_s: float, last: np.ndarray, state: RigidBodyState | None) -> np.ndarray:
         """Command to apply.
@@ -49,6 +51,7 @@ class StopAtOnce:
 
     longest_s = 0.0
     doing = ""
+    stuck: tuple[str, float] | None = None
 
     def __init__(self, safe: np.ndarray) -> None:
         self._safe = safe
@@ -62,6 +65,7 @@ class RampDown:
     """Wheels that slow down as fast as they may, so that they do not lock."""
 
     doing = ""
+    stuck: tuple[str, float] | None = None
 
     def __init__(self, scale: np.ndarray, slew: Sequence[float]) -> None:
         """Prepare.

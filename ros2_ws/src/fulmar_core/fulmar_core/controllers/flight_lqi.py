@@ -95,6 +95,10 @@ class FlightLqi(FlightFollowing):
         self.schedule = Schedule(self.robot, self._speed, self._dt, self._gain)
 
     def _gain(self, model: FlightModel) -> np.ndarray:
+        return regulator(*self._problem(model)).gain
+
+    def _problem(self, model: FlightModel) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Model and costs of a step, arguments of `regulator`."""
         g, dt, count = self.gains, self._dt, len(model.a)
         surfaces, motors = self._craft.positions, len(self._craft.motors)
         weights = [g.side, g.height, *[g.attitude] * 3, *[g.speed] * 3, *[g.rate] * 3]
@@ -105,7 +109,7 @@ class FlightLqi(FlightFollowing):
             a = np.block([[a, np.zeros((count, 2))], [dt * np.eye(2, count), np.eye(2)]])
             b = np.vstack((b, np.zeros((2, surfaces + motors))))
             q = np.diag([*np.diag(q), g.side_integral, g.height_integral])
-        return regulator(a, b, dt * q, dt * r).gain
+        return a, b, dt * q, dt * r
 
     def reset(self) -> None:
         """Forget the past."""
@@ -142,7 +146,11 @@ class FlightLqi(FlightFollowing):
             free = np.abs(off) < self.gains.error_limit
             self._sums = self._sums + self._dt * np.where(free, off, 0.0)
         gain = self.schedule.array(aim.place[:, 1])
-        return np.asarray(level - np.einsum("nij,nj->ni", gain, x))
+        return np.asarray(level - np.einsum("nij,nj->ni", gain, self._with_constants(x)))
+
+    def _with_constants(self, x: np.ndarray) -> np.ndarray:
+        """Departures and integrals, shape (n, k), with what else the gains are for; here nothing."""
+        return x
 
     def answers(
         self, states: SpatialState, aim: Aim, servos: np.ndarray, *, share: float = 1.0

@@ -11,6 +11,7 @@ from fulmar_core.actuators.refuge import DOWN, Refuge
 from fulmar_core.attitude import euler_of, from_euler, product
 from fulmar_core.controllers.controller import Inputs
 from fulmar_core.controllers.flight_lqi import FlightLqi, FlightWeights, flight_lqi_weights
+from fulmar_core.controllers.flight_stuck import REPLACED, StuckLqi, can_replace
 from fulmar_core.goal import goals_at
 from fulmar_core.robot import Robot
 from fulmar_core.spatial import SpatialState
@@ -30,6 +31,7 @@ DOWN_M, SURE_S = (
     0.3,
 )  # nearer to the ground than this, over so long a time, its lowest point is down [m], [s]
 HOLDS, DESCENDS = "holds its height", "descends with level wings"  # what it does before it is `DOWN`
+MOST_SINK = 1.5  # of a craft with a stuck surface, which goes on sinking as it did [m/s]
 BLIND = "measures no state and idles its motors"
 
 
@@ -38,6 +40,7 @@ class LevelDescent:
 
     longest_s = math.inf
     doing = HOLDS
+    stuck: tuple[str, float] | None = None
 
     def __init__(self, robot: Robot, hz: float) -> None:
         """Solve for its gains.
@@ -51,8 +54,10 @@ class LevelDescent:
         """
         self._robot = robot
         task = load_task("fly_hold").fitted(robot)
-        self._law = FlightLqi(robot, task, descent_weights(robot), control_hz=hz)
-        self._since_s = math.inf
+        weights = descent_weights(robot)
+        self._law = self._usual = FlightLqi(robot, task, weights, control_hz=hz)
+        self._beside = StuckLqi(robot, task, weights, self._usual) if can_replace(robot) else None
+        self._since_s = self._descends_s = math.inf
 
     def command(self, since_s: float, last: np.ndarray, state: RigidBodyState | None) -> np.ndarray:
         """See `Refuge.command`; a time that is not after that of the call before begins anew."""
@@ -61,24 +66,44 @@ class LevelDescent:
             return self._robot.actuators.safe_command
         now = SpatialState.from_rigid(state)[None].in_float64()
         if since_s <= self._since_s:
+            self._law = self._usual
             self._height, self._heading = float(now.z[0]), float(euler_of(now.quat)[2][0])
             self._law.reset()
             self._sent, self._since_s = np.asarray(last, dtype=float), since_s
-            self._falls, self.doing = 0.0, HOLDS
+            self._falls, self._fell, self.doing = 0.0, 0.0, HOLDS
+            self._descends_s = HOLD_S
             # No craft is down by its first measurement alone, and one that is shows it within `SURE_S`.
             self._low = max(self._lowest(now), 2.0 * DOWN_M)
+        self._bear(since_s, now)
         passed, self._since_s = since_s - self._since_s, since_s
         if self._is_down(now, passed):
             self.doing = DOWN
             return self._robot.actuators.safe_command
-        if since_s <= HOLD_S:
+        if since_s <= self._descends_s:
             self.doing = HOLDS
         else:
             self.doing = DESCENDS
-            self._falls = SINK * min(1.0, (since_s - HOLD_S) / EASE_S)
+            self._falls = self._fell + (SINK - self._fell) * min(1.0, (since_s - self._descends_s) / EASE_S)
             self._height = max(self._height - self._falls * passed, float(now.z[0]) - LEAD_M)
         self._sent = self._answer(self._along(now))
         return self._sent
+
+    def _bear(self, since_s: float, now: SpatialState) -> None:
+        """Fly beside a rudder that stands, along the way of that moment: no controller comes back to hold for."""
+        if (
+            self.stuck is None
+            or self.stuck[0] != REPLACED
+            or self._beside is None
+            or self._law is self._beside
+        ):
+            return
+        self._law, self._beside.value = self._beside, self.stuck[1]
+        self._law.reset()
+        self._sent = self._sent.copy()
+        self._sent[self._beside.number] = self.stuck[1]
+        self._height, self._heading = float(now.z[0]), math.atan2(float(now.vy[0]), float(now.vx[0]))
+        self._fell = min(max(-float(now.vz[0]), 0.0), MOST_SINK)
+        self._descends_s = since_s
 
     def _lowest(self, state: SpatialState) -> float:
         """Height of the lowest point of the hull in level flight [m]."""

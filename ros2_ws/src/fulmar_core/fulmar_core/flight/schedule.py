@@ -71,9 +71,16 @@ class Schedule:
     """Arrays that are computed at some heights, and interpolated between them."""
 
     def __init__(
-        self, robot: Robot, speed: float, dt: float, make: Callable[[FlightModel], np.ndarray]
+        self,
+        robot: Robot,
+        speed: float,
+        dt: float,
+        make: Callable[[FlightModel], np.ndarray],
+        models: tuple[FlightModel, ...] = (),
     ) -> None:
         """Solve the trims; arguments as of `flight_model`, and what is computed of each model, all of one shape.
+
+        `models`: those of another schedule of the same robot, speed and step, which are not solved again.
 
         Raises:
             ConfigError: There is no trim at this speed.
@@ -81,11 +88,13 @@ class Schedule:
         assert robot.airframe is not None
         above = 1.1 * max(0.0, -robot.hull_span[0] - robot.airframe.span * HEIGHTS[0] / 1.1)
         self.heights = above + robot.airframe.span * np.array(HEIGHTS)
-        models = [flight_model(robot, find_trim(robot, speed, float(height)), dt) for height in self.heights]
-        self._arrays = np.stack([make(model) for model in models])
-        self._commands = np.stack([model.trim.command for model in models])
+        self.models = models or tuple(
+            flight_model(robot, find_trim(robot, speed, float(height)), dt) for height in self.heights
+        )
+        self._arrays = np.stack([make(model) for model in self.models])
+        self._commands = np.stack([model.trim.command for model in self.models])
         self._quats = np.stack(
-            [np.array([float(part) for part in model.trim.state.quat]) for model in models]
+            [np.array([float(part) for part in model.trim.state.quat]) for model in self.models]
         )
 
     def _between(self, values: np.ndarray, height: np.ndarray) -> np.ndarray:

@@ -14,10 +14,12 @@ class Finding:
     Attributes:
         part: Its name, see `MovingParts.names`; empty where no single part can be named.
         words: A sentence for people, without numbers that change from step to step.
+        value: Where it stands, in the unit of its command; None where that is not known.
     """
 
     part: str
     words: str
+    value: float | None = None
 
 
 def dead(part: str) -> Finding:
@@ -27,7 +29,9 @@ def dead(part: str) -> Finding:
 
 def stuck(part: str, value: float, unit: str) -> Finding:
     """A part that stands at a value, whatever it is commanded."""
-    return Finding(part, f"{part} is stuck at {value:+.2f}{unit and ' ' + unit}, whatever it is commanded")
+    return Finding(
+        part, f"{part} is stuck at {value:+.2f}{unit and ' ' + unit}, whatever it is commanded", value
+    )
 
 
 def unresponsive(part: str) -> Finding:

@@ -107,9 +107,9 @@ class ActuatorFeedback:
         self.findings: tuple[Finding, ...] = ()
 
     @property
-    def grounds(self) -> str:
-        """Why no controller may fly on, in words: a surface has failed; empty if none has."""
-        return next((finding.words for finding in self.findings if finding.part in self._vital), "")
+    def grounds(self) -> Finding | None:
+        """Why no controller may fly on: a surface has failed; None if none has."""
+        return next((finding for finding in self.findings if finding.part in self._vital), None)
 
     def reset(self) -> None:
         """Begin anew, with an episode."""

@@ -87,6 +87,7 @@ class ActuatorGuard:
             None  # since when the controller of what cannot stop commands what is safe
         )
         self.failed = ""
+        self._stuck: tuple[str, float] | None = None
         self._steering_ns: int | None = None  # by the plant's clock, since when the safe controller steers
         self._handed_over_ns: int | None = None  # since when the safe controller has the actuators for good
         self.watchdog.reset()
@@ -110,9 +111,16 @@ class ActuatorGuard:
         if self._handed_over_ns is None:
             self._handed_over_ns = now_ns
 
-    def fail(self, words: str, now_ns: int) -> None:
-        """Hand over to the safe controller until the next reset, for a part that has failed, in words [ns]."""
-        self.failed = self.failed or words
+    def fail(self, words: str, now_ns: int, stuck: tuple[str, float] | None = None) -> None:
+        """Hand over to the safe controller until the next reset, for a part that has failed.
+
+        Args:
+            words: What failed.
+            now_ns: Steady clock [ns].
+            stuck: Its name and where it stands, if it does.
+        """
+        if not self.failed:
+            self.failed, self._stuck = words, stuck
         self.hand_over(now_ns)
 
     def offer(
@@ -240,6 +248,8 @@ class ActuatorGuard:
         if self._safe_since_ns is None or since_ns < self._safe_since_ns:
             self._safe_since_ns = since_ns
         since_s = max(0, now_ns - self._safe_since_ns) / 1e9
+        if self._steers:
+            self.refuge.stuck = self._stuck
         if self._steers and plant_ns is not None:
             if self._steering_ns is None:
                 self._steering_ns = plant_ns
