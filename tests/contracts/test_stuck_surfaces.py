@@ -1,4 +1,4 @@
-"""An aircraft with a surface at half travel: its safe controller lands it where level flight is left, here a rudder's."""
+"""An aircraft with a surface at half travel: its safe controller lands it where level flight is left, beside a rudder."""
 
 from __future__ import annotations
 

@@ -69,10 +69,7 @@ ON_AN_AIRCRAFT = (  # what differs there: it flies on, by the plant's own state
     "time_jump_backwards",
     "recorder_killed",
     "supervisor_stopped",
-    pytest.param(
-        "surface_stuck",
-        marks=pytest.mark.xfail(reason="its safe controller cannot fly with the rudder at half travel"),
-    ),
+    "surface_stuck",  # drawn: the rudder
     "propeller_lost",
     pytest.param(
         "gnss_creeps",
