@@ -1,4 +1,4 @@
-"""An aircraft with a surface at half travel: its safe controller lands it where level flight is left, beside a rudder."""
+"""An aircraft with a surface at half travel is landed where level flight is left to it: beside a rudder."""
 
 from __future__ import annotations
 
