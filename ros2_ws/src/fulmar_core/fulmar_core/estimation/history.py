@@ -39,7 +39,7 @@ SEPARATION = (
 )
 CONTRADICTION = (
     "motion capture and inertial readings contradict each other: neither is trusted until they agree on a motion. "
-    "Turn the robot by hand, or restart the estimator"
+    "Turn the robot by hand and hold it, or restart the estimator"
 )
 NO_POSE = "no pose yet. Is the motion capture running, and does it see the robot?"
 

@@ -2,6 +2,9 @@
 
 They are if they move as the inertial readings say: through the same way and turn, seen from the body. A source that
 repeats itself, stands while the body moves, or creeps, does not.
+
+Inertial readings alone know the velocity for some seconds only. Later a place that creeps steadily looks like a body
+that drifts; but it does not stand when the body is turned and then held.
 """
 
 from __future__ import annotations
@@ -20,12 +23,19 @@ TO_BEGIN_ANEW = (
 )
 TO_BEGIN_ANEW_NS = 800_000_000  # and that long: in less, noise hides how they move
 AGAIN_NS = 1_800_000_000  # same, shortly after an estimate began anew
-KEPT_NS = 2_000_000_000  # how far apart two of them are compared
+PROOF_NS = (
+    3_000_000_000  # same, of sources that contradicted each other: a slow drift must grow out of the noise
+)
+KEPT_NS = 3_200_000_000  # how far apart two of them are compared
 WAY_SHARE = 0.15  # of a way by which what is seen and what is expected may differ, as poses may be late
 TURN_SHARE = 0.5  # same of a turn
-CLOSE_TURN_SHARE = 0.15  # same of a turn, of sources that were off shortly before
+CLOSE_TURN_SHARE = 0.05  # same of a turn, of sources that were off shortly before
 SIGMAS = 3.0  # standard deviations of velocity and turn rate that a difference may have
 MOVED = 3.0  # a motion of so many times what may differ shows that poses do not stand
+PROOF_SHARE = 0.02  # of a way or turn by which sources may differ that contradicted each other before
+PROOF_SPEED = 0.05  # same, per second: far less than the 0.2 m/s that are noticed at the first time [m/s]
+KNOWN_SPEED = 0.2  # a velocity less well known, by SIGMAS, tells no creeping place from a sound one [m/s]
+HELD_NS = 10_000_000_000  # how long after a turn that both sources saw a body that is held proves the place
 
 NO_TURN = np.array([0.0, 0.0, 0.0, 1.0])
 INVERSE = np.array([-1.0, -1.0, -1.0, 1.0])  # makes a unit quaternion its inverse
@@ -48,7 +58,7 @@ class Agreement:
 
     agrees: bool
     closely: bool  # same, with little room for a drift
-    proves: bool  # same, on a motion so large that no source that stands could
+    proves: bool  # with hardly any, on a motion so large that no source that stands, creeps or drifts could
 
 
 class Strangers:
@@ -64,10 +74,12 @@ class Strangers:
         """
         self._speed, self._slack, self._turn_slack = speed, slack, turn_slack
         self._met: deque[Stranger] = deque()
+        self._turned_ns: int | None = None  # when both sources saw a large turn, one and the same
 
     def forget(self) -> None:
         """Begin anew, as after a pose that was expected."""
         self._met.clear()
+        self._turned_ns = None
 
     def meet(self, stranger: Stranger, *, for_ns: int = TO_BEGIN_ANEW_NS) -> Agreement | None:
         """Note one more; None as long as those that go together are too few, or do not last for a time [ns]."""
@@ -95,12 +107,38 @@ class Strangers:
         turn_slack = self._turn_slack + SIGMAS * last.rate_std * seconds
         way_slack = self._slack + SIGMAS * last.speed_std * seconds
         off, turned_off = float(np.linalg.norm(way - expected_way)), _angle(expected_turn, turn)
-        moved = ways[0] > MOVED * way_slack or turns[0] > MOVED * turn_slack
 
         ways_agree = off <= way_slack + WAY_SHARE * max(ways)
         agrees = ways_agree and turned_off <= turn_slack + TURN_SHARE * max(turns)
         closely = ways_agree and turned_off <= turn_slack + CLOSE_TURN_SHARE * max(turns)
-        return Agreement(agrees, closely, moved and closely)
+        proves = last.stamp_ns - first.stamp_ns >= PROOF_NS and self._proves(
+            last, ways, off, turns, turned_off
+        )
+        return Agreement(agrees, closely, proves)
+
+    def _proves(
+        self,
+        last: Stranger,
+        ways: tuple[float, float],
+        off: float,
+        turns: tuple[float, float],
+        turned_off: float,
+    ) -> bool:
+        """Whether sources that contradicted each other agree on a motion; those seen first, then those expected."""
+        seconds = PROOF_NS / 1e9
+        turn_slack = self._turn_slack + SIGMAS * last.rate_std * seconds
+        if turned_off > turn_slack + PROOF_SHARE * max(turns):
+            self._turned_ns = None
+            return False
+        turned = min(turns) > MOVED * turn_slack
+        if turned:
+            self._turned_ns = last.stamp_ns
+        way_slack = self._slack + PROOF_SPEED * seconds
+        if SIGMAS * last.speed_std <= KNOWN_SPEED:
+            agree = off <= way_slack + PROOF_SHARE * max(ways)
+            return agree and (turned or min(ways) > MOVED * way_slack)
+        lately = self._turned_ns is not None and last.stamp_ns - self._turned_ns <= HELD_NS
+        return lately and not turned and ways[0] <= self._slack
 
 
 def _between(a: Placed, b: Placed) -> tuple[np.ndarray, np.ndarray]:
