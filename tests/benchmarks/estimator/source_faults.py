@@ -141,6 +141,7 @@ ODOMETRY: Mapping[str, Make] = {
     "pose stands with noise": lambda rng, space: SourceFault(odometry=_odometry(_kept(_shaken(rng, space)))),
     "position creeps 0.1 m/s": lambda rng, space: SourceFault(odometry=_odometry(_creeps(0.1))),
     "position creeps 0.5 m/s": lambda rng, space: SourceFault(odometry=_odometry(_creeps(0.5))),
+    "position creeps 3 m/s": lambda rng, space: SourceFault(odometry=_odometry(_creeps(3.0))),
     "twist stands": lambda rng, space: SourceFault(odometry=_twist_stands()),
 }
 

@@ -138,7 +138,7 @@ def test_an_outlier_is_refused_and_does_not_move_the_estimate():
 def test_outliers_that_agree_with_one_another_are_believed_in_the_end():
     track = Track()
     assert track.run(3.0) == 0
-    answers = [track.pose(3.001 + 0.09 * i, off=0.3) for i in range(TO_BEGIN_ANEW)]
+    answers = [track.pose(3.001 + 0.21 * i, off=0.3) for i in range(TO_BEGIN_ANEW)]
     assert all("gate" in answer for answer in answers[:-1])
     assert answers[-1] is None
     assert track.estimator.epoch == 1

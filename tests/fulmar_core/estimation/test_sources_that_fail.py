@@ -269,3 +269,54 @@ def test_after_a_contradiction_sources_that_only_stand_are_not_believed_again():
     body.run(5.0, pose=body.standing())
     assert body.estimate is None
     assert body.estimator.epoch == 0
+
+
+def creeps(speed: float) -> Change:
+    return lambda t, pose: np.concatenate(([pose[0] + speed * t], pose[1:]))
+
+
+def turns(rate: float) -> Change:
+    return lambda t, pose: np.concatenate((pose[:3], multiply(from_yaw(np.asarray(rate * t)), pose[3:])))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("fault", [creeps(0.2), turns(0.1)], ids=["creeps", "drifts"])
+def test_poses_that_creep_or_drift_on_are_not_believed_again(kind, seed, fault):
+    body = Body(kind, seed=seed)
+    body.run(3.0)
+    body.run(30.0, pose=fault)
+    assert body.estimate is None
+    assert body.estimator.warnings() == (CONTRADICTION,)
+
+
+def test_a_place_that_creeps_on_is_not_believed_again():
+    body = Body("mocap_imu")
+    body.velocity = np.array([0.5, 0.0, 0.0])
+    body.run(3.0)
+    body.run(7.0, pose=creeps(0.2))
+    assert (body.estimate, body.estimator.epoch) == (None, 0)
+
+
+def test_poses_that_crept_are_believed_once_they_move_as_the_body_does():
+    body = Body("mocap_imu")
+    body.run(3.0)
+    body.run(2.0, pose=creeps(0.2))
+    assert body.estimate is None
+    body.run(5.0)
+    assert body.estimator.warnings() == ()
+    assert body.estimate.value.position_in_world == pytest.approx(body.position, abs=0.02)
+
+
+@pytest.mark.parametrize("crept", [0.0, 0.2], ids=["sound", "creeping"])
+def test_long_after_a_contradiction_a_turn_and_a_hold_tell_sound_poses_from_creeping_ones(crept):
+    body = Body("mocap_imu", moves=False)
+    body.run(1.0)
+    body.run(12.0, pose=creeps(0.2))
+    body.moves = True
+    body.run(5.0, pose=creeps(crept))
+    assert body.estimate is None  # inertial readings no longer know the velocity
+    body.moves, body.velocity = False, np.zeros(3)
+    body.run(4.0, pose=creeps(crept))
+    assert (body.estimator.epoch, bool(body.estimator.warnings())) == ((1, False) if not crept else (0, True))

@@ -21,7 +21,7 @@ from fulmar_core.estimation.frozen import EXACT, FrozenSources, Noise
 from fulmar_core.estimation.inertial_prediction import InertialPredictions
 from fulmar_core.estimation.reading_times import ReadingTimes
 from fulmar_core.estimation.settings import MotionSettings
-from fulmar_core.estimation.strangers import AGAIN_NS, TO_BEGIN_ANEW_NS, Stranger, Strangers
+from fulmar_core.estimation.strangers import CONTRADICT_NS, TO_BEGIN_ANEW_NS, Stranger, Strangers
 from fulmar_core.robot import Limits
 from fulmar_core.sensors.reading import Reading
 
@@ -339,12 +339,12 @@ class HistoryEstimator(ABC, Generic[S]):
     def _meet(self, stranger: Stranger, event: Event) -> bool:
         """Whether to begin anew at an unexpected pose, as those before it move as the inertial readings say."""
         lately = event.stamp_ns - self._anew_ns < LATELY_NS
-        agreement = self._strangers.meet(stranger, for_ns=AGAIN_NS if lately else TO_BEGIN_ANEW_NS)
+        agreement = self._strangers.meet(stranger, for_ns=TO_BEGIN_ANEW_NS if lately else CONTRADICT_NS)
         if agreement is None:
             return False
         if not (agreement.closely if lately else agreement.agrees):
             self._contradiction = CONTRADICTION
-        if self._contradiction and not agreement.proves:
+        if not (agreement.proves if self._contradiction else agreement.lasts):
             return False
         before = None if self._contradiction else self._filter
         self._begin(event)

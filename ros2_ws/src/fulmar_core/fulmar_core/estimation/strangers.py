@@ -21,13 +21,17 @@ from fulmar_core.rotation import multiply, rotate
 TO_BEGIN_ANEW = (
     10  # poses beyond the gate in a row that agree with one another and with the inertial readings
 )
-TO_BEGIN_ANEW_NS = 800_000_000  # and that long: in less, noise hides how they move
-AGAIN_NS = 1_800_000_000  # same, shortly after an estimate began anew
+CONTRADICT_NS = (
+    800_000_000  # how long they last before they can contradict: in less, noise hides how they move
+)
+TO_BEGIN_ANEW_NS = (
+    1_800_000_000  # how long they agree to be believed: a body that moves slowly seems to stand
+)
 PROOF_NS = (
     3_000_000_000  # same, of sources that contradicted each other: a slow drift must grow out of the noise
 )
 KEPT_NS = 3_200_000_000  # how far apart two of them are compared
-WAY_SHARE = 0.15  # of a way by which what is seen and what is expected may differ, as poses may be late
+WAY_SHARE = 0.05  # of a way by which what is seen and what is expected may differ, as poses may be late
 TURN_SHARE = 0.5  # same of a turn
 CLOSE_TURN_SHARE = 0.05  # same of a turn, of sources that were off shortly before
 SIGMAS = 3.0  # standard deviations of velocity and turn rate that a difference may have
@@ -56,6 +60,7 @@ class Stranger:
 class Agreement:
     """Whether poses move as they are expected to."""
 
+    lasts: bool  # long enough to be believed
     agrees: bool
     closely: bool  # same, with little room for a drift
     proves: bool  # with hardly any, on a motion so large that no source that stands, creeps or drifts could
@@ -81,7 +86,7 @@ class Strangers:
         self._met.clear()
         self._turned_ns = None
 
-    def meet(self, stranger: Stranger, *, for_ns: int = TO_BEGIN_ANEW_NS) -> Agreement | None:
+    def meet(self, stranger: Stranger, *, for_ns: int = CONTRADICT_NS) -> Agreement | None:
         """Note one more; None as long as those that go together are too few, or do not last for a time [ns]."""
         if self._met and not self._follows(self._met[-1], stranger):
             self._met.clear()
@@ -111,10 +116,9 @@ class Strangers:
         ways_agree = off <= way_slack + WAY_SHARE * max(ways)
         agrees = ways_agree and turned_off <= turn_slack + TURN_SHARE * max(turns)
         closely = ways_agree and turned_off <= turn_slack + CLOSE_TURN_SHARE * max(turns)
-        proves = last.stamp_ns - first.stamp_ns >= PROOF_NS and self._proves(
-            last, ways, off, turns, turned_off
-        )
-        return Agreement(agrees, closely, proves)
+        lasts_ns = last.stamp_ns - first.stamp_ns
+        proves = lasts_ns >= PROOF_NS and self._proves(last, ways, off, turns, turned_off)
+        return Agreement(lasts_ns >= TO_BEGIN_ANEW_NS, agrees, closely, proves)
 
     def _proves(
         self,
