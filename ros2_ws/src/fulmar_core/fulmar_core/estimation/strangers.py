@@ -38,7 +38,7 @@ SIGMAS = 3.0  # standard deviations of velocity and turn rate that a difference 
 MOVED = 3.0  # a motion of so many times what may differ shows that poses do not stand
 PROOF_SHARE = 0.02  # of a way or turn by which sources may differ that contradicted each other before
 PROOF_SPEED = 0.05  # same, per second: far less than the 0.2 m/s that are noticed at the first time [m/s]
-KNOWN_SPEED = 0.2  # a velocity less well known, by SIGMAS, tells no creeping place from a sound one [m/s]
+KNOWN_SPEED = 0.2  # a velocity less well known, by SIGMAS, cannot show that a place creeps [m/s]
 HELD_NS = 10_000_000_000  # how long after a turn that both sources saw a body that is held proves the place
 
 NO_TURN = np.array([0.0, 0.0, 0.0, 1.0])
