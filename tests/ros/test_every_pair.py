@@ -41,7 +41,6 @@ SEED = 5
 LASTS_S = {"track_velocities": 14.0, "track_velocities_3d": 14.0}  # long enough for a second velocity
 BRIEFLY_S = 6.0  # short enough to leave no geofence and to touch no obstacle
 TURNS_S = 3.0  # soon after, the guard stops what turns ever further from its goal
-
 FLIES_S = 2.0  # of aircraft, which are commanded more often
 # A second task of a kind with other figures brings nothing new onto the wires; tests/conftest.py has more of them.
 ALIKE = {
