@@ -24,7 +24,7 @@ def unbelievable(
         now_ns: When [ns].
         last: What was believed before, and when [ns].
         limits: Of the robot.
-        turns_freely: As of `InputGate`.
+        turns_freely: Whether the robot turns about any axis, as in `InputGate`.
     """
     gate = InputGate(limits, frozen_after=0, jump_m=JUMP_M, turns_freely=turns_freely)
     if last is not None:

@@ -86,7 +86,7 @@ class KobukiDriver(DeviceDriver):
         return self._feedback.read()
 
     def refusal(self) -> str:
-        """Whether somebody has lifted the base; see `Answering`."""
+        """Whether the base is lifted; see `Answering`."""
         lifted_s = self._lifted_s
         if lifted_s is None or time.monotonic() - lifted_s < LIFTED_S:
             return ""

@@ -80,6 +80,7 @@ def check_unpacked(content: bytes, most: int) -> None:
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             unpacked = sum(entry.file_size for entry in archive.infolist())
+    # NotImplementedError is zipfile's for a version or a compression that it does not know.
     except (zipfile.BadZipFile, NotImplementedError, UnicodeDecodeError) as error:
         raise ValueError(f"is no archive, or a damaged one ({type(error).__name__})") from error
     if unpacked > most:
@@ -108,7 +109,7 @@ def load_arrays(
             return {name: np.asarray(arrays[name]) for name in (arrays.files if names is None else names)}
     except KeyError as error:
         raise ValueError(f"lacks an array: {error.args[0] if error.args else error}") from error
-    # Headers of its parts may lie in every way.
+    # What zipfile and NumPy raise for headers that lie; NotImplementedError is zipfile's for an unknown compression.
     except (zipfile.BadZipFile, EOFError, SyntaxError, TypeError, RuntimeError) as error:
         raise ValueError(f"is no .npz file, or a damaged one ({type(error).__name__})") from error
     except (MemoryError, NotImplementedError, OverflowError, OSError) as error:
