@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
@@ -29,7 +30,7 @@ class EstimatorSettings:
 
 
 @dataclass(frozen=True, kw_only=True)
-class MotionSettings(EstimatorSettings):
+class MotionSettings(EstimatorSettings, ABC):
     """What estimators of motion have in common.
 
     Densities are those of white noise: over a time t they spread what they drive by density · √t.
@@ -56,9 +57,9 @@ class MotionSettings(EstimatorSettings):
     )  # fmt: skip
 
     @property
+    @abstractmethod
     def pose_turn_std(self) -> float:
         """Of the angles of a pose [rad]."""
-        raise NotImplementedError
 
     def __post_init__(self) -> None:
         super().__post_init__()
