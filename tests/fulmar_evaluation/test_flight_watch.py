@@ -53,6 +53,15 @@ def test_neutral_surfaces_that_a_controller_commands_are_not_safe_for_an_aircraf
     assert observer.moves()
 
 
+def test_whatever_is_applied_to_an_aircraft_that_has_come_down_is_safe(node):
+    down = [False]
+    observer = RunObserver(node, CRAFT, is_down=lambda: down[0])
+    node.listeners[command_wire(CRAFT).name](JointState(effort=[0.0] * 5))
+    for down[0] in (False, True):
+        applied(node, [0.0] * 5)
+    assert [moves for _, moves in observer.applied_since(0.0)] == [True, False]
+
+
 def test_a_robot_that_can_stop_is_safe_with_the_safe_command_alone(node):
     observer = RunObserver(node, load_robot("floating_platform"))
     applied(node, [0.0] * 8)
@@ -61,11 +70,11 @@ def test_a_robot_that_can_stop_is_safe_with_the_safe_command_alone(node):
     assert observer.moves()
 
 
-def flown(watch_node: Node, *, climb: float, qx: float = 0.0) -> None:
+def flown(watch_node: Node, *, climb: float, qx: float = 0.0, speed: float = 28.0) -> None:
     message = Odometry()
     message.header.frame_id, message.child_frame_id = "map", "airship_v7/base_link"
     message.pose.pose.orientation.x, message.pose.pose.orientation.w = qx, (1.0 - qx**2) ** 0.5
-    message.twist.twist.linear.x, message.twist.twist.linear.z = 28.0, climb
+    message.twist.twist.linear.x, message.twist.twist.linear.z = speed, climb
     watch_node.listeners[TRUTH.name](serialize_message(message))
 
 
@@ -78,3 +87,11 @@ def test_a_flight_is_safe_with_little_bank_and_sink(node, climb, qx, safe):
     flown(node, climb=climb, qx=qx)
     words, found = watch.since(0.0)
     assert found is safe, words
+
+
+def test_a_craft_that_stands_has_come_down(node):
+    watch = FlightWatch(node, frames_of("airship_v7", "airship_v7"))
+    assert not watch.is_down()
+    for speed in (28.0, 0.2):
+        flown(node, climb=0.0, speed=speed)
+        assert watch.is_down() == (speed < 1.0)

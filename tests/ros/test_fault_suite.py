@@ -71,12 +71,7 @@ ON_AN_AIRCRAFT = (  # what differs there: it flies on, by the plant's own state
     "supervisor_stopped",
     "surface_stuck",  # drawn: the rudder
     "propeller_lost",
-    pytest.param(
-        "gnss_creeps",
-        marks=pytest.mark.xfail(
-            reason="neutral surfaces after the landing count as its controller's command"
-        ),
-    ),
+    "gnss_creeps",  # it comes down at once
 )
 KEYS = [
     "name",

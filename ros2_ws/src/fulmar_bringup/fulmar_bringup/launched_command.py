@@ -77,10 +77,10 @@ class LaunchedCommand:
         with contextlib.suppress(psutil.Error):
             for child in self.process.children(recursive=True):
                 self._seen[child.pid] = child
+                name = _name_of(child)
                 with contextlib.suppress(psutil.Error):  # it may have ended meanwhile
-                    names = [word.removeprefix(NODE) for word in child.cmdline() if word.startswith(NODE)]
-                    if names and child.status() != psutil.STATUS_ZOMBIE:
-                        found[names[0]] = child
+                    if name and child.status() != psutil.STATUS_ZOMBIE:
+                        found[name] = child
         return found
 
     def node(self, name: str, *, other_than: int | None = None, timeout_s: float = START_S) -> psutil.Process:
@@ -149,18 +149,25 @@ class LaunchedCommand:
         _, alive = psutil.wait_procs(list(self._seen.values()), timeout=within_s)
         return [process for process in alive if process.status() != psutil.STATUS_ZOMBIE]
 
-    def end(self) -> None:
-        """End the command in order where it runs, then kill whatever is left of it."""
+    def end(self) -> list[str]:
+        """End the command in order where it runs, then kill whatever is left of it.
+
+        Returns:
+            Names of nodes that were left over once the command had ended.
+        """
         self.nodes()
         if self.process.poll() is None:
             self.process.resume()  # a test may have stopped it
             self.process.terminate()
             with contextlib.suppress(psutil.TimeoutExpired):
                 self.wait(STOP_S)
-        for process in (self.process, *self.left_over(0.0)):
+        left = self.left_over() if self.process.poll() is not None else list(self._seen.values())
+        names = [_name_of(process) for process in left]
+        for process in (self.process, *left):
             with contextlib.suppress(psutil.Error):
                 process.kill()
         self.process.wait(STOP_S)
+        return [name for name in names if name]
 
     def _take_output(self, line: str) -> None:
         if line.startswith('{"event"'):
@@ -182,6 +189,13 @@ def launched(
         yield command
     finally:
         command.end()
+
+
+def _name_of(process: psutil.Process) -> str:
+    """The node that a process runs; empty once it has ended, and of one that runs none."""
+    with contextlib.suppress(psutil.Error):
+        return next((word.removeprefix(NODE) for word in process.cmdline() if word.startswith(NODE)), "")
+    return ""
 
 
 def _read(stream: IO[str], take: Callable[[str], None]) -> None:

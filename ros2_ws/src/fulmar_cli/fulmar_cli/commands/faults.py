@@ -27,6 +27,8 @@ def faults(
         str | None,
         option("L", "What starts the systems: run, up or both; by default both where they differ, else run."),
     ] = None,
+    times: Annotated[int, option("N", "How often each fault is done.", min=1)] = 1,
+    height: Annotated[float | None, option("M", "Height at which an aircraft begins [m].", min=0.0)] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Inject faults into the parts of a live system, and measure how long it takes to be safe.
@@ -42,13 +44,14 @@ def faults(
     fulmar faults --robot turtlebot2 --only controller_killed,odometry_silent
     """
     from fulmar_cli.extras import require
-    from fulmar_evaluation.faults.suite import faults_of, modules_for, run_faults, times_of
+    from fulmar_evaluation.faults.suite import at_height, faults_of, modules_for, run_faults, times_of
 
     chosen, skipped = faults_of(robot, names_in(only))
-    count = len(times_of(chosen, launcher))
+    chosen = chosen if height is None else at_height(chosen, robot, height)
+    count = len(times_of(chosen, launcher, times))
     require(*modules_for(robot, chosen))
     with work_bar("injecting") as moved:
-        results = run_faults(robot, chosen, lambda done: moved(done, count), launcher)
+        results = run_faults(robot, chosen, lambda done: moved(done, count), launcher, times)
     if as_json:
         print_json(
             {

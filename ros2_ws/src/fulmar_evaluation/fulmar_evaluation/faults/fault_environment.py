@@ -129,6 +129,7 @@ class FaultEnvironment:
     intercepted: Wire | None = None  # passes through an injector
     answers_pass: bool = False  # the robot's commands pass through an injector of their own
     by_goal_node: bool = False  # a goal node publishes goals from a file
+    drawn: bool = False  # a node draws for viewers
     by_hand: bool = False  # a node for teleoperation runs, and nobody touches it yet
     scenario: str = "nominal"
     emulated: bool = False  # a driver drives an emulated device
@@ -229,6 +230,7 @@ def request_of(name: str, record: Path, about: FaultEnvironment = USUAL) -> RunR
         command="fulmar faults",
         goals=_goals_file(record.parent, robot, task) if about.by_goal_node else None,
         emulate=about.emulated,
+        markers=about.drawn,
         guards=about.guards_of(robot),
     )
     policy = (

@@ -52,6 +52,11 @@ class FlightWatch:
             ]
         return began and all(bank < LEVEL_DEG and abs(sink) < LEVEL_SINK for bank, sink in late)
 
+    def is_down(self) -> bool:
+        """Whether it has come down."""
+        with self._lock:
+            return bool(self._flown) and self._flown[-1][3] <= STANDS
+
     def since(self, since_s: float) -> tuple[str, bool]:
         """How it has flown since a time, in words, and whether that was safe [s]."""
         with self._lock:

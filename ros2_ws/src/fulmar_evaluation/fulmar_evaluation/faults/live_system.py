@@ -67,6 +67,7 @@ class LiveSystem:
         launched: The process of `fulmar run` or `fulmar up`.
         launcher: Which of them.
         others: Nodes that people start beside it.
+        left_over: Nodes of the launcher that had to be killed after its end.
     """
 
     def __init__(
@@ -88,10 +89,13 @@ class LiveSystem:
         )
         self.bystander, self._request, self._hosts, self._clock = bystander, request, hosts, clock
         self.others = ProcessGroup()
+        self.left_over: list[str] = []
         robot = load_robot(self.plan.robot)
         self.robot = robot
-        self.observer = RunObserver(bystander, robot, DEVICE_STATE if about.emulated else ACTUATORS_STATE)
-        self.flight = FlightWatch(bystander, self.plan.frames) if robot.flies else None
+        self.flight = flight = FlightWatch(bystander, self.plan.frames) if robot.flies else None
+        applied = DEVICE_STATE if about.emulated else ACTUATORS_STATE
+        downs = {} if flight is None else {"is_down": flight.is_down}
+        self.observer = RunObserver(bystander, robot, applied, **downs)
         wire = command_wire(robot)
         self._answers = FaultInjector(bystander, wire) if about.answers_pass else None
         self._injector = (
@@ -273,7 +277,7 @@ def live_system(
                 for number in (signal.SIGTERM, signal.SIGINT):
                     live.signal_launcher(number)
                     time.sleep(ASKED_S)
-            launched.end()
+            live.left_over = launched.end()
             live.others.stop_all()
     if errors:
         raise RunFailed(f"the bystander failed: {errors[0]!r}") from errors[0]

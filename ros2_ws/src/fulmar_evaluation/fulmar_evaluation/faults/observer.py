@@ -46,12 +46,26 @@ class HealthStatus:
 class RunObserver:
     """Records applied commands and health, in a node that spins in a thread of its own."""
 
-    def __init__(self, node: Node, robot: Robot, wire: Wire = ACTUATORS_STATE) -> None:
-        """Subscribe to the applied command, on a wire, and to the health of every node."""
-        self.wire = wire
+    def __init__(
+        self,
+        node: Node,
+        robot: Robot,
+        wire: Wire = ACTUATORS_STATE,
+        is_down: Callable[[], bool] = lambda: False,
+    ) -> None:
+        """Subscribe to the applied command, and to the health of every node.
+
+        Args:
+            node: Listens.
+            robot: Which.
+            wire: Has the applied command.
+            is_down: Whether an aircraft has come down: from then on nothing moves it.
+        """
+        self.wire, self._is_down = wire, is_down
         self._safe = robot.actuators.safe_command
         self._lock = threading.Lock()
-        self._applied: list[tuple[float, int, tuple[float, ...]]] = []  # received [s], stamp [ns], command
+        # Received [s], stamp [ns], command; None of what has come down.
+        self._applied: list[tuple[float, int, tuple[float, ...] | None]] = []
         # Of what cannot stop: every command of its controller; anything else is the safe controller's.
         self._commanded: set[tuple[float, ...]] | None = set() if robot.flies else None
         self._statuses: list[HealthStatus] = []
@@ -66,8 +80,8 @@ class RunObserver:
             listen(DiagnosticArray, health.name, self._on_health, qos)
 
     def _on_applied(self, message: JointState) -> None:
+        applied = None if self._is_down() else tuple(float(value) for value in message.effort)
         with self._lock:
-            applied = tuple(float(value) for value in message.effort)
             self._applied.append((time.monotonic(), stamp_ns(message.header.stamp), applied))
 
     def _on_command(self, message: JointState) -> None:
@@ -75,8 +89,10 @@ class RunObserver:
             if self._commanded is not None:
                 self._commanded.add(tuple(float(value) for value in message.effort))
 
-    def _moves(self, applied: tuple[float, ...]) -> bool:
+    def _moves(self, applied: tuple[float, ...] | None) -> bool:
         """Whether a command moves the robot in a way that is not that of its safe controller."""
+        if applied is None:
+            return False
         if self._commanded is not None:
             return applied in self._commanded
         return bool(np.any(np.asarray(applied) != self._safe))

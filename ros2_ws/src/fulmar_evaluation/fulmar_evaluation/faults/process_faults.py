@@ -96,24 +96,66 @@ def _plant(live: LiveSystem, number: signal.Signals) -> Outcome:
 
 
 def goals_killed(live: LiveSystem) -> Outcome:
-    """SIGKILL of the goal node: the robot goes to the last goal that it received."""
+    """SIGKILL of the goal node: the robot goes on to the last goal, and another goal node follows."""
+    return helper_lost(live, "goals", signal.SIGKILL)
+
+
+def goals_hang(live: LiveSystem) -> Outcome:
+    """SIGSTOP of the goal node."""
+    return helper_lost(live, "goals", signal.SIGSTOP)
+
+
+def markers_killed(live: LiveSystem) -> Outcome:
+    """SIGKILL of the node that draws for viewers: control goes on, and another one draws."""
+    return helper_lost(live, "markers", signal.SIGKILL)
+
+
+def markers_hang(live: LiveSystem) -> Outcome:
+    """SIGSTOP of the node that draws for viewers."""
+    return helper_lost(live, "markers", signal.SIGSTOP)
+
+
+def helper_lost(live: LiveSystem, name: str, number: signal.Signals) -> Outcome:
+    """Send a signal to a node without which the robot goes on; the launcher has to start it again."""
     since_s = live.until_it_moves()
-    live.send("goals", signal.SIGKILL)
+    lost = live.process(name)
+    lost.send_signal(number)
+    again = _is_started_again(live, lost, name)
     time.sleep(PAUSE_S)
-    who, reaction = _launcher_on(live, "goals")
-    return went_on(live, since_s, detected_by=who, reaction=reaction, correct=bool(who))
+    who, reaction = _launcher_on(live, name, number)
+    return went_on(live, since_s, detected_by=who, reaction=reaction, correct=bool(who) and again)
+
+
+def _is_started_again(live: LiveSystem, lost: psutil.Process, name: str) -> bool:
+    """Whether a node that was lost runs again soon, in another process."""
+    try:
+        live.launched.node(name, other_than=lost.pid, timeout_s=AGAIN_S)
+    except TimeoutError:
+        return False
+    return True
 
 
 def recorder_killed(live: LiveSystem) -> Outcome:
     """SIGKILL of the recorder, a power cut to the bag: control goes on, and another recorder goes on with the bag."""
+    return _recorder_lost(live, signal.SIGKILL)
+
+
+def recorder_stopped(live: LiveSystem) -> Outcome:
+    """SIGSTOP of the recorder for good: the same."""
+    return _recorder_lost(live, signal.SIGSTOP)
+
+
+def _recorder_lost(live: LiveSystem, number: signal.Signals) -> Outcome:
     since_s = live.until_it_moves()
     time.sleep(PAUSE_S)  # the bag gets something to lose
-    live.send("recorder", signal.SIGKILL)
+    lost = live.process("recorder")
+    lost.send_signal(number)
     away_s = time.monotonic()
-    again = wait_for(lambda: _recorder_reports(live, away_s + REPORT_S), AGAIN_S)
+    again = _is_started_again(live, lost, "recorder")
+    again = again and wait_for(lambda: _recorder_reports(live, away_s + REPORT_S), AGAIN_S)
     back_s = time.monotonic()
     time.sleep(PAUSE_S)
-    who, reaction = _launcher_on(live, "recorder")
+    who, reaction = _launcher_on(live, "recorder", number)
     return went_on(
         live,
         since_s,
@@ -162,12 +204,12 @@ def disk_full(live: LiveSystem) -> Outcome:
     )
 
 
-def _launcher_on(live: LiveSystem, name: str) -> tuple[str, str]:
-    """Who noticed that a process has ended, and the words."""
-    ended = live.said(name, "was killed")
-    if not ended:
-        return "", f"nobody noticed that {name} has ended"
-    return "launcher", f"{ended}; control goes on"
+def _launcher_on(live: LiveSystem, name: str, number: signal.Signals) -> tuple[str, str]:
+    """Who noticed that a process was killed or stopped, and the words."""
+    lost = live.said(name, "was killed" if number == signal.SIGKILL else "was stopped", "is started again")
+    if not lost:
+        return "", f"nobody noticed that {name} was lost"
+    return "launcher", f"{lost}; control goes on"
 
 
 def _problem(live: LiveSystem, since_s: float) -> HealthStatus | None:
@@ -183,12 +225,17 @@ PLAIN: tuple[Callable[[LiveSystem], Outcome], ...] = (
     estop_killed,
     estop_hangs,
     recorder_killed,
+    recorder_stopped,
     recorder_hangs,
     disk_full,
 )
 PROCESS_FAULTS = (
     *(Fault(do, launchers=LAUNCHERS) for do in PLAIN),
-    Fault(goals_killed, FaultEnvironment(by_goal_node=True)),
+    *(
+        Fault(do, FaultEnvironment(by_goal_node=True), launchers=LAUNCHERS)
+        for do in (goals_killed, goals_hang)
+    ),
+    *(Fault(do, FaultEnvironment(drawn=True), launchers=LAUNCHERS) for do in (markers_killed, markers_hang)),
     Fault(estimator_killed, FaultEnvironment(estimated=True), launchers=LAUNCHERS),
     Fault(estimator_hangs, FaultEnvironment(estimated=True), launchers=LAUNCHERS),
     Fault(mocap_lost, FaultEnvironment(estimated=True, intercepted=MOCAP)),

@@ -6,7 +6,7 @@ import multiprocessing
 import tempfile
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from fulmar_bringup.domains import environment, reserved_domains
@@ -100,12 +100,13 @@ def modules_for(robot: str, faults: list[Fault]) -> tuple[str, ...]:
     return tuple(needed)
 
 
-def times_of(faults: list[Fault], launcher: str | None = None) -> list[tuple[Fault, str]]:
+def times_of(faults: list[Fault], launcher: str | None = None, times: int = 1) -> list[tuple[Fault, str]]:
     """Faults with the launcher of the system that each is done to.
 
     Args:
         faults: Which.
         launcher: run, up or both; None: that of each fault, both where they differ.
+        times: How often each is done.
 
     Raises:
         UnknownNameError: It is none of these.
@@ -113,19 +114,36 @@ def times_of(faults: list[Fault], launcher: str | None = None) -> list[tuple[Fau
     every = {RUN: (RUN,), UP: (UP,), BOTH: LAUNCHERS}
     if launcher is not None and launcher not in every:
         raise UnknownNameError("launcher", launcher, every)
-    return [(fault, each) for fault in faults for each in (every[launcher] if launcher else fault.launchers)]
+    once = [(fault, each) for fault in faults for each in (every[launcher] if launcher else fault.launchers)]
+    return once * times
+
+
+def at_height(faults: list[Fault], robot: str, height_m: float) -> list[Fault]:
+    """Faults of an aircraft that begins at another height [m].
+
+    Raises:
+        ConfigError: The robot is no aircraft.
+    """
+    if not load_robot(robot).flies:
+        raise ConfigError(f"--height {height_m:g}: {robot} does not fly. Leave it out.")
+    return [replace(fault, about=replace(fault.about, height_m=height_m)) for fault in faults]
 
 
 def run_faults(
-    robot: str, faults: list[Fault], progress: Callable[[int], None], launcher: str | None = None
+    robot: str,
+    faults: list[Fault],
+    progress: Callable[[int], None],
+    launcher: str | None = None,
+    times: int = 1,
 ) -> list[FaultResult]:
     """Do each of them to a system of its own, one after another, in a ROS domain that nobody else uses.
 
     Args:
         robot: Its name.
         faults: Which.
-        progress: Called with the number of faults that are done, each launcher counted.
+        progress: Called with the number of faults that are done, each launcher and time counted.
         launcher: As of `times_of`.
+        times: Same.
 
     Raises:
         FulmarError: The robot has no controller to run.
@@ -136,7 +154,7 @@ def run_faults(
         )  # a robot without a policy is refused once, not by every fault
     results = []
     with reserved_domains(1) as (domain,), environment({"ROS_DOMAIN_ID": str(domain)}):
-        for count, (fault, each) in enumerate(times_of(faults, launcher), 1):
+        for count, (fault, each) in enumerate(times_of(faults, launcher, times), 1):
             results.append(_result_of(robot, fault, each))
             progress(count)
     return results
@@ -161,9 +179,9 @@ def _result_of(robot: str, fault: Fault, launcher: str) -> FaultResult:
 
 
 def _result(fault: Fault, live: LiveSystem, outcome: Outcome, evidence: BagEvidence) -> FaultResult:
-    words = "; ".join(
-        text for text in (outcome.reaction, evidence.words and f"bag: {evidence.words}") if text
-    )
+    said = outcome.reaction, evidence.words and f"bag: {evidence.words}"
+    left = live.left_over and f"left over: {', '.join(live.left_over)}"
+    words = "; ".join(text for text in (*said, left) if text)
     return FaultResult(
         fault.name,
         outcome.detected_by,
@@ -172,7 +190,7 @@ def _result(fault: Fault, live: LiveSystem, outcome: Outcome, evidence: BagEvide
         outcome.limit_s,
         evidence.lost,
         evidence.intact,
-        outcome.passed and evidence.intact,
+        outcome.passed and evidence.intact and not live.left_over,
         live.launcher,
         live.failure,
     )
