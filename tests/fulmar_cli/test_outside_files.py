@@ -316,7 +316,7 @@ def read_without_traceback(reader: str, content: bytes, folder: Path) -> None:
 
 
 QUICK = settings(max_examples=8, deadline=None, suppress_health_check=list(HealthCheck))
-THOROUGH = settings(max_examples=500, deadline=None, suppress_health_check=list(HealthCheck))
+THOROUGH = settings(max_examples=1000, deadline=None, suppress_health_check=list(HealthCheck))
 
 
 @pytest.mark.parametrize("reader", READERS)

@@ -25,6 +25,7 @@ from fulmar_core.topics import (
     OBSERVATION,
     OBSTACLES,
     ODOMETRY,
+    SENSOR_WIRES,
     VELOCITY_COMMAND,
 )
 from fulmar_evaluation.rerun.replay_controllers import answers_of
@@ -34,7 +35,8 @@ STEPS = 100  # control steps of each
 SEED = 11
 LARGEST = 200_000  # bytes of the MCAP file
 STEPPED = (ODOMETRY, COMMAND, VELOCITY_COMMAND)
-KEPT = (*STEPPED, OBSERVATION, ACTION, METADATA, OBSTACLES, *GOAL_WIRES.values())
+MEASURED = tuple(wire for wire in SENSOR_WIRES.values() if wire != ODOMETRY)
+KEPT = (*STEPPED, *MEASURED, OBSERVATION, ACTION, METADATA, OBSTACLES, *GOAL_WIRES.values())
 # What a machine and a moment leave in a record, and what therefore stays out of one that is kept.
 OF_THE_MACHINE = ("policy", "command", "git_revision", "fulmar_version", "goals", "path")
 # Another processor adds float32 sums of a network in another order, and rounds a sine otherwise in the last bit.
@@ -50,12 +52,16 @@ class Reference:
     task: str
     controller: str
     guards: Mapping[str, Any] = field(default_factory=dict)
+    backend: str = "mujoco"
+    control_hz: float | None = None  # None: the robot's own [Hz]
 
     @property
     def name(self) -> str:
         """Of its bag."""
-        guarded = "_guarded" if self.guards else ""
-        return f"{self.robot}_{self.task}_{self.controller}{guarded}"
+        estimator = self.guards.get("estimator", "")
+        guarded = f"_{estimator}" if estimator else "_guarded" if self.guards else ""
+        simulated = "" if self.backend == "mujoco" else f"_{self.backend.partition(':')[0]}"
+        return f"{self.robot}_{self.task}_{self.controller}{guarded}{simulated}"
 
 
 REFERENCES = (
@@ -67,6 +73,12 @@ REFERENCES = (
     Reference("modular_freeflyer", "go_to_position", "policy"),
     Reference("jetbot", "go_to_position", "policy"),
     Reference("leatherback", "go_to_position", "policy"),
+    Reference("spacecraft_16", "go_to_pose_3d", "policy"),
+    Reference("spacecraft_16", "go_to_pose_3d", "lqr", {"estimator": "mocap_imu_3d"}),
+    Reference("cubesat_wheels", "point", "lqr", {"estimator": "attitude"}),
+    Reference("airship_v7", "fly_hold", "lqi"),
+    Reference("airship_v7", "fly_hold", "policy", control_hz=25.0),
+    Reference("airship_v7", "fly_hold", "lqi", backend="jsbsim"),
 )
 
 
@@ -84,20 +96,21 @@ def record_reference(reference: Reference, folder: Path) -> Path:
     from fulmar_bringup.planning import plan_run
     from fulmar_evaluation.run_outcome import run_and_evaluate
 
+    control_hz = reference.control_hz or load_robot(reference.robot).timing.control_hz
     with tempfile.TemporaryDirectory(prefix="fulmar_reference_") as scratch:
         recorded = Path(scratch) / reference.name
         request = plan_run(
             robot=reference.robot,
             task=reference.task,
             controller=reference.controller,
-            backend="mujoco",
+            backend=reference.backend,
             policy=None,
             goal=None,
             start=None,
-            duration_s=STEPS / load_robot(reference.robot).timing.control_hz,
+            duration_s=STEPS / control_hz,
             lockstep=True,
             rate=1.0,
-            control_hz=load_robot(reference.robot).timing.control_hz,
+            control_hz=control_hz,
             scenario="nominal",
             seed=SEED,
             record=recorded,
