@@ -9,7 +9,6 @@ import sys
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
-
 from fulmar_core.paths import config_names
 from tests.freeze.tables import TABLES, Rows
 

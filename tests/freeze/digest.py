@@ -38,6 +38,8 @@ def _parts(value: Any) -> Iterator[bytes]:
         array = np.ascontiguousarray(value)
         yield f"{array.dtype.str}{array.shape}".encode()
         yield array.tobytes()
+    elif isinstance(value, bytes):
+        yield value
     elif value is None or isinstance(value, (bool, int, float, str)):
         yield json.dumps(value).encode()
     else:

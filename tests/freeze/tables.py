@@ -6,11 +6,14 @@ well: the digest of the words.
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from fulmar_bags.contents import open_bag
 from fulmar_core.control_loop import ControlLoop
 from fulmar_core.controllers.classical import gains_of
 from fulmar_core.disturbances.scenario import load_scenario
@@ -20,6 +23,8 @@ from fulmar_core.paths import config_names
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import Task, load_task
+from fulmar_core.topics import CLOCK, DIAGNOSTICS, METADATA, STATUS, WIRES
+from fulmar_evaluation.rerun.reference_bags import REFERENCES, run_reference
 from policy_server.controllers import CONTROLLERS, Choice, load_controller
 from tests.freeze.digest import digest
 from tests.spaces import shared_space
@@ -28,6 +33,8 @@ Rows = dict[str, str]
 SEED = 5
 WORLDS, STEPS = 4, 6  # of each batch
 USUAL = "nominal"  # scenario of laws and observations
+# What they report depends on the time of day, or names folders; a clock ticks on until its last listener is gone.
+OF_A_MOMENT = (CLOCK, DIAGNOSTICS, METADATA, STATUS)
 LAWS = tuple(name for name, entry in CONTROLLERS.items() if entry.is_law)
 
 
@@ -69,8 +76,21 @@ def batches(name: str) -> Rows:
     }
 
 
+def runs(name: str) -> Rows:
+    """Every message that moves in lock-step runs of a robot through the deployed nodes, by run and topic."""
+    rows = {}
+    for reference in REFERENCES:
+        if reference.robot == name:
+            with tempfile.TemporaryDirectory(prefix="fulmar_freeze_") as folder:
+                bag = open_bag(run_reference(reference, Path(folder)))
+            for wire in WIRES:
+                if wire not in OF_A_MOMENT and len(bag.of(wire)):
+                    rows[f"{reference.name} {wire.name}"] = digest(list(bag.of(wire).data))
+    return rows
+
+
 TABLES: dict[str, Callable[[str], Rows]] = {
-    each.__name__: each for each in (gains, laws, observations, batches)
+    each.__name__: each for each in (gains, laws, observations, batches, runs)
 }
 
 

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import copy
 import math
 import time
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import rclpy
 from nav_msgs.msg import Odometry
 
+from fulmar_bags.message_reader import stamp_ns
 from fulmar_core.errors import RunFailed
 from fulmar_core.goal import goal_at
 from fulmar_core.robot import Robot
+from fulmar_core.rotation import rotate, rotate_inverse
 from fulmar_core.safety.geofence import is_inside
 from fulmar_core.spatial import SpatialState
 from fulmar_core.topics import GOAL_POSE, GOAL_WIRES, SIMULATION_START_NS
@@ -34,7 +38,7 @@ from fulmar_ros.qos import publisher_qos
 
 TOO_MUCH = 2.0  # times the limit
 OF_EACH = 0.8  # of the limit, about each of three axes: together 1.39 of it
-STEP_M = 0.1  # from message to message: no jump
+OF_LIMIT, FASTEST = 0.9, 10.0  # a robot is carried off at so much of its speed limit, at most so fast [m/s]
 CARRIED_S = 15.0  # by then it is beyond any geofence
 MATCH_S = 10.0
 
@@ -76,14 +80,26 @@ def odometry_leaves_the_geofence(live: LiveSystem) -> Outcome:
 
 
 def _carried_off(live: LiveSystem, is_beyond: Callable[[list[float]], bool]) -> Outcome:
-    axes = "xyz"[: live.robot.state_type.AXES]
-    way_m, beyond_s = [0.0], list[float]()
+    """Odometry reports a motion at a constant velocity out of its limits, which pose and twist agree on."""
+    axes, beyond_s = live.robot.state_type.AXES, list[float]()
+    first: list[Odometry] = []
 
     def change(message: Odometry) -> None:
-        place = message.pose.pose.position
-        way_m[0] += STEP_M
-        setattr(place, axes[-1], getattr(place, axes[-1]) - way_m[0])
-        if not beyond_s and is_beyond([getattr(place, axis) for axis in axes]):
+        first.append(copy.deepcopy(message))
+        del first[1:]
+        velocity = _with_drift(live.robot, _velocity_in_world(first[0]), axes - 1)
+        passed_s = 1e-9 * (stamp_ns(message.header.stamp) - stamp_ns(first[0].header.stamp))
+        begin, place, twist = (
+            first[0].pose.pose.position,
+            message.pose.pose.position,
+            message.twist.twist.linear,
+        )
+        place.x, place.y, place.z = (
+            start + passed_s * speed
+            for start, speed in zip((begin.x, begin.y, begin.z), velocity, strict=True)
+        )
+        twist.x, twist.y, twist.z = rotate_inverse(_attitude(message), velocity).tolist()
+        if not beyond_s and is_beyond([place.x, place.y, place.z][:axes]):
             beyond_s.append(time.monotonic())
 
     live.until_it_moves()
@@ -93,6 +109,24 @@ def _carried_off(live: LiveSystem, is_beyond: Callable[[list[float]], bool]) -> 
     # What an aircraft applied in the tick of that measurement came just before it, and the next is safe already.
     before_s = live.tick_s if live.flight is not None else 0.0
     return stopped(live, beyond_s[0] - before_s, before_s + live.tick_s + live.corrected_s)
+
+
+def _with_drift(robot: Robot, velocity: np.ndarray, axis: int) -> np.ndarray:
+    """A velocity in the world that also leads down an axis, as fast as a robot may be [m/s]."""
+    left = (OF_LIMIT * robot.limits.speed) ** 2 - float(velocity @ velocity)
+    drifting = velocity.copy()
+    drifting[axis] -= min(math.sqrt(max(left, 0.0)), FASTEST)
+    return drifting
+
+
+def _velocity_in_world(message: Odometry) -> np.ndarray:
+    twist = message.twist.twist.linear
+    return np.asarray(rotate(_attitude(message), np.array([twist.x, twist.y, twist.z])), dtype=float)
+
+
+def _attitude(message: Odometry) -> np.ndarray:
+    attitude = message.pose.pose.orientation
+    return np.array([attitude.x, attitude.y, attitude.z, attitude.w])
 
 
 def _because(outcome: Outcome, words: str) -> Outcome:
@@ -155,7 +189,7 @@ def _refusal(live: LiveSystem, since_s: float) -> str:
 def _without_place(robot: Robot) -> str:
     if robot.actuators.turns_only:
         return STAYS
-    drift_m = CARRIED_S * STEP_M / robot.timing.physics_dt
+    drift_m = CARRIED_S * FASTEST
     far = robot.flies and robot.limits.geofence > drift_m
     return f"its geofence of {robot.limits.geofence:g} m is farther than a drift takes it" if far else ""
 

@@ -191,6 +191,8 @@ def bag_evidence(
         return BagEvidence(len(received_ns), False, str(error))
     found = stamps_ns(bag.of(observer.wire))
     if found is None or not len(found):
+        if not len(received_ns):  # a system that ended before its plant ran has nothing to lose
+            return BagEvidence(0, True)
         return BagEvidence(len(received_ns), False, f"it has nothing of {observer.wire.name}")
     # A recorder may find the plant a little later than the bystander did.
     missing = (received_ns >= found.min()) & ~np.isin(received_ns, found)

@@ -93,36 +93,9 @@ def record_reference(reference: Reference, folder: Path) -> Path:
         RunFailed: The run did not come to its end.
         BagError: The bag cannot be written.
     """
-    from fulmar_bringup.planning import plan_run
-    from fulmar_evaluation.run_outcome import run_and_evaluate
-
-    control_hz = reference.control_hz or load_robot(reference.robot).timing.control_hz
     with tempfile.TemporaryDirectory(prefix="fulmar_reference_") as scratch:
-        recorded = Path(scratch) / reference.name
-        request = plan_run(
-            robot=reference.robot,
-            task=reference.task,
-            controller=reference.controller,
-            backend=reference.backend,
-            policy=None,
-            goal=None,
-            start=None,
-            duration_s=STEPS / control_hz,
-            lockstep=True,
-            rate=1.0,
-            control_hz=control_hz,
-            scenario="nominal",
-            seed=SEED,
-            record=recorded,
-            guards=reference.guards,
-            command="",
-        )
-        with own_domain():
-            outcome = run_and_evaluate(request)
-        if outcome.failure:
-            raise RunFailed(f"reference '{reference.name}': {outcome.failure}")
         new = Path(scratch) / "kept" / reference.name
-        _write_kept(open_bag(recorded), new, load_task(reference.task))
+        _write_kept(open_bag(run_reference(reference, Path(scratch))), new, load_task(reference.task))
         first = first_difference(check_reference(new))
         if first is not None:
             raise RunFailed(
@@ -134,6 +107,41 @@ def record_reference(reference: Reference, folder: Path) -> Path:
         folder.mkdir(parents=True, exist_ok=True)
         shutil.copytree(new, target)
     return target
+
+
+def run_reference(reference: Reference, folder: Path) -> Path:
+    """Run through the deployed nodes in lock step, and return the whole bag, which lies in a folder.
+
+    Raises:
+        RunFailed: The run did not come to its end.
+    """
+    from fulmar_bringup.planning import plan_run
+    from fulmar_evaluation.run_outcome import run_and_evaluate
+
+    control_hz = reference.control_hz or load_robot(reference.robot).timing.control_hz
+    request = plan_run(
+        robot=reference.robot,
+        task=reference.task,
+        controller=reference.controller,
+        backend=reference.backend,
+        policy=None,
+        goal=None,
+        start=None,
+        duration_s=STEPS / control_hz,
+        lockstep=True,
+        rate=1.0,
+        control_hz=control_hz,
+        scenario="nominal",
+        seed=SEED,
+        record=folder / reference.name,
+        guards=reference.guards,
+        command="",
+    )
+    with own_domain():
+        outcome = run_and_evaluate(request)
+    if outcome.failure:
+        raise RunFailed(f"reference '{reference.name}': {outcome.failure}")
+    return request.record
 
 
 def _write_kept(bag: Bag, folder: Path, task: Task) -> None:
