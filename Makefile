@@ -145,6 +145,15 @@ policies: dev ## Make the shipped policies that are missing or out of date (unde
 replay-bags: dev ## Record the reference bags of the tests again, after an intended change of behaviour
 	$(BIN)/fulmar bag reference tests/replay/bags --update
 
+.PHONY: freeze-check
+freeze-check: dev ## Compare gains, commands, observations, batches, runs and benchmarks with the frozen ones
+	$(BIN)/fulmar bag reference tests/replay/bags
+	$(BIN)/python -m tests.freeze
+
+.PHONY: freeze
+freeze: dev ## Freeze them anew, after an intended change of behaviour
+	$(BIN)/python -m tests.freeze --update
+
 # Tests with wall-clock deadlines run alone, all others in three processes, since tests of nodes mostly wait.
 # Exit code 5 of pytest: no test of this part is selected.
 define run_tests

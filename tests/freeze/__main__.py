@@ -10,8 +10,11 @@ from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 from fulmar_core.paths import config_names
+from tests.freeze.benchmarks import SMALL, documents
 from tests.freeze.tables import TABLES, Rows
 
+ROBOTS = config_names("robots")
+EVERY = {name: (table, ROBOTS) for name, table in TABLES.items()} | {"benchmarks": (documents, list(SMALL))}
 FROZEN = Path(__file__).parent / "frozen"
 SHOWN = 20  # differences of a table that are printed, at most
 
@@ -20,13 +23,15 @@ def main() -> None:
     """Compute every table, and compare it with its file, or write it."""
     parser = argparse.ArgumentParser(prog="python -m tests.freeze", description=__doc__)
     parser.add_argument("--update", action="store_true", help="write what is computed now")
-    parser.add_argument("--only", nargs="+", choices=list(TABLES), default=list(TABLES), help="some tables")
-    parser.add_argument("--robots", nargs="+", default=config_names("robots"), help="some robots")
+    parser.add_argument("--only", nargs="+", choices=list(EVERY), default=list(EVERY), help="some tables")
+    parser.add_argument("--of", nargs="+", help="some robots or benchmarks; all by default")
     asked = parser.parse_args()
     differences = 0
     with ProcessPoolExecutor(os.cpu_count()) as pool:
         for table in asked.only:
-            found = dict(zip(asked.robots, pool.map(TABLES[table], asked.robots), strict=True))
+            compute, names = EVERY[table]
+            names = [name for name in names if asked.of is None or name in asked.of]
+            found = dict(zip(names, pool.map(compute, names), strict=True))
             differences += _compared(table, found, update=asked.update)
     sys.exit(1 if differences else 0)
 
@@ -36,10 +41,10 @@ def _compared(table: str, found: dict[str, Rows], *, update: bool) -> int:
     path = FROZEN / f"{table}.json"
     frozen = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
     differing = [
-        f"{robot} {row}"
-        for robot, rows in found.items()
-        for row in sorted(rows.keys() | frozen.get(robot, {}).keys())
-        if rows.get(row) != frozen.get(robot, {}).get(row)
+        f"{name} {row}"
+        for name, rows in found.items()
+        for row in sorted(rows.keys() | frozen.get(name, {}).keys())
+        if rows.get(row) != frozen.get(name, {}).get(row)
     ]
     count = sum(map(len, found.values()))
     if update:
