@@ -16,6 +16,8 @@ TARGETS = {
     "dev",
     "peers",
     "demo",
+    "freeze",
+    "freeze-check",
     "train-demo",
     "profile-step",
     "test",

@@ -47,7 +47,7 @@ def commands_late(live: LiveSystem) -> Outcome:
     """Each command comes long after its observation: nobody knows any more whether it would still be right."""
     since_s = live.until_it_moves()
     limit_s = live.silenced_s
-    live.injector.change = delayed(math.ceil((limit_s + STAYS_S / 4.0) / live.beat_s))
+    live.injector.change = delayed(limit_s + STAYS_S / 4.0)
     return stopped(live, since_s, limit_s)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import time
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -65,13 +66,14 @@ def lost(_message: Any) -> None:
     """Nothing passes."""
 
 
-def delayed(periods: int) -> Injection:
-    """Everything comes later, by so many messages."""
-    waiting: deque[Any] = deque()
+def delayed(seconds: float) -> Injection:
+    """Each message comes later by so much at least, with the first one that comes then [s]."""
+    waiting: deque[tuple[float, Any]] = deque()
 
     def change(message: Any) -> Any:
-        waiting.append(message)
-        return waiting.popleft() if len(waiting) > periods else None
+        now_s = time.monotonic()
+        waiting.append((now_s, message))
+        return waiting.popleft()[1] if now_s - waiting[0][0] >= seconds else None
 
     return change
 

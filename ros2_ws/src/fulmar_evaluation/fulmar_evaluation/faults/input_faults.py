@@ -12,6 +12,7 @@ from typing import Any
 from nav_msgs.msg import Odometry
 
 from fulmar_bags.message_reader import stamp_ns
+from fulmar_core.robot import Robot
 from fulmar_core.sensors.repetition import FROZEN_AFTER
 from fulmar_evaluation.faults.fault import STAYS_S, Fault, Outcome, stopped
 from fulmar_evaluation.faults.fault_environment import RELAYED, Injection, delayed, lost
@@ -113,7 +114,7 @@ def odometry_late(live: LiveSystem) -> Outcome:
     """
     limit_s = live.watchdog_s + live.corrected_s
     late_s = limit_s + STAYS_S + MARGIN_S
-    return intercept(live, delayed(round(late_s / live.tick_s)), live.watchdog_s)
+    return intercept(live, delayed(late_s), live.watchdog_s)
 
 
 def odometry_dated_back(live: LiveSystem) -> Outcome:
@@ -174,6 +175,11 @@ def _epoch(live: LiveSystem, since_s: float) -> tuple[str, str]:
     return (statuses[-1].values["epoch"], statuses[-1].values["mode"]) if statuses else ("", "silent")
 
 
+def _with_one_clock(robot: Robot) -> str:
+    turns = robot.actuators.turns_only
+    return "its wheels stamp what they measure by the same clock, and are not relayed" if turns else ""
+
+
 INPUT_FAULTS = (
     *(
         Fault(do, RELAYED)
@@ -188,5 +194,6 @@ INPUT_FAULTS = (
             odometry_dated_back,
         )
     ),
-    *(Fault(do, replace(RELAYED, answers_pass=True)) for do in (time_jump_forwards, time_jump_backwards)),
+    Fault(time_jump_forwards, replace(RELAYED, answers_pass=True)),
+    Fault(time_jump_backwards, replace(RELAYED, answers_pass=True), _with_one_clock),
 )

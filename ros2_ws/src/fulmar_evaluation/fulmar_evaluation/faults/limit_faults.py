@@ -39,6 +39,7 @@ from fulmar_ros.qos import publisher_qos
 TOO_MUCH = 2.0  # times the limit
 OF_EACH = 0.8  # of the limit, about each of three axes: together 1.39 of it
 OF_LIMIT, FASTEST = 0.9, 10.0  # a robot is carried off at so much of its speed limit, at most so fast [m/s]
+GENTLE = 0.3  # an aircraft at this: it climbs at the same, and must not be out of level flight by then [m/s]
 CARRIED_S = 15.0  # by then it is beyond any geofence
 MATCH_S = 10.0
 
@@ -115,7 +116,7 @@ def _with_drift(robot: Robot, velocity: np.ndarray, axis: int) -> np.ndarray:
     """A velocity in the world that also leads down an axis, as fast as a robot may be [m/s]."""
     left = (OF_LIMIT * robot.limits.speed) ** 2 - float(velocity @ velocity)
     drifting = velocity.copy()
-    drifting[axis] -= min(math.sqrt(max(left, 0.0)), FASTEST)
+    drifting[axis] -= min(math.sqrt(max(left, 0.0)), GENTLE if robot.flies else FASTEST)
     return drifting
 
 
