@@ -94,7 +94,9 @@ def test_a_spacecraft_has_every_fault_of_the_platform_but_that_of_its_air_bearin
 def test_a_satellite_lacks_what_needs_a_policy_a_place_or_a_person_and_each_has_a_reason(robot: str):
     reasons = left_out(robot)
     assert all(reasons.values())
-    needs = ("swap", "bundle", "area", "geofence", "teleop", "driver", "mocap", "bearing", "gyroscope")
+    needs = (
+        "swap", "bundle", "area", "geofence", "teleop", "driver", "mocap", "bearing", "gyroscope", "backwards",
+    )  # fmt: skip
     assert [name for name in reasons if not any(word in name for word in needs)] == []
     assert ("gyroscope_dies" in reasons) is not bool(load_robot(robot).event_cameras)
 
@@ -104,7 +106,7 @@ def test_an_aircraft_has_every_fault_of_processes_commands_and_odometry_and_the_
     reasons = left_out(robot)
     assert all(reasons.values())
     needs = (
-        "swap", "bundle", "geofence", "goal", "teleop", "driver", "mocap", "estimator", "bearing", "gyroscope",
+        "swap", "bundle", "area", "geofence", "goal", "teleop", "driver", "mocap", "estimator", "bearing", "gyroscope",
     )  # fmt: skip
     assert [name for name in reasons if not any(word in name for word in needs)] == []
     assert "goal_outside_the_area" not in reasons

@@ -61,7 +61,6 @@ ON_AN_AIRCRAFT = (  # what differs there: it flies on, by the plant's own state
     "estop_killed",
     "odometry_not_a_number",
     "odometry_late",
-    "odometry_leaves_the_area",
     "goal_outside_the_area",
     "commands_not_a_number",
     "commands_late",

@@ -39,7 +39,6 @@ from fulmar_ros.qos import publisher_qos
 TOO_MUCH = 2.0  # times the limit
 OF_EACH = 0.8  # of the limit, about each of three axes: together 1.39 of it
 OF_LIMIT, FASTEST = 0.9, 10.0  # a robot is carried off at so much of its speed limit, at most so fast [m/s]
-GENTLE = 0.3  # an aircraft at this: it climbs at the same, and must not be out of level flight by then [m/s]
 CARRIED_S = 15.0  # by then it is beyond any geofence
 MATCH_S = 10.0
 
@@ -81,43 +80,43 @@ def odometry_leaves_the_geofence(live: LiveSystem) -> Outcome:
 
 
 def _carried_off(live: LiveSystem, is_beyond: Callable[[list[float]], bool]) -> Outcome:
-    """Odometry reports a motion at a constant velocity out of its limits, which pose and twist agree on."""
+    """Odometry reports a motion out of its limits, which pose and twist agree on.
+
+    It is a constant velocity, whatever the robot does.
+    """
     axes, beyond_s = live.robot.state_type.AXES, list[float]()
     first: list[Odometry] = []
 
     def change(message: Odometry) -> None:
         first.append(copy.deepcopy(message))
         del first[1:]
-        velocity = _with_drift(live.robot, _velocity_in_world(first[0]), axes - 1)
         passed_s = 1e-9 * (stamp_ns(message.header.stamp) - stamp_ns(first[0].header.stamp))
-        begin, place, twist = (
-            first[0].pose.pose.position,
-            message.pose.pose.position,
-            message.twist.twist.linear,
-        )
-        place.x, place.y, place.z = (
-            start + passed_s * speed
-            for start, speed in zip((begin.x, begin.y, begin.z), velocity, strict=True)
-        )
+        velocity = _with_drift(live.robot, _velocity_in_world(first[0]), axes - 1)
+        place = _place(first[0]) + passed_s * velocity
+        position, twist = message.pose.pose.position, message.twist.twist.linear
+        position.x, position.y, position.z = place.tolist()
         twist.x, twist.y, twist.z = rotate_inverse(_attitude(message), velocity).tolist()
-        if not beyond_s and is_beyond([place.x, place.y, place.z][:axes]):
+        if not beyond_s and is_beyond(place.tolist()[:axes]):
             beyond_s.append(time.monotonic())
 
     live.until_it_moves()
     live.injector.change = changing(change)
     if not wait_for(lambda: bool(beyond_s), CARRIED_S):
         raise RunFailed(f"the robot was not carried beyond its limit within {CARRIED_S:g} s")
-    # What an aircraft applied in the tick of that measurement came just before it, and the next is safe already.
-    before_s = live.tick_s if live.flight is not None else 0.0
-    return stopped(live, beyond_s[0] - before_s, before_s + live.tick_s + live.corrected_s)
+    return stopped(live, beyond_s[0], live.tick_s + live.corrected_s)
 
 
 def _with_drift(robot: Robot, velocity: np.ndarray, axis: int) -> np.ndarray:
     """A velocity in the world that also leads down an axis, as fast as a robot may be [m/s]."""
     left = (OF_LIMIT * robot.limits.speed) ** 2 - float(velocity @ velocity)
     drifting = velocity.copy()
-    drifting[axis] -= min(math.sqrt(max(left, 0.0)), GENTLE if robot.flies else FASTEST)
+    drifting[axis] -= min(math.sqrt(max(left, 0.0)), FASTEST)
     return drifting
+
+
+def _place(message: Odometry) -> np.ndarray:
+    place = message.pose.pose.position
+    return np.array([place.x, place.y, place.z])
 
 
 def _velocity_in_world(message: Odometry) -> np.ndarray:
@@ -190,9 +189,10 @@ def _refusal(live: LiveSystem, since_s: float) -> str:
 def _without_place(robot: Robot) -> str:
     if robot.actuators.turns_only:
         return STAYS
-    drift_m = CARRIED_S * FASTEST
-    far = robot.flies and robot.limits.geofence > drift_m
-    return f"its geofence of {robot.limits.geofence:g} m is farther than a drift takes it" if far else ""
+    contradicts = (
+        "its controller steers against a drift, and faster odometry contradicts itself (gnss_creeps)"
+    )
+    return contradicts if robot.flies else ""
 
 
 def _without_attitude(robot: Robot) -> str:
@@ -205,7 +205,7 @@ def _without_attitude(robot: Robot) -> str:
 LIMIT_FAULTS = (
     Fault(odometry_too_fast, RELAYED),
     Fault(odometry_turns_too_fast, RELAYED),
-    Fault(odometry_leaves_the_area, replace(RELAYED, has_area=True)),
+    Fault(odometry_leaves_the_area, replace(RELAYED, has_area=True), _without_place),
     Fault(odometry_leaves_the_geofence, RELAYED, _without_place),
     Fault(goal_with_a_wrong_quaternion, why_not=_without_attitude),
     Fault(goal_outside_the_area, FaultEnvironment(has_area=True)),
