@@ -21,7 +21,7 @@ from fulmar_evaluation.faults.observer import HealthStatus, wait_for
 ESTOP_S = TIMEOUT_NS / 1e9
 PAUSE_S = 2.0
 REPORT_S = 0.5  # what a recorder said before it died has come by then
-AGAIN_S = 15.0  # for a recorder to be started again, on a busy computer
+AGAIN_S = 30.0  # for a recorder to be started again, on a busy computer
 PROBLEM_S = 10.0  # a recorder looks at its disk now and then
 
 
