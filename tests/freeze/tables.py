@@ -23,7 +23,7 @@ from fulmar_core.paths import config_names
 from fulmar_core.robot import Robot, load_robot
 from fulmar_core.simulation import BatchSimulation
 from fulmar_core.tasks import Task, load_task
-from fulmar_core.topics import CLOCK, DIAGNOSTICS, METADATA, STATUS, WIRES
+from fulmar_core.topics import AIR_BEARING, CLOCK, DIAGNOSTICS, METADATA, STATUS, WIRES
 from fulmar_evaluation.rerun.reference_bags import REFERENCES, run_reference
 from policy_server.controllers import CONTROLLERS, Choice, load_controller
 from tests.freeze.digest import digest
@@ -33,8 +33,9 @@ Rows = dict[str, str]
 SEED = 5
 WORLDS, STEPS = 4, 6  # of each batch
 USUAL = "nominal"  # scenario of laws and observations
-# What they report depends on the time of day, or names folders; a clock ticks on until its last listener is gone.
-OF_A_MOMENT = (CLOCK, DIAGNOSTICS, METADATA, STATUS)
+# What they report depends on the time of day, or names folders; a clock ticks on until its last listener is gone; how
+# often a bearing reports before the first step depends on how fast nodes start.
+OF_A_MOMENT = (AIR_BEARING, CLOCK, DIAGNOSTICS, METADATA, STATUS)
 LAWS = tuple(name for name, entry in CONTROLLERS.items() if entry.is_law)
 
 
