@@ -99,3 +99,29 @@ def test_no_thread_of_the_middleware_outlives_a_node_that_is_refused(
     found = ended(module, {**LQR, "control_hz": "-1.0"}, domain=ros_domain, folder=tmp_path)
     assert found["code"] == BAD_USAGE
     assert of_dds(found["left"]) == []
+
+
+HANGS = """
+import ctypes
+from fulmar_ros import runtime
+
+def hang(node):
+    ctypes.PyDLL(None).sleep(60)  # with Python's lock, as the middleware did
+
+runtime._destroy, runtime.DESTROYED_S = hang, 1.0
+with runtime.ros_node("hangs", print):
+    pass
+"""
+
+
+def test_a_process_whose_middleware_hangs_at_its_end_ends_with_the_place(ros_domain) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", HANGS],
+        env=ros_domain.env,
+        capture_output=True,
+        text=True,
+        timeout=30,
+        check=False,
+    )
+    assert done.returncode != 0
+    assert "in hang" in done.stderr

@@ -7,6 +7,7 @@ thread is free for signals and for the last messages of a control loop.
 from __future__ import annotations
 
 import contextlib
+import faulthandler
 import gc
 import os
 import queue
@@ -40,6 +41,8 @@ SWITCH_INTERVAL_S = 0.0005
 CUTS_SHORT = (signal.SIGINT, signal.SIGQUIT)
 ORPHANED = signal.SIGUSR1  # from the kernel, when the launcher that started us has died
 ENDS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
+DESTROYED_S = 20.0  # for a node, or the middleware, to be destroyed; sound ones take less than a second
+STANDARD_ERROR = 2
 SPIN_S = 60.0
 RCLPY = os.path.dirname(rclpy.__file__) + os.sep
 EXECUTOR = "FULMAR_EXECUTOR"  # environment variable: default, or events
@@ -96,7 +99,8 @@ def run_node(make_node: Callable[[RequestExit], Node], argv: Sequence[str] | Non
     except FulmarError as error:
         sys.stderr.write(f"{error}\n")
     finally:
-        rclpy.try_shutdown()
+        with _within(DESTROYED_S):
+            rclpy.try_shutdown()
     _collect_refused_node()
     return BAD_USAGE
 
@@ -196,7 +200,21 @@ def spinning(node: Node, on_error: Callable[[Exception], None]) -> Iterator[None
         over.set_result(None)
         thread.join(timeout=2.0)
         executor.shutdown()
-        _destroy(node)
+        with _within(DESTROYED_S):
+            _destroy(node)
+
+
+@contextlib.contextmanager
+def _within(seconds: float) -> Iterator[None]:
+    """End the process, and print its stacks, where something takes longer, such as a middleware that hangs [s].
+
+    It may hang with Python's lock, so that no signal handler and no other thread of Python could end the process.
+    """
+    faulthandler.dump_traceback_later(seconds, exit=True, file=STANDARD_ERROR)
+    try:
+        yield
+    finally:
+        faulthandler.cancel_dump_traceback_later()
 
 
 def _destroy(node: Node) -> None:
@@ -235,7 +253,8 @@ def ros_node(name: str, on_error: Callable[[Exception], None], *, namespace: str
         with spinning(node, on_error):
             yield node
     finally:
-        rclpy.try_shutdown()
+        with _within(DESTROYED_S):
+            rclpy.try_shutdown()
 
 
 def _bring_down(node: Any, exit_codes: queue.SimpleQueue[int]) -> None:

@@ -46,7 +46,7 @@ class StuckLqi(FlightLqi):
 
         Args:
             robot: One that `can_replace`.
-            task: As of `FlightLqi`.
+            task: The task that is flown; see `FlightLqi`.
             gains: Weights.
             usual: The law of the sound craft, whose models these are.
         """

@@ -208,7 +208,7 @@ def _launcher_on(live: LiveSystem, name: str, number: signal.Signals) -> tuple[s
     """Who noticed that a process was killed or stopped, and the words."""
     lost = live.said(name, "was killed" if number == signal.SIGKILL else "was stopped", "is started again")
     if not lost:
-        return "", f"nobody noticed that {name} was lost"
+        return "", f"the launcher did not report the loss of {name}"
     return "launcher", f"{lost}; control goes on"
 
 
