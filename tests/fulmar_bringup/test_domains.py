@@ -49,12 +49,3 @@ def test_a_domain_that_is_none_is_refused(monkeypatch, text):
     monkeypatch.setenv("ROS_DOMAIN_ID", text)
     with pytest.raises(ConfigError, match=f"ROS_DOMAIN_ID = '{text}' must be a whole number from 0 to 232"):
         claimed_domain("alpha").__enter__()
-
-
-def test_memory_of_nodes_that_were_killed_is_given_back_at_the_end_of_their_run(monkeypatch):
-    given = []
-    monkeypatch.setattr("fulmar_bringup.domains.give_back_abandoned_memory", lambda: given.append(1))
-    with pytest.raises(KeyboardInterrupt), claimed_domain("alpha"):
-        assert len(given) == 1
-        raise KeyboardInterrupt
-    assert len(given) == 2

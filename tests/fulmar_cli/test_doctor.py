@@ -12,7 +12,6 @@ import socket
 import subprocess
 import sys
 import tempfile
-import time
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -35,9 +34,8 @@ from fulmar_cli.diagnosis.machine import (
 from fulmar_cli.diagnosis.network import (
     check_discovery,
     check_multicast,
+    check_profile,
     check_running_robots,
-    check_shared_memory,
-    check_transports,
 )
 from fulmar_cli.diagnosis.sockets import Listener, check_sockets, listeners
 
@@ -138,40 +136,10 @@ def test_a_network_that_carries_no_multicast_is_found(before, environment, level
     assert words in finding["found"]
 
 
-def test_shared_memory_that_killed_processes_left_is_counted_and_can_be_given_back(tmp_path):
-    assert check_shared_memory(tmp_path).level == "ok"
-    for name in ("fastrtps_0123456789abcdef", "fastrtps_0123456789abcdef_el"):
-        (tmp_path / name).write_bytes(b"x")
-        os.utime(tmp_path / name, (time.time() - HOUR,) * 2)
-    finding = check_shared_memory(tmp_path)
-    assert finding.level == "advice"
-    assert "pieces left by killed processes: 1" in finding.found
-    assert len(list(tmp_path.iterdir())) == 2  # it looks, and removes nothing
-    done = subprocess.run(finding.fix.split(), capture_output=True, text=True, check=True)
-    assert done.stdout.startswith("removed ")
-
-
-def test_shared_memory_that_is_full_or_absent_is_wrong(tmp_path):
-    full, absent = check_shared_memory(tmp_path, least_bytes=10**18), check_shared_memory(tmp_path / "none")
-    assert (full.level, absent.level) == ("wrong", "wrong")
-    assert "--shm-size" in full.fix
-    assert "mount -t tmpfs" in absent.fix
-
-
-def test_shared_memory_of_several_users_or_in_a_container_is_advised_against(tmp_path):
-    marks = [tmp_path / "containerenv"]
-
-    def check(**environment):
-        return check_transports(environment, folder=tmp_path, container_marks=marks)
-
-    (tmp_path / "fastrtps_0123456789abcdef").write_bytes(b"x")
-    assert check().level == "ok"
-    marks[0].touch()
-    assert "a container" in check().found
-    os.chown(tmp_path / "fastrtps_0123456789abcdef", os.getuid() + 1, -1)
-    assert f"users {os.getuid()}, {os.getuid() + 1} share" in check().found
-    assert (check().level, check().fix.split()[1]) == ("advice", "FASTDDS_BUILTIN_TRANSPORTS=UDPv4")
-    assert check(FASTDDS_BUILTIN_TRANSPORTS="UDPv4").level == "ok"
+def test_a_profile_of_the_user_that_may_share_memory_is_named():
+    assert check_profile({}).level == "ok"
+    finding = check_profile({"FASTDDS_DEFAULT_PROFILES_FILE": "/etc/mine.xml"})
+    assert (finding.level, "/etc/mine.xml is yours" in finding.found) == ("advice", True)
 
 
 def test_sockets_that_other_hosts_can_reach_are_found_with_their_process_and_the_cause():

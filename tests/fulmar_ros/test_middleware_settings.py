@@ -10,12 +10,10 @@ from fulmar_ros import middleware
 from fulmar_ros.middleware import (
     DISCOVERY_RANGE,
     LOOPBACK,
-    LOOPBACK_UDP,
     NETWORK,
-    PEERS_UDP,
+    PEERS,
     PROFILES,
     STATIC_PEERS,
-    TRANSPORTS,
     discovery_range,
     environment_of_any_node,
     middleware_environment,
@@ -24,12 +22,12 @@ from fulmar_ros.middleware import (
     strangers_can_send,
 )
 
-SUBNET, PEERS, UDP = {DISCOVERY_RANGE: "SUBNET"}, {STATIC_PEERS: "10.0.0.2"}, {TRANSPORTS: "UDPv4"}
+SUBNET, PEER = {DISCOVERY_RANGE: "SUBNET"}, {STATIC_PEERS: "10.0.0.2"}
 
 
 @pytest.fixture
 def environment(monkeypatch):
-    for name in (DISCOVERY_RANGE, STATIC_PEERS, TRANSPORTS, *PROFILES):
+    for name in (DISCOVERY_RANGE, STATIC_PEERS, *PROFILES):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setattr(middleware, "_loaded", [])
     return monkeypatch
@@ -41,11 +39,9 @@ def environment(monkeypatch):
         ({}, LOOPBACK, False),
         ({DISCOVERY_RANGE: "LOCALHOST"}, LOOPBACK, False),
         ({DISCOVERY_RANGE: "OFF"}, LOOPBACK, False),
-        (UDP, LOOPBACK_UDP, False),
         (SUBNET, NETWORK, False),
-        (SUBNET | UDP | PEERS, NETWORK, False),
-        (PEERS, NETWORK, True),
-        (PEERS | UDP, PEERS_UDP, True),
+        (SUBNET | PEER, NETWORK, False),
+        (PEER, PEERS, True),
     ],
 )
 def test_nodes_listen_on_the_network_only_where_range_or_peers_ask_for_it(variables, profile, filtered):
@@ -64,9 +60,7 @@ def test_the_profile_follows_a_range_that_changed_since_a_parent_chose_it(enviro
     ("variables", "read"),
     [
         ({}, "SYSTEM_DEFAULT"),
-        (UDP, "SYSTEM_DEFAULT"),
-        (PEERS | UDP, "SUBNET"),
-        (PEERS, "LOCALHOST"),
+        (PEER, "SUBNET"),
         (SUBNET, "SUBNET"),
     ],
 )
@@ -99,11 +93,9 @@ def test_rclpy_leaves_the_transports_to_a_profile_that_is_bound_to_loopback_alon
     assert seen() == "SYSTEM_DEFAULT LOCALHOST"
     environment.setenv(STATIC_PEERS, "10.0.0.2")
     assert seen() == "LOCALHOST LOCALHOST"
-    environment.setenv(TRANSPORTS, "UDPv4")
-    environment.setattr(middleware, "_loaded", [str(PEERS_UDP)])
+    environment.setattr(middleware, "_loaded", [str(PEERS)])
     assert seen() == "SUBNET LOCALHOST"
     environment.delenv(STATIC_PEERS)
-    environment.delenv(TRANSPORTS)
     environment.setattr(middleware, "_loaded", [str(NETWORK)])  # of this process, and read but once
     assert seen() == "LOCALHOST LOCALHOST"
 
@@ -120,4 +112,12 @@ def test_the_profiles_differ_in_their_transports_only():
                     parent.remove(child)
         return [(element.tag, element.attrib, (element.text or "").strip()) for element in root.iter()]
 
-    assert rest(NETWORK) == rest(LOOPBACK) == rest(LOOPBACK_UDP) == rest(PEERS_UDP)
+    assert rest(NETWORK) == rest(LOOPBACK) == rest(PEERS)
+
+
+@pytest.mark.parametrize("path", sorted(middleware.OWN_PROFILES))
+def test_nodes_share_no_memory_in_which_one_that_dies_could_block_the_others(path):
+    found = {
+        element.tag.rpartition("}")[2]: element.text for element in ElementTree.parse(path).getroot().iter()
+    }
+    assert (found["useBuiltinTransports"], found["type"]) == ("false", "UDPv4")

@@ -33,22 +33,6 @@ def usual_umask():
     os.umask(before)
 
 
-SPEAKER = """
-import os, sys
-from pathlib import Path
-from rclpy.node import Node
-from fulmar_ros.private_memory import _segments
-from fulmar_ros.runtime import init_ros, spinning
-
-init_ros()
-node = Node("speaker")
-with spinning(node, print):
-    assert _segments(), "this middleware shares no memory"
-    print(max(os.stat(path).st_mode & 0o077 for path in _segments()))
-os._exit(0)
-"""
-
-
 def test_a_stricter_umask_stays(usual_umask):
     os.umask(0o177)
     keep_private()
@@ -60,10 +44,3 @@ def test_files_and_folders_of_a_node_have_no_rights_for_others(ros_domain, usual
     subprocess.run([sys.executable, "-c", MAKER, str(folder)], check=True, timeout=60)
     assert folder.stat().st_mode & 0o777 == 0o700
     assert (folder / "file").stat().st_mode & 0o777 == 0o600
-
-
-def test_messages_in_shared_memory_are_read_by_no_other_user(ros_domain, usual_umask):
-    done = subprocess.run(
-        [sys.executable, "-c", SPEAKER], check=True, timeout=60, capture_output=True, text=True
-    )
-    assert done.stdout.strip() == "0"

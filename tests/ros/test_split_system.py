@@ -15,7 +15,7 @@ from fulmar_core.errors import BAD_USAGE, DONE, FAILED
 from fulmar_core.safety.watchdog import default_timeout
 from fulmar_core.topics import ACTUATORS_STATE
 from fulmar_evaluation.faults.two_hosts import TwoHosts, inside, two_hosts
-from fulmar_ros.middleware import STATIC_PEERS, TRANSPORTS, UDP_ONLY
+from fulmar_ros.middleware import STATIC_PEERS
 from fulmar_ros.qos import subscriber_qos
 from fulmar_ros.runtime import ros_node
 from tests.conftest import RosDomain
@@ -26,8 +26,8 @@ from tests.ros.split_parts import Part, in_container
 pytestmark = [pytest.mark.slow, pytest.mark.real_time]
 SYSTEM = "mujoco_lqr"
 PERIOD_S = 1.0 / 50.0  # of the system's commands
-PEER_OF_ROBOT = {TRANSPORTS: UDP_ONLY, STATIC_PEERS: "10.77.0.2"}  # the documented settings of two hosts
-PEER_OF_OTHER = {TRANSPORTS: UDP_ONLY, STATIC_PEERS: "10.77.0.1"}
+PEER_OF_ROBOT = {STATIC_PEERS: "10.77.0.2"}  # the documented settings of two hosts
+PEER_OF_OTHER = {STATIC_PEERS: "10.77.0.1"}
 ANSWER_S = 0.25  # after the limit: the state is published each tick, and this computer is busy
 
 

@@ -15,8 +15,6 @@ from fulmar_ros.middleware import (
     DISCOVERY_RANGE,
     PROFILES,
     STATIC_PEERS,
-    TRANSPORTS,
-    UDP_ONLY,
     environment_of_any_node,
 )
 from tests.conftest import RosDomain
@@ -77,7 +75,7 @@ def hosts() -> Iterator[TwoHosts]:
 
 def environment(domain: RosDomain, **more: str) -> dict[str, str]:
     """An environment in which nothing is set of discovery but what is given."""
-    mine = {DISCOVERY_RANGE, STATIC_PEERS, TRANSPORTS, *PROFILES}
+    mine = {DISCOVERY_RANGE, STATIC_PEERS, *PROFILES}
     return {name: value for name, value in domain.env.items() if name not in mine} | more
 
 
@@ -97,7 +95,11 @@ def victim(hosts: TwoHosts, env: dict[str, str], code: str = VICTIM) -> Iterator
 
 def received_from_the_other_host(hosts: TwoHosts, domain: RosDomain, **of_robot: str) -> str:
     """Names of the wires on which a stranger's messages arrive, who knows the robot's address."""
-    attacker = environment(domain) | {DISCOVERY_RANGE: "SUBNET", STATIC_PEERS: ROBOT, TRANSPORTS: UDP_ONLY}
+    attacker = environment(domain) | {
+        DISCOVERY_RANGE: "SUBNET",
+        STATIC_PEERS: ROBOT,
+        "FASTDDS_BUILTIN_TRANSPORTS": "UDPv4",
+    }
     command = in_container(hosts.other, attack(PLAIN), other_user=False)
     return received(hosts, command, attacker, environment(domain, **of_robot))
 
@@ -122,28 +124,26 @@ def test_nothing_of_another_host_arrives_with_default_settings(
 
 def test_every_host_of_the_network_is_received_with_subnet(hosts: TwoHosts, ros_domain: RosDomain) -> None:
     """The attack works: the tests beside this one can fail."""
-    open_to_all = {DISCOVERY_RANGE: "SUBNET", TRANSPORTS: UDP_ONLY}
+    open_to_all = {DISCOVERY_RANGE: "SUBNET"}
     assert received_from_the_other_host(hosts, ros_domain, **open_to_all) == ALL
 
 
 def test_a_container_of_another_user_on_the_own_host_is_received_without_opening_the_network(
     hosts: TwoHosts, ros_domain: RosDomain
 ) -> None:
-    """By UDP on loopback, since the two share no memory."""
-    udp = environment(ros_domain) | {TRANSPORTS: UDP_ONLY}
+    """The two share no memory."""
+    env = environment(ros_domain)
     logs = {"ROS_LOG_DIR": "/tmp", "HOME": "/tmp"}
     command = in_container(hosts.robot, attack(OURS), other_user=True)
-    assert received(hosts, command, udp | logs, udp) == ALL
+    assert received(hosts, command, env | logs, env) == ALL
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("transport", [{}, {TRANSPORTS: UDP_ONLY}], ids=["memory_and_udp", "udp"])
 @pytest.mark.parametrize(("peer", "arrives"), [(STRANGER, ALL), ("10.77.0.9", "")])
 def test_with_a_static_peer_that_host_is_received_and_no_other(
-    hosts: TwoHosts, ros_domain: RosDomain, peer: str, arrives: str, transport: dict[str, str]
+    hosts: TwoHosts, ros_domain: RosDomain, peer: str, arrives: str
 ) -> None:
-    of_robot = {STATIC_PEERS: peer, **transport}
-    assert received_from_the_other_host(hosts, ros_domain, **of_robot) == arrives
+    assert received_from_the_other_host(hosts, ros_domain, **{STATIC_PEERS: peer}) == arrives
 
 
 @pytest.mark.parametrize(

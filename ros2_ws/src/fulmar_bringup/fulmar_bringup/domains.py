@@ -11,7 +11,6 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TextIO
 
-from fulmar_bringup.shared_memory_cleanup import give_back_abandoned_memory
 from fulmar_core.errors import ConfigError
 
 
@@ -80,11 +79,7 @@ def claimed_domain(name: str, part: str = "") -> Iterator[int]:
                 f"another `fulmar run` is using ROS domain {domain} for '{own}', and two of one name would mix. "
                 "Wait for it to end, give this robot another --name, or set ROS_DOMAIN_ID to another number."
             )
-        give_back_abandoned_memory()
-        try:
-            yield domain
-        finally:  # of nodes that were killed meanwhile
-            give_back_abandoned_memory()
+        yield domain
 
 
 @contextlib.contextmanager

@@ -9,22 +9,17 @@ from pathlib import Path
 
 DISCOVERY_RANGE, STATIC_PEERS = "ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_STATIC_PEERS"
 OWN_HOST = "LOCALHOST"  # the range where the environment says nothing
-TRANSPORTS, UDP_ONLY = (
-    "FASTDDS_BUILTIN_TRANSPORTS",
-    "UDPv4",
-)  # between containers or users: without shared memory
 # Jazzy's name of the file, and that of later ones.
 PROFILES = ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE")
-# All announce nodes early, and resend lost messages early. Two of them listen on 127.0.0.1 alone.
+# All announce nodes early, and resend lost messages early. Those of loopback listen on 127.0.0.1 alone.
 NETWORK = Path(__file__).with_name("fast_dds.xml")
+PEERS = Path(__file__).with_name("fast_dds_peers.xml")
 LOOPBACK = Path(__file__).with_name("fast_dds_loopback.xml")
-LOOPBACK_UDP = Path(__file__).with_name("fast_dds_loopback_udp.xml")
-PEERS_UDP = Path(__file__).with_name("fast_dds_peers_udp.xml")
-OWN_PROFILES = {str(profile) for profile in (NETWORK, LOOPBACK, LOOPBACK_UDP, PEERS_UDP)}
-# With LOCALHOST rmw_fastrtps adds transports of its own to those of a profile: they send on every interface, and
-# deliver through shared memory, twice or where there is none. These profiles have all that is needed: they go with
-# ranges at which rmw adds nothing, or, at SUBNET, the static peers alone.
-RANGE_OF = {str(LOOPBACK): "SYSTEM_DEFAULT", str(LOOPBACK_UDP): "SYSTEM_DEFAULT", str(PEERS_UDP): "SUBNET"}
+OWN_PROFILES = {str(profile) for profile in (NETWORK, PEERS, LOOPBACK)}
+# With LOCALHOST rmw_fastrtps adds transports of its own to those of a profile: shared memory, and one that sends on
+# every interface. These profiles have all that is needed: they go with ranges at which rmw adds nothing, or, at SUBNET,
+# the static peers alone.
+RANGE_OF = {str(LOOPBACK): "SYSTEM_DEFAULT", str(PEERS): "SUBNET"}
 _loaded: list[str] = []  # the profile of this process; Fast DDS reads it once
 
 
@@ -46,13 +41,10 @@ def foreign_profile(environment: Mapping[str, str]) -> str:
 
 
 def own_profile(environment: Mapping[str, str]) -> Path:
-    """The profile for the range, peers and transports of an environment."""
+    """The profile for the range and peers of an environment."""
     if discovery_range(environment) not in (OWN_HOST, "OFF"):
         return NETWORK
-    by_udp = environment.get(TRANSPORTS) == UDP_ONLY
-    if static_peers(environment):
-        return PEERS_UDP if by_udp else NETWORK
-    return LOOPBACK_UDP if by_udp else LOOPBACK
+    return PEERS if static_peers(environment) else LOOPBACK
 
 
 def middleware_environment(environment: Mapping[str, str] | None = None) -> dict[str, str]:

@@ -31,8 +31,8 @@ from fulmar_core.process import LAUNCHER_PID, end_with
 from fulmar_core.yielding import take_place
 from fulmar_ros.middleware import range_for_rclpy, set_up_middleware, static_peers, strangers_can_send
 from fulmar_ros.peer_filter import PeerFilter
-from fulmar_ros.private_memory import PRIVATE, keep_memory_private
 
+PRIVATE = 0o077  # rights that group and others do not get
 # A thread that waits for the interpreter gets it after this long; Python's own 5 ms is a lot of 20 ms.
 SWITCH_INTERVAL_S = 0.0005
 
@@ -177,7 +177,6 @@ def spinning(node: Node, on_error: Callable[[Exception], None]) -> Iterator[None
         node: The node.
         on_error: Called in that thread with what a callback raised; no further callback is served then.
     """
-    keep_memory_private()
     executor, over = _executor(), Future()
     executor.add_node(node)
 

@@ -14,7 +14,7 @@ MARK = "# Written by `fulmar service install`; `fulmar service remove` removes i
 # Of the environment of the one who installs: where nodes find each other, and own files.
 PASSED = (
     "ROS_DOMAIN_ID", "ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_STATIC_PEERS", "RMW_IMPLEMENTATION",
-    "FASTDDS_BUILTIN_TRANSPORTS", "FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE",
+    "FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE",
     "ROS_SECURITY_ENABLE", "ROS_SECURITY_STRATEGY", "ROS_SECURITY_KEYSTORE", "FULMAR_CONFIGS", "FULMAR_CALIBRATION",
 )  # fmt: skip
 # The same where ROS is sourced, which sets the first; ROS from wheels finds its own places.
@@ -36,7 +36,7 @@ StartLimitBurst={failures}
 [Service]
 Type=exec
 User={user}
-{groups}{environment}# Bags, logs and the shared memory of nodes are read by this user alone.
+{groups}{environment}# Bags and logs are read by this user alone.
 UMask=0077
 StateDirectory={state}
 StateDirectoryMode=0700
@@ -60,7 +60,7 @@ LimitMEMLOCK=infinity
 StandardOutput=journal
 StandardError=journal
 SyslogIdentifier=fulmar-{name}
-# /dev, /dev/shm and /tmp stay: devices, shared memory of Fast DDS, and the record of used ROS domains.
+# /dev, /dev/shm and /tmp stay: devices, semaphores, and the record of used ROS domains.
 NoNewPrivileges=yes
 ProtectSystem=strict
 ReadWritePaths=/tmp /dev/shm

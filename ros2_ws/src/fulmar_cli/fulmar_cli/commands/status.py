@@ -49,8 +49,7 @@ def status(
         domain = os.environ.get("ROS_DOMAIN_ID") or "0"
         console.print(
             f"no {what} is found in ROS domain {domain} within {timeout:g} s. Check ROS_DOMAIN_ID and "
-            "ROS_AUTOMATIC_DISCOVERY_RANGE; between hosts also ROS_STATIC_PEERS, between containers "
-            "FASTDDS_BUILTIN_TRANSPORTS.",
+            "ROS_AUTOMATIC_DISCOVERY_RANGE; between hosts also ROS_STATIC_PEERS.",
             markup=False, soft_wrap=True,
         )  # fmt: skip
     for robot in robots if not as_json else ():

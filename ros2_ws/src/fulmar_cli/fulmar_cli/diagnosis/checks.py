@@ -27,10 +27,9 @@ from fulmar_cli.diagnosis.machine import (
 from fulmar_cli.diagnosis.network import (
     check_discovery,
     check_multicast,
+    check_profile,
     check_round_trip,
     check_running_robots,
-    check_shared_memory,
-    check_transports,
 )
 from fulmar_cli.diagnosis.sockets import check_sockets
 
@@ -63,8 +62,7 @@ def diagnose(purpose: str | None = None, name: str | None = None) -> list[Findin
         check_policies,
         partial(check_discovery, environment, hardware=hardware),
         partial(check_multicast, environment),
-        check_shared_memory,
-        partial(check_transports, environment),
+        partial(check_profile, environment),
         partial(check_sockets, environment),
         check_round_trip,
         check_running_robots,

@@ -2,26 +2,16 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
-import shutil
 import socket
-import sys
-from collections.abc import Mapping, Sequence
-from pathlib import Path
+from collections.abc import Mapping
 
 from fulmar_bringup.domains import DOMAINS, LARGEST
-from fulmar_bringup.shared_memory_cleanup import (
-    SHARED_MEMORY,
-    count_abandoned_memory,
-    give_back_abandoned_memory,
-)
 from fulmar_cli.diagnosis.check_result import Finding
 from fulmar_ros.middleware import (
     DISCOVERY_RANGE,
+    PROFILES,
     STATIC_PEERS,
-    TRANSPORTS,
-    UDP_ONLY,
     discovery_range,
     foreign_profile,
     static_peers,
@@ -31,8 +21,6 @@ from fulmar_ros.middleware import OWN_HOST as OURS
 RANGES = ("SUBNET", "LOCALHOST", "OFF", "SYSTEM_DEFAULT")
 GROUP = "239.255.0.1"  # of DDS discovery (OMG DDSI-RTPS 2.5, 9.6.2)
 LOOPBACK = "127.0.0.1"
-CONTAINER_MARKS = (Path("/.dockerenv"), Path("/run/.containerenv"))  # files of Docker and of Podman
-FREE_BYTES = 64_000_000  # of shared memory: Fast DDS takes half a megabyte for each process
 ROS_FIX = (
     "sudo ip link set lo up && ROS_DOMAIN_ID=77 fulmar doctor   # without loopback, or in a domain in use"
 )
@@ -119,58 +107,15 @@ def _without_multicast(found: str, timeout_s: float) -> Finding:
     return Finding("multicast", "advice", found, fix)
 
 
-def check_shared_memory(folder: Path = SHARED_MEMORY, *, least_bytes: int = FREE_BYTES) -> Finding:
-    """Whether Fast DDS has room in shared memory, and whether killed processes have left some behind.
-
-    Args:
-        folder: Where it lies.
-        least_bytes: What has to be free [bytes].
-    """
-    what, clean = "shared memory", f"{sys.executable} -m {give_back_abandoned_memory.__module__}"
-    if not folder.is_dir() or not os.access(folder, os.W_OK | os.X_OK):
-        mount = f"sudo mkdir -p {folder} && sudo mount -t tmpfs -o mode=1777 tmpfs {folder}"
-        return Finding(what, "wrong", f"{folder} cannot be written", mount)
-    free, left = shutil.disk_usage(folder).free, count_abandoned_memory(folder)
-    found = f"{free / 1e6:,.0f} MB free in {folder}" + (
-        f"; pieces left by killed processes: {left}" if left else ""
+def check_profile(environment: Mapping[str, str]) -> Finding:
+    """Whether a Fast DDS profile of the user's own may let the nodes share memory, see fast_dds.xml."""
+    path = foreign_profile(environment)
+    if not path:
+        return Finding("profile", "ok", "nodes speak by UDP")
+    found = f"{path} is yours: in shared memory a node that dies or hangs can block the others for 2 s"
+    return Finding(
+        "profile", "advice", found, f"unset {' '.join(PROFILES)}   # or useBuiltinTransports=false in it"
     )
-    if free < least_bytes:
-        grow = f"sudo mount -o remount,size=50% {folder}   # in a container: docker run --shm-size=1g"
-        return Finding(what, "wrong", found, clean if left else grow)
-    return Finding(what, "advice" if left else "ok", found, clean if left else "")
-
-
-def check_transports(
-    environment: Mapping[str, str],
-    *,
-    folder: Path = SHARED_MEMORY,
-    container_marks: Sequence[Path] = CONTAINER_MARKS,
-) -> Finding:
-    """Whether shared memory could lose messages between users or containers; Fast DDS reports no such loss.
-
-    Args:
-        environment: Environment of the nodes.
-        folder: Where shared memory lies.
-        container_marks: Files that exist in a container alone.
-    """
-    what, chosen = "transports", environment.get(TRANSPORTS, "")
-    if foreign_profile(environment):
-        return Finding(what, "ok", "a Fast DDS profile of your own decides")
-    if chosen == UDP_ONLY:
-        return Finding(what, "ok", f"{TRANSPORTS}={chosen}")
-    owners = set()
-    for file in folder.glob("fastrtps_*"):
-        with contextlib.suppress(OSError):  # its process has just ended
-            owners.add(file.stat().st_uid)
-    fix = f"export {TRANSPORTS}={UDP_ONLY}   # for every node of the robot"
-    if len(owners | {os.getuid()}) > 1:
-        users = ", ".join(map(str, sorted(owners | {os.getuid()})))
-        found = f"users {users} share {folder}: messages between them are lost in it"
-        return Finding(what, "advice", found, fix)
-    if any(mark.exists() for mark in container_marks):
-        found = "a container: messages to nodes outside are lost, unless they share network, IPC and user"
-        return Finding(what, "advice", found, fix)
-    return Finding(what, "ok", f"{TRANSPORTS}={chosen}" if chosen else "shared memory and UDP")
 
 
 def check_round_trip(timeout_s: float = 5.0) -> Finding:

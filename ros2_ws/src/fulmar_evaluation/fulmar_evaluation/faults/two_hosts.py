@@ -25,7 +25,7 @@ from pathlib import Path
 
 from fulmar_core.errors import RunFailed
 from fulmar_core.process import PLANT_PRIORITY, take_priority
-from fulmar_ros.middleware import DISCOVERY_RANGE, TRANSPORTS, UDP_ONLY
+from fulmar_ros.middleware import DISCOVERY_RANGE
 
 TUN = Path("/dev/net/tun")
 TUNSETIFF, IFF_TAP, IFF_NO_PI = 0x400454CA, 0x0002, 0x1000  # linux/if_tun.h
@@ -33,8 +33,7 @@ CLONE_NEWNET = 0x40000000  # linux/sched.h
 NETNS = Path("/run/netns")  # where `ip netns` keeps them
 FRAME = 65536
 LOOK_S = 0.05  # how soon the cable notices that it shall end
-# What processes on them need in their environment: those of one machine else find each other's memory, past any cable.
-ACROSS = {DISCOVERY_RANGE: "SUBNET", TRANSPORTS: UDP_ONLY}
+ACROSS = {DISCOVERY_RANGE: "SUBNET"}  # what processes on them need in their environment
 _numbers = itertools.count()
 
 
