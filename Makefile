@@ -150,6 +150,10 @@ freeze-check: dev ## Compare gains, commands, observations, batches, runs and be
 	$(BIN)/fulmar bag reference tests/replay/bags
 	$(BIN)/python -m tests.freeze
 
+.PHONY: rooms
+rooms: dev ## Print the rooms of the core, and which folders import each other
+	$(BIN)/python -m tests.architecture.rooms
+
 .PHONY: freeze
 freeze: dev ## Freeze them anew, after an intended change of behaviour
 	$(BIN)/python -m tests.freeze --update

@@ -16,9 +16,9 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float32MultiArray
 from std_srvs.srv import SetBool
 
-from fulmar_core.errors import BAD_USAGE, ConfigError
-from fulmar_core.robot import load_robot
-from fulmar_core.topics import VELOCITY_COMMAND, command_wire
+from fulmar_core.config.errors import BAD_USAGE, ConfigError
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.robots.topics import VELOCITY_COMMAND, command_wire
 from fulmar_ros.air_bearing import SERVICE
 from fulmar_ros.convert import TwistWriter, VectorWriter
 from fulmar_ros.foreign_topics import VALVE_MESSAGES, valve_values

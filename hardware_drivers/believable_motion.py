@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from fulmar_core.robot import Limits
+from fulmar_core.robots.robot import Limits
 from fulmar_core.safety.input_gate import JUMP_M, InputGate, Measurement
-from fulmar_core.state import RigidBodyState
+from fulmar_core.states.state import RigidBodyState
 
 
 def unbelievable(

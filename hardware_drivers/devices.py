@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from fulmar_core.errors import ConfigError
-from fulmar_core.robot import Robot
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.robots.robot import Robot
 from hardware_drivers.driver_backend import DriverBackend, backend_of
 from hardware_drivers.hardware import Hardware
 from hardware_drivers.settings import (

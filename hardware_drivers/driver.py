@@ -7,7 +7,7 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
-from fulmar_core.robot import Robot
+from fulmar_core.robots.robot import Robot
 from hardware_drivers.feedback import Report
 
 

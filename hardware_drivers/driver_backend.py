@@ -7,12 +7,12 @@ import time
 
 import numpy as np
 
-from fulmar_core.actuators.refuge import slowdown
-from fulmar_core.backend import AirBearing, Sample
-from fulmar_core.episode import Episode
-from fulmar_core.errors import DeviceError
-from fulmar_core.planar import PlanarState
-from fulmar_core.robot import Robot
+from fulmar_core.config.errors import DeviceError
+from fulmar_core.robots.actuators.refuge import slowdown
+from fulmar_core.robots.robot import Robot
+from fulmar_core.simulation.backend import AirBearing, Sample
+from fulmar_core.simulation.episode import Episode
+from fulmar_core.states.planar import PlanarState
 from hardware_drivers.driver import Answering, DeviceDriver, Halting
 
 STOPS = 5  # the safe command goes out this often: one may be lost

@@ -9,9 +9,9 @@ import numpy as np
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from rclpy.publisher import Publisher
 
-from fulmar_core.backend import Backend
-from fulmar_core.errors import ConfigError
-from fulmar_core.robot import Robot
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.robots.robot import Robot
+from fulmar_core.simulation.backend import Backend
 from fulmar_ros.foreign_topics import thrust_sender, valve_sender, velocity_sender
 from fulmar_ros.parameters import own_frames
 from fulmar_ros.plant_node import DONE, PlantNode

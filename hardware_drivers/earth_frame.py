@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from fulmar_core.attitude import euler_of
-from fulmar_core.rotation import from_yaw, multiply
+from fulmar_core.states.attitude import euler_of
+from fulmar_core.states.rotation import from_yaw, multiply
 
 # WGS 84.
 EQUATOR_M = 6378137.0

@@ -7,10 +7,10 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from fulmar_core.errors import DeviceError
-from fulmar_core.sensors.imu import ImuSample
-from fulmar_core.sensors.reading import Reading
-from fulmar_core.state import RigidBodyState
+from fulmar_core.config.errors import DeviceError
+from fulmar_core.robots.sensors.imu import ImuSample
+from fulmar_core.states.state import RigidBodyState
+from fulmar_core.wires.reading import Reading
 
 
 @dataclass(frozen=True)

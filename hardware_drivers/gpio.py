@@ -12,7 +12,7 @@ from typing import Any, Protocol
 import gpiod
 from gpiod.line import Direction, Value
 
-from fulmar_core.errors import DeviceError
+from fulmar_core.config.errors import DeviceError
 
 CONSUMER = "fulmar"
 RETRY_S = 0.1

@@ -5,12 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from fulmar_core.actuators.family import Actuators
-from fulmar_core.config import load_config
-from fulmar_core.errors import ConfigError
-from fulmar_core.paths import config_names, config_path
-from fulmar_core.robot import Robot, load_robot
-from fulmar_core.spatial import SpatialState
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.config.paths import config_names, config_path
+from fulmar_core.config.strict_yaml import load_config
+from fulmar_core.robots.actuators.family import Actuators
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.states.spatial import SpatialState
 from hardware_drivers.settings import (
     Driver,
     GpioValves,

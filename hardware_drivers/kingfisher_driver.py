@@ -8,9 +8,9 @@ import time
 
 import numpy as np
 
-from fulmar_core.robot import Robot
-from fulmar_core.sensors.imu import ImuSample
-from fulmar_core.state import RigidBodyState
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.sensors.imu import ImuSample
+from fulmar_core.states.state import RigidBodyState
 from hardware_drivers import kingfisher_protocol as protocol
 from hardware_drivers.driver import DeviceDriver
 from hardware_drivers.earth_frame import LocalFrame, attitude

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fulmar_core.sensors.imu import ImuSample
+from fulmar_core.robots.sensors.imu import ImuSample
 from hardware_drivers.wiring import bounded
 
 GRAVITY = 9.80665  # [m/s²]; the recorded boat reports accelerations in multiples of it, with z down

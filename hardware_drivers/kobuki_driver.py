@@ -8,9 +8,9 @@ import time
 
 import numpy as np
 
-from fulmar_core.actuators.differential_drive import DifferentialDrive
-from fulmar_core.robot import Robot
-from fulmar_core.sensors.imu import ImuSample
+from fulmar_core.robots.actuators.differential_drive import DifferentialDrive
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.sensors.imu import ImuSample
 from hardware_drivers.driver import DeviceDriver
 from hardware_drivers.feedback import DeviceTime, Feedback, Report
 from hardware_drivers.kobuki_protocol import (

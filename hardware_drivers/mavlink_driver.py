@@ -10,8 +10,8 @@ from collections.abc import Callable
 import numpy as np
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from fulmar_core.errors import DeviceError
-from fulmar_core.robot import Robot
+from fulmar_core.config.errors import DeviceError
+from fulmar_core.robots.robot import Robot
 from hardware_drivers.driver import DeviceDriver
 from hardware_drivers.feedback import Feedback, Report
 from hardware_drivers.mavlink_autopilot import ERROR, MANUAL, Autopilot

@@ -8,7 +8,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from fulmar_core.errors import DeviceError
+from fulmar_core.config.errors import DeviceError
 from hardware_drivers.mavlink_address import place_of
 from hardware_drivers.mavlink_signing import GOOD, OLD, Signatures, ticks_now
 from hardware_drivers.ports import Port, SerialPort, TcpPort, UdpListener, UdpPort, patiently

@@ -14,7 +14,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from fulmar_core.errors import ConfigError
+from fulmar_core.config.errors import ConfigError
 
 KEY_BYTES = 32
 LARGEST_FILE = 200  # of a key: 64 digits and some white space [bytes]

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_core.sensors.imu import ImuSample
-from fulmar_core.state import RigidBodyState
+from fulmar_core.robots.sensors.imu import ImuSample
+from fulmar_core.states.state import RigidBodyState
 from hardware_drivers.earth_frame import attitude
 from hardware_drivers.feedback import DeviceTime, Report
 

@@ -7,12 +7,12 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from fulmar_core.actuators.differential_drive import DifferentialDrive
-from fulmar_core.errors import ConfigError, DeviceError, FulmarError, did_you_mean, shortened
-from fulmar_core.own_class import construct, load_class, one_line
-from fulmar_core.robot import Robot
-from fulmar_core.sensors.reading import Reading
-from fulmar_core.sensors.table import SENSORS
+from fulmar_core.config.errors import ConfigError, DeviceError, FulmarError, did_you_mean, shortened
+from fulmar_core.config.own_class import construct, load_class, one_line
+from fulmar_core.robots.actuators.differential_drive import DifferentialDrive
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.sensors.table import SENSORS
+from fulmar_core.wires.reading import Reading
 from hardware_drivers.driver import MEMBERS, Answering, DeviceDriver
 from hardware_drivers.driver_backend import DriverBackend, backend_of
 from hardware_drivers.feedback import Report

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from fulmar_core.robot import Limits
+from fulmar_core.robots.robot import Limits
 from hardware_drivers.believable_motion import unbelievable
 from hardware_drivers.feedback import Feedback, Report
 

@@ -12,7 +12,7 @@ from typing import Protocol, TypeVar
 
 import serial
 
-from fulmar_core.errors import ConfigError, DeviceError
+from fulmar_core.config.errors import ConfigError, DeviceError
 
 T = TypeVar("T")
 READ_S = 0.05  # longest wait of the reading thread, and so of `stop`

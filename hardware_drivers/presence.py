@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from glob import glob
 from pathlib import Path
 
-from fulmar_core.errors import DeviceError
+from fulmar_core.config.errors import DeviceError
 from hardware_drivers.gpio import FILE_CHIP, line_of
 from hardware_drivers.settings import (
     Driver,

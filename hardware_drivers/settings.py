@@ -6,9 +6,9 @@ import math
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal
 
-from fulmar_core.config import Named
-from fulmar_core.errors import ConfigError
-from fulmar_core.own_class import check_class_path
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.config.own_class import check_class_path
+from fulmar_core.config.strict_yaml import Named
 from hardware_drivers.mavlink_address import place_of
 from hardware_drivers.valves import VALVE_ORDERS
 from hardware_drivers.wiring import AS_NAMED, check_wiring

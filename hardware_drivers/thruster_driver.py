@@ -8,7 +8,7 @@ import time
 import numpy as np
 from gpiod.line import Value
 
-from fulmar_core.robot import Robot
+from fulmar_core.robots.robot import Robot
 from hardware_drivers.driver import DeviceDriver
 from hardware_drivers.gpio import LineRequest, line_of, output_lines
 from hardware_drivers.settings import GpioValves

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fulmar_core.errors import DeviceError
+from fulmar_core.config.errors import DeviceError
 from hardware_drivers.driver import DeviceDriver
 from hardware_drivers.driver_backend import STOP_PERIOD_S, STOPS
 

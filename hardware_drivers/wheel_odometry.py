@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from fulmar_core.planar import PlanarState
-from fulmar_core.rotation import wrap_angle
-from fulmar_core.state import RigidBodyState
+from fulmar_core.states.planar import PlanarState
+from fulmar_core.states.rotation import wrap_angle
+from fulmar_core.states.state import RigidBodyState
 
 COUNTS = 1 << 16  # encoders count up to here and begin again
 LONGEST_GAP_S = 0.5  # the speed after a longer gap is zero

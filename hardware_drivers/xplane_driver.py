@@ -8,12 +8,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fulmar_core.actuators.control_surfaces import ControlSurfaces
-from fulmar_core.errors import DeviceError
-from fulmar_core.robot import Robot
-from fulmar_core.sensors.air_data import NAME as AIR_DATA
-from fulmar_core.sensors.air_data import AirData
-from fulmar_core.sensors.reading import Reading
+from fulmar_core.config.errors import DeviceError
+from fulmar_core.robots.actuators.control_surfaces import ControlSurfaces
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.sensors.air_data import NAME as AIR_DATA
+from fulmar_core.robots.sensors.air_data import AirData
+from fulmar_core.wires.reading import Reading
 from hardware_drivers.believable_motion import unbelievable
 from hardware_drivers.driver import DeviceDriver
 from hardware_drivers.earth_frame import LocalFrame

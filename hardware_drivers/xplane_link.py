@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import time
 
-from fulmar_core.errors import DeviceError
+from fulmar_core.config.errors import DeviceError
 from hardware_drivers.ports import Reader, open_port
 from hardware_drivers.xplane_messages import AskPosition, Message, Position, Values
 from hardware_drivers.xplane_pause import Pause

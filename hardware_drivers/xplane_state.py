@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fulmar_core.rotation import from_yaw, multiply, rotate, rotate_inverse
-from fulmar_core.sensors.air_data import AirData, AirDataSpec
-from fulmar_core.sensors.imu import ImuSample
-from fulmar_core.state import RigidBodyState
+from fulmar_core.robots.sensors.air_data import AirData, AirDataSpec
+from fulmar_core.robots.sensors.imu import ImuSample
+from fulmar_core.states.rotation import from_yaw, multiply, rotate, rotate_inverse
+from fulmar_core.states.state import RigidBodyState
 from hardware_drivers.earth_frame import LocalFrame, attitude, sailed_angles
 from hardware_drivers.xplane_messages import Position, Values
 from hardware_drivers.xplane_protocol import MalformedError

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import sys
 
-from fulmar_core.controller_settings import ControllerSettings
 from fulmar_core.controllers.controller import Controller
-from fulmar_core.robot import Robot
+from fulmar_core.loop.controller_settings import ControllerSettings
+from fulmar_core.robots.robot import Robot
 from fulmar_core.tasks import Task
 from fulmar_ros.controller_node import ControllerNode
 from fulmar_ros.runtime import run_node

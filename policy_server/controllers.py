@@ -11,15 +11,15 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
+from fulmar_core.config.errors import BundleError, ConfigError, UnknownNameError
+from fulmar_core.config.own_class import is_own, load_class
 from fulmar_core.controllers.classical import LAWS, check_pair, families_of, load_classical
 from fulmar_core.controllers.controller import Controller
 from fulmar_core.controllers.excite import Excite, excite_of, excite_tasks
-from fulmar_core.errors import BundleError, ConfigError, UnknownNameError
-from fulmar_core.goal_files import load_torques
-from fulmar_core.own_class import is_own, load_class
-from fulmar_core.policy_bundle import PASSPORT, read_passport
-from fulmar_core.robot import Robot
+from fulmar_core.loop.policy_bundle import PASSPORT, read_passport
+from fulmar_core.robots.robot import Robot
 from fulmar_core.tasks import Task
+from fulmar_core.tasks.goal_files import load_torques
 from policy_server.own_controller import MEMBERS, OwnController
 
 EXTERNAL = "external"  # any node that publishes the robot's commands

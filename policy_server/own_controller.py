@@ -13,11 +13,11 @@ from typing import Any
 
 import numpy as np
 
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.config.own_class import construct, load_class, settings_beside, source_of
 from fulmar_core.controllers.controller import Inputs
-from fulmar_core.errors import ConfigError
-from fulmar_core.health.filters import HealthSettings
-from fulmar_core.own_class import construct, load_class, settings_beside, source_of
-from fulmar_core.robot import Robot
+from fulmar_core.estimators.actuator_health.filters import HealthSettings
+from fulmar_core.robots.robot import Robot
 from fulmar_core.tasks import Task
 
 MEMBERS = ("reset", "act")

@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 import onnxruntime
 
-from fulmar_core.bundle_signature import verify_bundle
+from fulmar_core.config.errors import BundleError
 from fulmar_core.controllers.controller import Inputs
 from fulmar_core.controllers.disturbance_inputs import ESTIMATOR, with_disturbances
-from fulmar_core.errors import BundleError
-from fulmar_core.observation import Observer
-from fulmar_core.policy_bundle import (
+from fulmar_core.loop.bundle_signature import verify_bundle
+from fulmar_core.loop.policy_bundle import (
     GOLDEN,
     NETWORK,
     Bundle,
@@ -24,8 +23,9 @@ from fulmar_core.policy_bundle import (
     read_bundle,
     takes_disturbances,
 )
-from fulmar_core.robot import Robot
+from fulmar_core.robots.robot import Robot
 from fulmar_core.tasks import Task
+from fulmar_core.tasks.observation import Observer
 from policy_server.inference import open_network
 
 # Of the logits: float32 sums in another order on another processor differ by about 1e-6.

@@ -19,14 +19,15 @@ from rclpy.publisher import Publisher
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float32MultiArray
 
-from fulmar_core.backend import Backend, Sample
-from fulmar_core.disturbances.scenario import Scenario, load_scenario
-from fulmar_core.errors import FAILED, ConfigError, UnknownNameError
-from fulmar_core.process import PLANT_PRIORITY, take_priority, take_priority_with_helpers
-from fulmar_core.robot import Robot, load_robot
-from fulmar_core.state import RigidBodyState
+from fulmar_core.config.errors import FAILED, ConfigError, UnknownNameError
+from fulmar_core.config.process import PLANT_PRIORITY, take_priority, take_priority_with_helpers
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.robots.topics import DEVICE_STATE, MOCAP, ODOMETRY, TRUTH
+from fulmar_core.simulation.backend import Backend, Sample
+from fulmar_core.states.state import RigidBodyState
 from fulmar_core.tasks import load_task
-from fulmar_core.topics import DEVICE_STATE, MOCAP, ODOMETRY, TRUTH
+from fulmar_core.worlds.scenario import Scenario, load_scenario
 from fulmar_ros.convert import OdometryWriter, PoseWriter, VectorWriter
 from fulmar_ros.deadline import Deadlines
 from fulmar_ros.foreign_topics import VALVE_MESSAGES

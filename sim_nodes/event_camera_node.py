@@ -17,13 +17,13 @@ from rclpy.publisher import Publisher
 from sensor_msgs.msg import PointCloud2
 
 from fulmar_bags.message_reader import stamp_ns
-from fulmar_core.attitude import rotation_error
-from fulmar_core.errors import ConfigError
-from fulmar_core.robot import load_robot
-from fulmar_core.sensors.ranges import attitude_problem
-from fulmar_core.sky.catalogue import load_stars
-from fulmar_core.sky.event_sensor import EventSensor
-from fulmar_core.topics import EVENTS, EVENTS_2, TRUTH
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.dynamics.sky.event_sensor import EventSensor
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.robots.sensors.catalogue import load_stars
+from fulmar_core.robots.sensors.ranges import attitude_problem
+from fulmar_core.robots.topics import EVENTS, EVENTS_2, TRUTH
+from fulmar_core.states.attitude import rotation_error
 from fulmar_ros.event_packets import cloud_of_events
 from fulmar_ros.lockstep_answer import LockstepAnswer
 from fulmar_ros.operator_subscription import subscribe_every

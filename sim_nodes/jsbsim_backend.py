@@ -12,21 +12,21 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_core.attitude import Quaternion, euler_of, from_euler, minus, product, turn, turn_back
-from fulmar_core.backend import Sample
-from fulmar_core.disturbances.scenario import Scenario, sensors_in
-from fulmar_core.episode import Episode
-from fulmar_core.errors import SafetyError
-from fulmar_core.flight.dynamics import FlightDynamics, flipped
-from fulmar_core.flight.turbulence import Gust
-from fulmar_core.motion import surface_positions_of
-from fulmar_core.robot import Robot
-from fulmar_core.sensors.kind import Truth
-from fulmar_core.sensors.reading import Reading
-from fulmar_core.sensors.simulated import SimulatedSensors
-from fulmar_core.spatial import SpatialState
-from fulmar_core.state import RigidBodyState
+from fulmar_core.config.errors import SafetyError
+from fulmar_core.dynamics.flight_dynamics import FlightDynamics, flipped
+from fulmar_core.dynamics.motion import surface_positions_of
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.sensors.kind import Truth
+from fulmar_core.robots.sensors.simulated import SimulatedSensors
+from fulmar_core.simulation.backend import Sample
+from fulmar_core.simulation.episode import Episode
+from fulmar_core.states.attitude import Quaternion, euler_of, from_euler, minus, product, turn, turn_back
+from fulmar_core.states.spatial import SpatialState
+from fulmar_core.states.state import RigidBodyState
 from fulmar_core.tasks import Task
+from fulmar_core.wires.reading import Reading
+from fulmar_core.worlds.scenario import Scenario, sensors_in
+from fulmar_core.worlds.turbulence import Gust
 from sim_nodes.jsbsim_craft import STEPS, ExportedCraft, JsbsimCraft
 from sim_nodes.jsbsim_model import FOOT, POUND, RADIUS_M
 from sim_nodes.jsbsim_own_craft import OwnCraft

@@ -9,8 +9,8 @@ from typing import Protocol
 import jsbsim
 import numpy as np
 
-from fulmar_core.errors import ConfigError
-from fulmar_core.robot import Robot
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.robots.robot import Robot
 from sim_nodes.jsbsim_model import STILL_PLANET, write_aircraft
 
 STEPS = 4  # of JSBSim in a physics tick

@@ -11,14 +11,14 @@ import math
 from pathlib import Path
 from xml.etree import ElementTree as Xml
 
-from fulmar_core.actuators.control_surfaces import ControlSurfaces
-from fulmar_core.dynamics.hydrodynamics import GRAVITY
-from fulmar_core.flight.airframe import SLOWEST, Airframe
-from fulmar_core.flight.coefficients import NAMES, SURFACES, Coefficients, Curve
-from fulmar_core.flight.ground_effect import HIGHEST, LOWEST
-from fulmar_core.flight.propulsion import SLOWEST as SLOWEST_PISTON
-from fulmar_core.flight.propulsion import ElectricMotor
-from fulmar_core.robot import Robot
+from fulmar_core.robots.actuators.control_surfaces import ControlSurfaces
+from fulmar_core.robots.airframe.airframe import SLOWEST, Airframe
+from fulmar_core.robots.airframe.coefficients import NAMES, SURFACES, Coefficients, Curve
+from fulmar_core.robots.airframe.ground_effect import HIGHEST, LOWEST
+from fulmar_core.robots.airframe.propulsion import SLOWEST as SLOWEST_PISTON
+from fulmar_core.robots.airframe.propulsion import ElectricMotor
+from fulmar_core.robots.robot import Robot
+from fulmar_core.states.gravity import GRAVITY
 
 FOOT, POUND, SLUG_FT3 = 0.3048, 4.4482216152605, 515.378818393  # [m], [N], [kg/m³]
 SLUG = POUND / FOOT  # [kg]
@@ -165,7 +165,7 @@ def _curve(curve: Curve, zero: float) -> Node:
 
 
 def _add_ground_effect(out: Node, frame: Airframe) -> None:
-    """`near_ground` of `flight.ground_effect`, formula for formula."""
+    """`near_ground` of `robots.airframe.ground_effect`, formula for formula."""
     effect = frame.ground_effect
     if effect is None:
         out.append(_function("fulmar/CL", _get("fulmar/CL-free")))
@@ -281,7 +281,7 @@ def write_aircraft(robot: Robot, folder: Path) -> Path:
     Raises:
         ConfigError: The robot is no aircraft.
     """
-    from fulmar_core.errors import ConfigError
+    from fulmar_core.config.errors import ConfigError
 
     if not robot.flies:
         raise ConfigError(f"'{robot.name}' is no aircraft, and JSBSim flies nothing else.")

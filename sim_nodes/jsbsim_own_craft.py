@@ -17,10 +17,10 @@ from xml.etree import ElementTree as Xml
 import jsbsim
 import numpy as np
 
-from fulmar_core.actuators.control_surfaces import ControlSurfaces
-from fulmar_core.errors import ConfigError, did_you_mean
-from fulmar_core.flight.trim import FREE_AIR, Trim, find_trim
-from fulmar_core.robot import Robot
+from fulmar_core.config.errors import ConfigError, did_you_mean
+from fulmar_core.dynamics.flight_trim import FREE_AIR, Trim, find_trim
+from fulmar_core.robots.actuators.control_surfaces import ControlSurfaces
+from fulmar_core.robots.robot import Robot
 from sim_nodes.jsbsim_craft import STEPS, model_in
 from sim_nodes.jsbsim_model import FOOT, SLUG
 

@@ -6,18 +6,18 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_core.backend import Sample
-from fulmar_core.episode import Episode
-from fulmar_core.flight.dynamics import FlightDynamics
-from fulmar_core.motion import surface_positions_of, wheel_speeds_of
-from fulmar_core.robot import Robot
-from fulmar_core.sensors.air_data import AirData
-from fulmar_core.sensors.kind import Truth
-from fulmar_core.sensors.reading import Reading
-from fulmar_core.sensors.simulated import SimulatedSensors
-from fulmar_core.spatial import SpatialState
-from fulmar_core.state import State
-from fulmar_core.things import Poses, Thing
+from fulmar_core.dynamics.flight_dynamics import FlightDynamics
+from fulmar_core.dynamics.motion import surface_positions_of, wheel_speeds_of
+from fulmar_core.dynamics.things import Poses, Thing
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.sensors.air_data import AirData
+from fulmar_core.robots.sensors.kind import Truth
+from fulmar_core.robots.sensors.simulated import SimulatedSensors
+from fulmar_core.simulation.backend import Sample
+from fulmar_core.simulation.episode import Episode
+from fulmar_core.states.spatial import SpatialState
+from fulmar_core.states.state import State
+from fulmar_core.wires.reading import Reading
 from sim_nodes.one_world import OneWorld
 
 

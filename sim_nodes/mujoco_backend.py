@@ -8,17 +8,17 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from fulmar_core.backend import Sample
-from fulmar_core.disturbances.scenario import Scenario, sensors_in
-from fulmar_core.episode import Episode
-from fulmar_core.errors import SafetyError
-from fulmar_core.robot import Robot
-from fulmar_core.sensors.kind import Truth
-from fulmar_core.sensors.reading import Reading
-from fulmar_core.sensors.simulated import SimulatedSensors
-from fulmar_core.state import RigidBodyState
+from fulmar_core.config.errors import SafetyError
+from fulmar_core.dynamics.things import Thing
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.sensors.kind import Truth
+from fulmar_core.robots.sensors.simulated import SimulatedSensors
+from fulmar_core.simulation.backend import Sample
+from fulmar_core.simulation.episode import Episode
+from fulmar_core.states.state import RigidBodyState
 from fulmar_core.tasks import Task
-from fulmar_core.things import Thing
+from fulmar_core.wires.reading import Reading
+from fulmar_core.worlds.scenario import Scenario, sensors_in
 from sim_nodes.mujoco_model import Scene
 from sim_nodes.mujoco_model.aircraft import Aircraft
 from sim_nodes.mujoco_model.objects import radii_for

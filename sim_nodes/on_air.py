@@ -8,9 +8,9 @@ from typing import Protocol
 
 import numpy as np
 
-from fulmar_core.backend import Backend, Sample
-from fulmar_core.disturbances.scenario import Scenario, bearing_late_s
-from fulmar_core.episode import Episode
+from fulmar_core.simulation.backend import Backend, Sample
+from fulmar_core.simulation.episode import Episode
+from fulmar_core.worlds.scenario import Scenario, bearing_late_s
 
 
 class CanStand(Backend, Protocol):

@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_core.counter_rng import uniform_from, words, world_keys
-from fulmar_core.dynamics_of import dynamics_of
-from fulmar_core.episode import Episode
-from fulmar_core.motion import actuation_of
-from fulmar_core.robot import Robot
-from fulmar_core.simulation import ACTUATOR_NOISE
-from fulmar_core.state import RigidBodyState
+from fulmar_core.dynamics.dynamics_of import dynamics_of
+from fulmar_core.dynamics.motion import actuation_of
+from fulmar_core.robots.robot import Robot
+from fulmar_core.simulation.episode import Episode
+from fulmar_core.simulation.simulation import ACTUATOR_NOISE
+from fulmar_core.states.counter_rng import uniform_from, words, world_keys
+from fulmar_core.states.state import RigidBodyState
 
 
 class OneWorld:

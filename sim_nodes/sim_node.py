@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import sys
 
-from fulmar_core.backend import Backend
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.errors import UnknownNameError
-from fulmar_core.flight.jsbsim_models import JSBSIM, is_jsbsim, jsbsim_model
-from fulmar_core.robot import Robot
+from fulmar_core.config.errors import UnknownNameError
+from fulmar_core.robots.jsbsim_models import JSBSIM, is_jsbsim, jsbsim_model
+from fulmar_core.robots.robot import Robot
+from fulmar_core.simulation.backend import Backend
 from fulmar_core.tasks import load_task
+from fulmar_core.worlds.scenario import load_scenario
 from fulmar_ros.plant_node import PlantNode
 from fulmar_ros.plant_settings import PlantSettings
 from fulmar_ros.runtime import run_node

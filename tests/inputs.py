@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 
 from fulmar_core.controllers.controller import Inputs
-from fulmar_core.goal import Goal, goal_in_float64
-from fulmar_core.health.actuator_estimator import ActuatorEstimate
-from fulmar_core.observation import Observer
-from fulmar_core.robot import Robot
-from fulmar_core.simulation import BatchSimulation
-from fulmar_core.state import State
+from fulmar_core.estimators.actuator_health.actuator_estimator import ActuatorEstimate
+from fulmar_core.robots.robot import Robot
+from fulmar_core.simulation.simulation import BatchSimulation
+from fulmar_core.states.state import State
 from fulmar_core.tasks import Task
+from fulmar_core.tasks.goal import Goal, goal_in_float64
+from fulmar_core.tasks.observation import Observer
 
 
 def inputs_at(

@@ -7,21 +7,21 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from fulmar_core.attitude import rotation_error
-from fulmar_core.control_loop import ControlLoop
 from fulmar_core.controllers.classical import load_classical
 from fulmar_core.controllers.excite import excite_of
-from fulmar_core.disturbances.scenario import load_scenario, sensors_in
-from fulmar_core.estimation.kinds import make_estimator
-from fulmar_core.estimation.reading_check import reading_problem
-from fulmar_core.robot import load_robot
-from fulmar_core.sensors.kind import Truth
-from fulmar_core.sensors.reading import Reading
-from fulmar_core.sensors.simulated import SimulatedSensors
-from fulmar_core.sensors.wheels import WheelSpeeds
-from fulmar_core.simulation import BatchSimulation
-from fulmar_core.spatial import SpatialState
+from fulmar_core.estimators.kinds import make_estimator
+from fulmar_core.estimators.motion.reading_check import reading_problem
+from fulmar_core.loop.control_loop import ControlLoop
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.robots.sensors.kind import Truth
+from fulmar_core.robots.sensors.simulated import SimulatedSensors
+from fulmar_core.robots.sensors.wheels import WheelSpeeds
+from fulmar_core.simulation.simulation import BatchSimulation
+from fulmar_core.states.attitude import rotation_error
+from fulmar_core.states.spatial import SpatialState
 from fulmar_core.tasks import load_task
+from fulmar_core.wires.reading import Reading
+from fulmar_core.worlds.scenario import load_scenario, sensors_in
 
 TICK_NS = 50_000_000  # as plants measure, twice in a control step
 BEGIN_NS = 1_000_000_000_000

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from fulmar_core.disturbances.scenario import Scenario, load_scenario
-from fulmar_core.paths import config_names
-from fulmar_core.robot import load_robot
-from fulmar_core.simulation import BatchSimulation
+from fulmar_core.config.paths import config_names
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.simulation.simulation import BatchSimulation
 from fulmar_core.tasks import load_task
+from fulmar_core.worlds.scenario import Scenario, load_scenario
 from tests.spaces import task_for
 
 ROBOTS = {name: load_robot(name) for name in config_names("robots")}

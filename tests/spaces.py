@@ -7,12 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_core.actuators.pushing import PLANAR, Pushing
-from fulmar_core.planar import PlanarState
-from fulmar_core.robot import Robot, load_robot
-from fulmar_core.state import State
+from fulmar_core.loop.teleop import OUT_OF_PLANE
+from fulmar_core.robots.actuators.pushing import PLANAR, Pushing
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.states.planar import PlanarState
+from fulmar_core.states.state import State
 from fulmar_core.tasks import Task, load_task
-from fulmar_core.teleop import OUT_OF_PLANE
 
 SPACECRAFT = load_robot("spacecraft_16")
 SATELLITE = load_robot("cubesat_wheels")

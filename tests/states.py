@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from fulmar_core.goal import Goal
-from fulmar_core.planar import PlanarState
-from fulmar_core.state import RigidBodyState
+from fulmar_core.states.planar import PlanarState
+from fulmar_core.states.state import RigidBodyState
 from fulmar_core.tasks import Task
+from fulmar_core.tasks.goal import Goal
 
 
 def planar_state(

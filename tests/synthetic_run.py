@@ -12,19 +12,20 @@ import numpy as np
 
 from fulmar_bags.message_types import type_store
 from fulmar_bags.writer import BagWriter
-from fulmar_core.control_loop import ControlLoop
 from fulmar_core.controllers.classical import load_classical
 from fulmar_core.controllers.controller import Controller
 from fulmar_core.controllers.lqr import Lqr, LqrWeights
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.goal import Goal, goal_at, goal_in_float64
-from fulmar_core.planar import PlanarState, at_rest
-from fulmar_core.robot import Robot, load_robot
-from fulmar_core.rotation import rotate_inverse
-from fulmar_core.simulation import BatchSimulation
-from fulmar_core.state import RigidBodyState
+from fulmar_core.loop.control_loop import ControlLoop
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.robots.topics import VELOCITY_COMMAND, WIRES, Wire, command_wire
+from fulmar_core.simulation.simulation import BatchSimulation
+from fulmar_core.states.planar import PlanarState, at_rest
+from fulmar_core.states.rotation import rotate_inverse
+from fulmar_core.states.state import RigidBodyState
 from fulmar_core.tasks import Task, load_task
-from fulmar_core.topics import VELOCITY_COMMAND, WIRES, Wire, command_wire
+from fulmar_core.tasks.goal import Goal, goal_at, goal_in_float64
+from fulmar_core.worlds.scenario import load_scenario
 from policy_server.controllers import EXTERNAL
 
 ROBOT = "floating_platform"

@@ -9,13 +9,14 @@ from pathlib import Path
 
 import numpy as np
 
-from fulmar_core.attitude import Vector, from_euler, rotation_error, scaled, turn_back
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.goal import Goal, goals_at
-from fulmar_core.robot import Robot, load_robot
-from fulmar_core.simulation import BatchSimulation
-from fulmar_core.spatial import SpatialState, quat_of
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.simulation.simulation import BatchSimulation
+from fulmar_core.states.attitude import Vector, from_euler, rotation_error, scaled, turn_back
+from fulmar_core.states.spatial import SpatialState, quat_of
 from fulmar_core.tasks import load_task
+from fulmar_core.tasks.goal import Goal, goals_at
+from fulmar_core.worlds.scenario import load_scenario
 from tests.synthetic_run import EPOCH_NS, LATENCY_NS, NS, RunMessages
 
 ROBOT = "spacecraft_16"

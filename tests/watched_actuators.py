@@ -8,21 +8,22 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_core.backend import Sample
-from fulmar_core.control_loop import ControlLoop
 from fulmar_core.controllers.controller import Controller
-from fulmar_core.disturbances.parts import Stuck
-from fulmar_core.disturbances.scenario import Scenario, load_scenario
-from fulmar_core.episode import draw_episodes
-from fulmar_core.goal import goal_in_float64
-from fulmar_core.health.applied import AppliedHistory
-from fulmar_core.health.fault_monitor import FaultMonitor
-from fulmar_core.health.losses import Losses
-from fulmar_core.robot import Robot, load_robot
+from fulmar_core.estimators.actuator_health.applied import AppliedHistory
+from fulmar_core.estimators.actuator_health.fault_monitor import FaultMonitor
+from fulmar_core.estimators.actuator_health.losses import Losses
+from fulmar_core.loop.control_loop import ControlLoop
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.safety.convergence import ConvergenceMonitor
-from fulmar_core.simulation import BatchSimulation
-from fulmar_core.state import RigidBodyState
+from fulmar_core.simulation.backend import Sample
+from fulmar_core.simulation.episode import draw_episodes
+from fulmar_core.simulation.simulation import BatchSimulation
+from fulmar_core.states.state import RigidBodyState
 from fulmar_core.tasks import Task, load_task
+from fulmar_core.tasks.goal import goal_in_float64
+from fulmar_core.worlds.parts import Stuck
+from fulmar_core.worlds.scenario import Scenario, load_scenario
 from policy_server.controllers import Choice, load_controller
 
 PARTS = ("position_in_world", "quat_xyzw", "velocity_in_world", "angular_velocity_in_body")

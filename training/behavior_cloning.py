@@ -15,12 +15,12 @@ import numpy as np
 import torch
 from torch.nn.utils import clip_grad_norm_
 
+from fulmar_core.config.errors import ConfigError
 from fulmar_core.controllers.classical import load_classical
 from fulmar_core.controllers.disturbance_inputs import PUSH_TERMS
 from fulmar_core.controllers.law import Law
 from fulmar_core.controllers.lqr import Lqr
 from fulmar_core.controllers.wrench_choice import WrenchChoice
-from fulmar_core.errors import ConfigError
 from training.fast_ppo import FastPPO, rows
 from training.vec_env import BatchVecEnv
 

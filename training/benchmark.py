@@ -8,8 +8,8 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-from fulmar_core.errors import ConfigError
-from fulmar_core.robot import load_robot
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.tasks import load_task
 from training.executors import Executor, Watch
 from training.jobs import Job, Outcome

@@ -17,8 +17,8 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
 from stable_baselines3.common.vec_env import VecNormalize
 
-from fulmar_core.atomic_write import whole_file
-from fulmar_core.errors import ConfigError
+from fulmar_core.config.atomic_write import whole_file
+from fulmar_core.config.errors import ConfigError
 from training.learners import learner_class
 from training.settings import Algorithm
 from training.vec_env import BatchVecEnv

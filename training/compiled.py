@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 import torch
 
-from fulmar_core.learning_step import observed_step
-from fulmar_core.rotation import Array
-from fulmar_core.simulation import BatchSimulation
+from fulmar_core.simulation.learning_step import observed_step
+from fulmar_core.simulation.simulation import BatchSimulation
+from fulmar_core.states.rotation import Array
 from training.kernel import (
     ASKED,
     EFFORT,

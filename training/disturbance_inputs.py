@@ -1,7 +1,7 @@
 """Pushes and dead valves as network inputs in training: the truth, as late as the estimator would report it.
 
-The estimator itself (`fulmar_core.health.actuator_estimator`) costs as much as the physics; it is used wherever a
-network is evaluated or deployed.
+The estimator itself (`fulmar_core.estimators.actuator_health.actuator_estimator`) costs as much as the physics; it
+is used wherever a network is evaluated or deployed.
 """
 
 from __future__ import annotations
@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_core.robot import Robot
-from fulmar_core.simulation import BatchSimulation
+from fulmar_core.robots.robot import Robot
+from fulmar_core.simulation.simulation import BatchSimulation
 
 LEARNED = 0.35  # share of the unknown part of a push that one step reveals, the estimator's average [-]
 ERROR = np.array([0.01, 0.01, 0.002])  # standard deviation of a known push [N, N, N·m]

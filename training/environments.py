@@ -10,13 +10,14 @@ from typing import Any
 
 import gymnasium
 
-from fulmar_core.disturbances.scenario import Scenario, load_scenario
-from fulmar_core.paths import config_names
-from fulmar_core.planar import PlanarState
-from fulmar_core.robot import Robot, load_robot
-from fulmar_core.spatial import SpatialState
-from fulmar_core.state import State
+from fulmar_core.config.paths import config_names
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.states.planar import PlanarState
+from fulmar_core.states.spatial import SpatialState
+from fulmar_core.states.state import State
 from fulmar_core.tasks import Task, load_task
+from fulmar_core.worlds.scenario import Scenario, load_scenario
 from training.gym_env import TaskEnv, TaskVectorEnv
 
 DEFAULT_ROBOTS: dict[type[State], str] = {PlanarState: "floating_platform", SpatialState: "spacecraft_16"}

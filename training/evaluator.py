@@ -7,12 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from fulmar_core.disturbances.scenario import Scenario, load_scenario
-from fulmar_core.metrics import summary
-from fulmar_core.robot import Robot, load_robot
-from fulmar_core.rollout import roll_out_in_backends, roll_out_in_batch
-from fulmar_core.seeds import EVALUATION_SEED, HELD_OUT_SEED
+from fulmar_core.config.seeds import EVALUATION_SEED, HELD_OUT_SEED
+from fulmar_core.loop.rollout import roll_out_in_backends, roll_out_in_batch
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.simulation.metrics import summary
 from fulmar_core.tasks import Task, load_task
+from fulmar_core.worlds.scenario import Scenario, load_scenario
 from training.network import DeployedNetwork, NetworkController, load_network
 from training.run_folder import NETWORK_FILE, read_run_record, write_run_record
 

@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
-from fulmar_core.errors import ConfigError, FulmarError
+from fulmar_core.config.errors import ConfigError, FulmarError
 from training.jobs import Job, Outcome, read_progress, run_job
 from training.run_folder import read_run_record
 

@@ -11,17 +11,18 @@ import numpy as np
 import onnx
 import torch
 
-from fulmar_core.control_loop import ControlLoop
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.config.seeds import HELD_OUT_SEED
 from fulmar_core.controllers.disturbance_inputs import disturbance_terms, with_disturbances
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.errors import ConfigError
-from fulmar_core.goal import goal_in_float64
-from fulmar_core.observation import Observer
-from fulmar_core.policy_bundle import FORMAT, Golden, Passport, action_of, write_bundle
-from fulmar_core.robot import Robot, load_robot
-from fulmar_core.seeds import HELD_OUT_SEED
-from fulmar_core.simulation import BatchSimulation
+from fulmar_core.loop.control_loop import ControlLoop
+from fulmar_core.loop.policy_bundle import FORMAT, Golden, Passport, action_of, write_bundle
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.simulation.simulation import BatchSimulation
 from fulmar_core.tasks import Task, load_task
+from fulmar_core.tasks.goal import goal_in_float64
+from fulmar_core.tasks.observation import Observer
+from fulmar_core.worlds.scenario import load_scenario
 from training.golden_limits import with_limits
 from training.network import DeployedNetwork, NetworkController, load_network
 from training.run_folder import NETWORK_FILE, read_run_record

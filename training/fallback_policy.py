@@ -12,11 +12,11 @@ from pathlib import Path
 
 import numpy as np
 
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.errors import ConfigError
-from fulmar_core.holdability import uncontrollable_losses
-from fulmar_core.robot import Robot
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.robots.robot import Robot
 from fulmar_core.tasks import Task
+from fulmar_core.worlds.holdability import uncontrollable_losses
+from fulmar_core.worlds.scenario import load_scenario
 from training.network import DeployedNetwork, load_network
 from training.run_folder import NETWORK_FILE
 from training.settings import TrainingSettings, load_training_settings

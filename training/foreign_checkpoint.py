@@ -17,9 +17,9 @@ import onnx
 import torch
 from torch import nn
 
-from fulmar_core import yaml_text
-from fulmar_core.bounded_file import CONFIG_BYTES, IMPORTED_BYTES, check_unpacked, read_bounded
-from fulmar_core.errors import ConfigError, did_you_mean
+from fulmar_core.config import yaml_text
+from fulmar_core.config.bounded_file import CONFIG_BYTES, IMPORTED_BYTES, check_unpacked, read_bounded
+from fulmar_core.config.errors import ConfigError, did_you_mean
 from training.onnx_graph import Graph, Tensor
 
 Format = Literal["skrl", "rl_games", "onnx"]

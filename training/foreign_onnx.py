@@ -9,9 +9,9 @@ import onnx
 import onnxruntime
 from onnx import compose, version_converter
 
-from fulmar_core.bounded_file import read_bounded
-from fulmar_core.errors import ConfigError
-from fulmar_core.policy_bundle import MAX_BYTES
+from fulmar_core.config.bounded_file import read_bounded
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.loop.policy_bundle import MAX_BYTES
 from training.onnx_graph import IR_VERSION, OLDEST_OPSET, OPSET, ROWS, Graph, Tensor, open_model
 
 

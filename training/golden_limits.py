@@ -7,7 +7,7 @@ from dataclasses import fields
 
 import numpy as np
 
-from fulmar_core.policy_bundle import Action, Golden
+from fulmar_core.loop.policy_bundle import Action, Golden
 
 Infer = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray]]
 STRETCHES = (1.0, -1.0, 2.0, -2.0, 5.0, -5.0)  # of observations: farther away, faster, on the other side

@@ -12,11 +12,11 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
-from fulmar_core.disturbances.scenario import Scenario
-from fulmar_core.errors import ConfigError
-from fulmar_core.robot import Robot
-from fulmar_core.simulation import BatchSimulation
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.robots.robot import Robot
+from fulmar_core.simulation.simulation import BatchSimulation
 from fulmar_core.tasks import Task
+from fulmar_core.worlds.scenario import Scenario
 from training.worlds import Worlds, actuator_space, observation_space
 
 Infos = dict[str, Any]

@@ -10,15 +10,16 @@ import numpy as np
 import onnx
 import torch
 
-from fulmar_core.bounded_file import IMPORTED_BYTES, read_bounded
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.errors import ConfigError
-from fulmar_core.observation import Observer
-from fulmar_core.policy_bundle import FORMAT, PASSPORT, Golden, Passport, action_of, write_bundle
-from fulmar_core.robot import Robot, load_robot
-from fulmar_core.seeds import HELD_OUT_SEED
-from fulmar_core.simulation import BatchSimulation
+from fulmar_core.config.bounded_file import IMPORTED_BYTES, read_bounded
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.config.seeds import HELD_OUT_SEED
+from fulmar_core.loop.policy_bundle import FORMAT, PASSPORT, Golden, Passport, action_of, write_bundle
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.simulation.simulation import BatchSimulation
 from fulmar_core.tasks import Task, load_task
+from fulmar_core.tasks.observation import Observer
+from fulmar_core.worlds.scenario import load_scenario
 from training.foreign_checkpoint import Activations, FeedForward, Format, find_activations, read_checkpoint
 from training.foreign_onnx import ForeignOnnx
 from training.golden_limits import with_limits

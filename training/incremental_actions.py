@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from fulmar_core.errors import ConfigError
-from fulmar_core.robot import Robot
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.robots.robot import Robot
 
 KINDS = 3  # of actions of one actuator: astern, hold and ahead; the policy numbers them 0, 1 and 2
 

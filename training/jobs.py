@@ -9,9 +9,10 @@ from typing import Any
 
 from stable_baselines3.common.logger import KVWriter
 
-from fulmar_core.calibration import calibration_path
-from fulmar_core.errors import ConfigError
-from fulmar_core.robot import Robot, load_robot
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.robots.calibration import calibration_path
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.tasks import Task, load_task
 from training.fallback_policy import FallbackPolicy, fallback_settings, load_fallback
 from training.progress import Watcher, progress_file

@@ -13,12 +13,12 @@ from typing import Any
 import torch
 from torch.fx.experimental.proxy_tensor import make_fx
 
-from fulmar_core.disturbances.world import Drawn
-from fulmar_core.errors import ConfigError
-from fulmar_core.goal import Goal
-from fulmar_core.learning_step import observed_step
-from fulmar_core.simulation import BatchSimulation
-from fulmar_core.state import State
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.simulation.learning_step import observed_step
+from fulmar_core.simulation.simulation import BatchSimulation
+from fulmar_core.states.state import State
+from fulmar_core.tasks.goal import Goal
+from fulmar_core.worlds.world import Drawn
 
 # Parts beside the mutable state: the command, and the cost of the actuators' effort.
 ASKED, EFFORT = "asked", "effort"

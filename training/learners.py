@@ -14,9 +14,9 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.noise import NormalActionNoise, VectorizedActionNoise
 from stable_baselines3.common.vec_env import VecEnv
 
-from fulmar_core.counter_rng import Draws
-from fulmar_core.flight.trim import find_trim
-from fulmar_core.robot import Robot
+from fulmar_core.dynamics.flight_trim import find_trim
+from fulmar_core.robots.robot import Robot
+from fulmar_core.states.counter_rng import Draws
 from fulmar_core.tasks import Task
 from training.behavior_cloning import BehaviorCloningPPO
 from training.fast_ppo import FastPPO

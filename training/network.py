@@ -12,15 +12,15 @@ import numpy as np
 import torch
 from torch import nn
 
+from fulmar_core.config.errors import ConfigError
 from fulmar_core.controllers.controller import Inputs
 from fulmar_core.controllers.disturbance_inputs import ESTIMATOR, with_disturbances
 from fulmar_core.controllers.wrench_choice import WRENCH, WrenchChoice
-from fulmar_core.errors import ConfigError
-from fulmar_core.observation import Observer
-from fulmar_core.robot import Robot
-from fulmar_core.rotation import Array
-from fulmar_core.symmetry import Mirror
+from fulmar_core.robots.robot import Robot
+from fulmar_core.simulation.symmetry import Mirror
+from fulmar_core.states.rotation import Array
 from fulmar_core.tasks import Task
+from fulmar_core.tasks.observation import Observer
 from training.incremental_actions import KINDS, incremental_shares
 
 Decision = Literal["threshold", "clamp", "squash", "choose", "increment"]

@@ -11,13 +11,13 @@ from dataclasses import asdict, dataclass, fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from fulmar_core.config import load_config
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.errors import BundleError
-from fulmar_core.paths import config_directory
-from fulmar_core.policy_bundle import FORMAT, read_passport
-from fulmar_core.robot import load_robot
+from fulmar_core.config.errors import BundleError
+from fulmar_core.config.paths import config_directory
+from fulmar_core.config.strict_yaml import load_config
+from fulmar_core.loop.policy_bundle import FORMAT, read_passport
+from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.tasks import load_task
+from fulmar_core.worlds.scenario import load_scenario
 from training.executors import Executor, Watch
 from training.fallback_policy import fallback_settings
 from training.jobs import Job, Outcome

@@ -10,7 +10,7 @@ from typing import Any
 
 import ray
 
-from fulmar_core.errors import FulmarError
+from fulmar_core.config.errors import FulmarError
 from training.executors import Watch
 from training.jobs import Job, Outcome, run_job
 from training.progress import ProgressNotes

@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from fulmar_core.counts import check_count, check_episodes
-from fulmar_core.errors import ConfigError
-from fulmar_core.provenance import git_revision
-from fulmar_core.robot import load_robot, use_calibration
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.config.provenance import git_revision
+from fulmar_core.robots.robot_file import load_robot, use_calibration
+from fulmar_core.simulation.counts import check_count, check_episodes
 from fulmar_core.tasks import load_task
 from training.executors import Executor, LocalExecutor
 from training.jobs import Job

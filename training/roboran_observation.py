@@ -10,7 +10,7 @@ import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from fulmar_core.errors import ConfigError, did_you_mean
+from fulmar_core.config.errors import ConfigError, did_you_mean
 from training.onnx_graph import Tensor
 
 MOTION = ("velocity_x_in_body", "velocity_y_in_body", "yaw_rate")

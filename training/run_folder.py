@@ -21,8 +21,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from fulmar_core.atomic_write import write_whole
-from fulmar_core.errors import ConfigError
+from fulmar_core.config.atomic_write import write_whole
+from fulmar_core.config.errors import ConfigError
 
 SETTINGS_FILE = "settings.yaml"
 START_FILE = "start.json"

@@ -10,11 +10,11 @@ from typing import Literal
 
 import yaml
 
-from fulmar_core.config import at_least_1, load_config, positive, shares
-from fulmar_core.errors import ConfigError
-from fulmar_core.paths import config_names, config_path
-from fulmar_core.robot import Robot
-from fulmar_core.symmetry import Symmetry
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.config.paths import config_names, config_path
+from fulmar_core.config.strict_yaml import at_least_1, load_config, positive, shares
+from fulmar_core.robots.robot import Robot
+from fulmar_core.simulation.symmetry import Symmetry
 from fulmar_core.tasks import Task
 
 Precision = Literal["float32", "bfloat16"]

@@ -14,12 +14,12 @@ from stable_baselines3.common.callbacks import CallbackList
 from stable_baselines3.common.logger import KVWriter, configure
 from stable_baselines3.common.vec_env import VecNormalize
 
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.errors import ConfigError
-from fulmar_core.robot import Robot
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.config.seeds import EVALUATION_SEEDS
+from fulmar_core.robots.robot import Robot
 from fulmar_core.safety.geofence import check_starts
-from fulmar_core.seeds import EVALUATION_SEEDS
 from fulmar_core.tasks import Task
+from fulmar_core.worlds.scenario import load_scenario
 from training.checkpoint import load_checkpoint
 from training.evaluator import held_out_evaluator
 from training.fallback_policy import FallbackPolicy

@@ -13,14 +13,14 @@ from stable_baselines3.common.vec_env import VecEnv
 from fulmar_core.controllers.controller import Inputs
 from fulmar_core.controllers.disturbance_inputs import disturbance_terms
 from fulmar_core.controllers.wrench_choice import WRENCH, WrenchChoice
-from fulmar_core.disturbances.scenario import Scenario
-from fulmar_core.episode import episode_steps
-from fulmar_core.goal import goal_in_float64
-from fulmar_core.observation import shares
-from fulmar_core.robot import Robot
-from fulmar_core.simulation import BatchSimulation
-from fulmar_core.symmetry import Mirror, Symmetry
+from fulmar_core.robots.robot import Robot
+from fulmar_core.simulation.episode import episode_steps
+from fulmar_core.simulation.simulation import BatchSimulation
+from fulmar_core.simulation.symmetry import Mirror, Symmetry
 from fulmar_core.tasks import Task
+from fulmar_core.tasks.goal import goal_in_float64
+from fulmar_core.tasks.observation import shares
+from fulmar_core.worlds.scenario import Scenario
 from training.compiled import step_of
 from training.disturbance_inputs import DisturbanceInputs
 from training.incremental_actions import KINDS, check_incremental, incremental_shares
@@ -74,7 +74,7 @@ class BatchVecEnv(VecEnv):
             action_space: "wrench": actions are shares of the strongest wrench, for which valves are chosen.
             valve_cost: Of an open valve in that choice, as a multiple.
             mirror: Goals on the right are mirrored to the left, or those behind to the front
-                (`fulmar_core.symmetry`).
+                (`fulmar_core.simulation.symmetry`).
             action_hold: Control steps of an incremental action (`training.incremental_actions`); 0: shares of command.
             compiled: Steps are compiled (`training.compiled`).
 

@@ -8,14 +8,14 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from fulmar_core.disturbances.scenario import Scenario
-from fulmar_core.episode import episode_steps
-from fulmar_core.errors import ConfigError
-from fulmar_core.learning_step import observed_step
-from fulmar_core.robot import Robot
-from fulmar_core.simulation import BatchSimulation
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.robots.robot import Robot
+from fulmar_core.simulation.episode import episode_steps
+from fulmar_core.simulation.learning_step import observed_step
+from fulmar_core.simulation.simulation import BatchSimulation
 from fulmar_core.tasks import Task
 from fulmar_core.tasks.go_to_pose import GoToPose
+from fulmar_core.worlds.scenario import Scenario
 
 # Observations, rewards, terminated and truncated of each world.
 Outcome = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
@@ -99,7 +99,7 @@ def shares_space(count: int) -> gymnasium.spaces.Box:
 def training_task(task: Task, scenario: Scenario) -> Task:
     """The task with its reward for a scenario: another one where every failure makes the robot uncontrollable.
 
-    Where no mean wrench is left in some direction (`fulmar_core.holdability`), a platform that turns its working
+    Where no mean wrench is left in some direction (`fulmar_core.worlds.holdability`), a platform that turns its working
     nozzles towards where it brakes can still come to rest at its goal. A reward for the heading on the way keeps it
     from learning that.
     """

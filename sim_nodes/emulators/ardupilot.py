@@ -11,8 +11,8 @@ os.environ.setdefault("MAVLINK20", "1")  # pymavlink reads it when it is importe
 import numpy as np
 from pymavlink import mavutil
 
-from fulmar_core.backend import Sample
-from fulmar_core.rotation import rotate_inverse
+from fulmar_core.simulation.backend import Sample
+from fulmar_core.states.rotation import rotate_inverse
 
 OVERRIDE_S = 3.0  # RC_OVERRIDE_TIME: an override is forgotten after so long
 GROUND_S = 1.5  # FS_TIMEOUT with FS_GCS_ENABLE: without the host's heartbeat for so long it holds

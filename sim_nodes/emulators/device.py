@@ -12,7 +12,7 @@ from typing import Protocol
 
 import numpy as np
 
-from fulmar_core.backend import Sample
+from fulmar_core.simulation.backend import Sample
 
 
 class EmulatedDevice(Protocol):

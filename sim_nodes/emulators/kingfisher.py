@@ -9,9 +9,9 @@ from operator import xor
 
 import numpy as np
 
-from fulmar_core.backend import Sample
-from fulmar_core.rotation import rotate_inverse
-from fulmar_core.state import RigidBodyState
+from fulmar_core.simulation.backend import Sample
+from fulmar_core.states.rotation import rotate_inverse
+from fulmar_core.states.state import RigidBodyState
 from sim_nodes.emulators.device import Link
 
 TIMEOUT_S = 0.5  # without $PYDIR for so long the propellers stand (heron_controller)

@@ -10,7 +10,7 @@ from operator import xor
 
 import numpy as np
 
-from fulmar_core.backend import Sample
+from fulmar_core.simulation.backend import Sample
 from sim_nodes.emulators.device import Link
 
 TIMEOUT_S = 0.6  # without base control for so long it stands (kobuki_node, cmd_vel_timeout_sec)

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from fulmar_core.backend import Sample
-from fulmar_core.robot import Robot
+from fulmar_core.robots.robot import Robot
+from fulmar_core.simulation.backend import Sample
 
 
 class ValveBank:

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fulmar_core.actuators.differential_drive import DifferentialDrive
-from fulmar_core.actuators.thrusters import Thrusters
-from fulmar_core.robot import Robot
+from fulmar_core.robots.actuators.differential_drive import DifferentialDrive
+from fulmar_core.robots.actuators.thrusters import Thrusters
+from fulmar_core.robots.robot import Robot
 
 STRAIGHT = ("left", "right")
 

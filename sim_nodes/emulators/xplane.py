@@ -9,11 +9,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from fulmar_core.actuators.control_surfaces import ControlSurfaces
-from fulmar_core.backend import Sample
-from fulmar_core.robot import Robot
-from fulmar_core.rotation import rotate, rotate_inverse
-from fulmar_core.state import RigidBodyState
+from fulmar_core.robots.actuators.control_surfaces import ControlSurfaces
+from fulmar_core.robots.robot import Robot
+from fulmar_core.simulation.backend import Sample
+from fulmar_core.states.rotation import rotate, rotate_inverse
+from fulmar_core.states.state import RigidBodyState
 
 LATITUDE, LONGITUDE = (
     49.5,

@@ -7,14 +7,14 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from fulmar_core.actuators.actuation import ActuationState
-from fulmar_core.dynamics.hydrodynamics import GRAVITY
+from fulmar_core.dynamics.actuators.actuation import ActuationState
+from fulmar_core.dynamics.flight_dynamics import FlightDynamics
+from fulmar_core.dynamics.motion import surface_positions_of
 from fulmar_core.dynamics.rigid_body import inertia_of
-from fulmar_core.flight.dynamics import FlightDynamics
-from fulmar_core.flight.turbulence import Gust
-from fulmar_core.motion import surface_positions_of
-from fulmar_core.robot import Robot
-from fulmar_core.spatial import SpatialState
+from fulmar_core.robots.robot import Robot
+from fulmar_core.states.gravity import GRAVITY
+from fulmar_core.states.spatial import SpatialState
+from fulmar_core.worlds.turbulence import Gust
 from sim_nodes.mujoco_model.floater import OFF_CENTRE
 from sim_nodes.mujoco_model.scenery import BODY, add_hull
 

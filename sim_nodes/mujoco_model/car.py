@@ -7,9 +7,9 @@ import math
 import mujoco
 import numpy as np
 
-from fulmar_core.actuators.ackermann import Ackermann
-from fulmar_core.planar import PlanarState, PlanarWrench
-from fulmar_core.robot import Robot
+from fulmar_core.robots.actuators.ackermann import Ackermann
+from fulmar_core.robots.robot import Robot
+from fulmar_core.states.planar import PlanarState, PlanarWrench
 from sim_nodes.mujoco_model.wheels import Chassis
 
 STEERING_HZ = 25.0  # bandwidth of the steering servos [Hz]

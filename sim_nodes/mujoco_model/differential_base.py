@@ -5,9 +5,9 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from fulmar_core.actuators.differential_drive import DifferentialDrive
-from fulmar_core.planar import PlanarState, PlanarWrench
-from fulmar_core.robot import Robot
+from fulmar_core.robots.actuators.differential_drive import DifferentialDrive
+from fulmar_core.robots.robot import Robot
+from fulmar_core.states.planar import PlanarState, PlanarWrench
 from sim_nodes.mujoco_model.wheels import Chassis
 
 # How far the weight lies from the axle towards a single caster, which has to carry some; our value [-].

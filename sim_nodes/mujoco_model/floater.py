@@ -7,10 +7,10 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from fulmar_core.actuators.pushing import Push, Pushing
-from fulmar_core.dynamics.hydrodynamics import GRAVITY
-from fulmar_core.robot import Robot
-from fulmar_core.urdf import PART_COLOUR
+from fulmar_core.robots.actuators.pushing import Push, Pushing
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.urdf import PART_COLOUR
+from fulmar_core.states.gravity import GRAVITY
 from sim_nodes.mujoco_model.scenery import BODY, add_hull
 from sim_nodes.mujoco_model.water import Water
 

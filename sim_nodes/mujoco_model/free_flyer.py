@@ -5,9 +5,9 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from fulmar_core.disturbances.spatial_world import SpatialWorld
-from fulmar_core.robot import Robot
-from fulmar_core.spatial import SpatialState
+from fulmar_core.robots.robot import Robot
+from fulmar_core.states.spatial import SpatialState
+from fulmar_core.worlds.spatial_world import SpatialWorld
 from sim_nodes.mujoco_model.floater import Floater, add_actuator
 
 TORQUE_SITE = "torque"  # where the torque of the surroundings acts

@@ -11,12 +11,12 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from fulmar_core.actuators.reaction_wheels import ReactionWheels
-from fulmar_core.attitude import turn_back
-from fulmar_core.disturbances.spatial_world import SpatialWorld
-from fulmar_core.robot import Robot
-from fulmar_core.sensors.wheels import WheelSpeeds
-from fulmar_core.spatial import SpatialState
+from fulmar_core.robots.actuators.reaction_wheels import ReactionWheels
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.sensors.wheels import WheelSpeeds
+from fulmar_core.states.attitude import turn_back
+from fulmar_core.states.spatial import SpatialState
+from fulmar_core.worlds.spatial_world import SpatialWorld
 from sim_nodes.mujoco_model.scenery import BODY, add_hull
 
 WHEEL_MASS = 1e-3  # of the body, each; they sit in its middle, where their mass turns nothing [-]

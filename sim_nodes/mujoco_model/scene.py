@@ -8,13 +8,13 @@ from typing import Any, Protocol
 import mujoco
 import numpy as np
 
-from fulmar_core.actuators.pushing import Pushing
-from fulmar_core.actuators.reaction_wheels import ReactionWheels
-from fulmar_core.episode import Episode
-from fulmar_core.errors import ConfigError
-from fulmar_core.robot import Robot
-from fulmar_core.spatial import SpatialState
-from fulmar_core.things import Thing
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.dynamics.things import Thing
+from fulmar_core.robots.actuators.pushing import Pushing
+from fulmar_core.robots.actuators.reaction_wheels import ReactionWheels
+from fulmar_core.robots.robot import Robot
+from fulmar_core.simulation.episode import Episode
+from fulmar_core.states.spatial import SpatialState
 from sim_nodes.mujoco_model.aircraft import Aircraft
 from sim_nodes.mujoco_model.car import Car
 from sim_nodes.mujoco_model.differential_base import DifferentialBase
@@ -169,7 +169,7 @@ class RobotModel(Protocol):
         ...
 
     def own_truth(self, data: mujoco.MjData) -> dict[str, Any]:
-        """What is true of robots of this family alone, by the names of `sensors.kind.Truth`."""
+        """What is true of robots of this family alone, by the names of `robots.sensors.kind.Truth`."""
         ...
 
     @property

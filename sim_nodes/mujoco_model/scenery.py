@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import mujoco
 
-from fulmar_core.robot import Robot
-from fulmar_core.urdf import HULL_COLOUR
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.urdf import HULL_COLOUR
 
 BODY, IMU_SITE = "base_link", "imu_link"
 FLOOR_BIT, THING_BIT = 1, 2  # what touches the floor, and what touches one another above it

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from fulmar_core.disturbances.world import World
-from fulmar_core.dynamics.hydrodynamics import GRAVITY, Hydrodynamics
-from fulmar_core.rotation import cross
+from fulmar_core.robots.hydrodynamics import Hydrodynamics
+from fulmar_core.states.gravity import GRAVITY
+from fulmar_core.states.rotation import cross
+from fulmar_core.worlds.world import World
 
 
 class Water:

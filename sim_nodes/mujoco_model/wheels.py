@@ -10,13 +10,13 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from fulmar_core.actuators.response import Response
-from fulmar_core.actuators.rolling import CASTER_RADIUS, SERVO_S, WHEEL_WIDTH
-from fulmar_core.disturbances.world import World
-from fulmar_core.dynamics.hydrodynamics import GRAVITY
-from fulmar_core.planar import PlanarState, PlanarWrench
-from fulmar_core.robot import Robot
-from fulmar_core.urdf import WHEEL_COLOUR
+from fulmar_core.robots.actuators.response import Response
+from fulmar_core.robots.actuators.rolling import CASTER_RADIUS, SERVO_S, WHEEL_WIDTH
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.urdf import WHEEL_COLOUR
+from fulmar_core.states.gravity import GRAVITY
+from fulmar_core.states.planar import PlanarState, PlanarWrench
+from fulmar_core.worlds.world import World
 from sim_nodes.mujoco_model.scenery import BODY, FLOOR_BIT, add_hull
 
 STEP_S = 0.004  # contacts and wheel servos need finer steps than the robots' physics ticks [s]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from fulmar_core.topics import SENSOR_WIRES
+from fulmar_core.robots.topics import SENSOR_WIRES
 
 POLICY = Path(__file__).resolve().parents[2] / "configs/security/policy.xml"
 BEGIN = "<!-- sensors: python -m tests.architecture.security_policy -->"

@@ -131,7 +131,7 @@ def test_the_launch_file_is_installed_in_share(built):
 
 
 def test_the_installed_core_reads_the_installed_configs(built):
-    code = "import fulmar_core.paths as p; print(p.__file__); print(p.config_directory())"
+    code = "import fulmar_core.config.paths as p; print(p.__file__); print(p.config_directory())"
     result = built.sourced(f"python3 -c '{code}'")
     assert result.returncode == 0, result.stderr
     for line in result.stdout.splitlines():

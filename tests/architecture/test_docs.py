@@ -115,7 +115,7 @@ def test_the_robot_of_the_first_hour_reaches_its_goals_by_the_lqr(first_hour):
 
 
 def test_the_driver_of_the_first_hour_has_a_line_for_every_nozzle(first_hour):
-    from fulmar_core.robot import load_robot
+    from fulmar_core.robots.robot_file import load_robot
     from hardware_drivers.hardware import load_hardware
 
     hardware = load_hardware("hexbot_gpio")

@@ -11,7 +11,7 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 from packaging.version import Version
 
-from fulmar_cli.installed_as import EXTRAS_OF_SETUP
+from fulmar_cli.installation.installed_as import EXTRAS_OF_SETUP
 
 RUN_LOCK, DEV_LOCK, PEERS_LOCK = "requirements.lock", "requirements-dev.lock", "requirements-peers.lock"
 LOCKS = [RUN_LOCK, DEV_LOCK, PEERS_LOCK]

@@ -7,18 +7,18 @@ import re
 import numpy as np
 import pytest
 
-from fulmar_core.attitude import exponential
+from fulmar_core.config.paths import config_names
 from fulmar_core.controllers.disturbance_inputs import PUSH_TERMS, disturbance_terms
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.goal import Goal, no_obstacles
-from fulmar_core.observation import Observer
-from fulmar_core.paths import config_names
-from fulmar_core.planar import PlanarState
-from fulmar_core.robot import load_robot
-from fulmar_core.simulation import BatchSimulation
-from fulmar_core.spatial import SpatialState
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.simulation.simulation import BatchSimulation
+from fulmar_core.states.attitude import exponential
+from fulmar_core.states.planar import PlanarState
+from fulmar_core.states.spatial import SpatialState
 from fulmar_core.tasks import load_task
 from fulmar_core.tasks.go_to_position_with_obstacles import GoToPositionWithObstacles
+from fulmar_core.tasks.goal import Goal, no_obstacles
+from fulmar_core.tasks.observation import Observer
+from fulmar_core.worlds.scenario import load_scenario
 
 TASKS = config_names("tasks")
 UNITS = {"fine_distance": " m", "fine_heading_deg": "°", "fine_speed": " m/s", "fine_velocity": " m/s"} | {

@@ -6,8 +6,8 @@ import itertools
 
 import pytest
 
-from fulmar_core.errors import ConfigError
-from fulmar_core.robot import load_robot
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.tasks import load_task
 from tests.pairs import covering
 from tests.spaces import shared_space

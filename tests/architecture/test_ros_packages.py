@@ -15,7 +15,7 @@ import grimp
 import pytest
 from catkin_pkg.package import parse_package
 
-from fulmar_cli.extras import EXTRAS
+from fulmar_cli.installation.extras import EXTRAS
 from tests.architecture.conftest import PACKAGES
 
 ROS = set(EXTRAS["ros"])  # rclpy and the packages of messages

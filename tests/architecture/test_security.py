@@ -14,12 +14,13 @@ import numpy as np
 import pytest
 
 from fulmar_bringup.processes import child_environment
-from fulmar_core.config import load_config
-from fulmar_core.errors import BundleError, ConfigError
-from fulmar_core.policy_bundle import GOLDEN, NETWORK, PASSPORT, read_passport, write_bundle
-from fulmar_core.robot import Robot, load_robot
+from fulmar_core.config.errors import BundleError, ConfigError
+from fulmar_core.config.strict_yaml import load_config
+from fulmar_core.loop.policy_bundle import GOLDEN, NETWORK, PASSPORT, read_passport, write_bundle
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.robots.topics import WIRES
 from fulmar_core.tasks import load_task
-from fulmar_core.topics import WIRES
 from policy_server.controllers import policies_directory
 from policy_server.policy import Policy
 from tests.architecture.security_policy import BEGIN, POLICY, with_sensors
@@ -178,7 +179,7 @@ def test_only_the_plant_publishes_applied_commands_and_only_operators_stop_or_sw
 
 
 def test_a_rewritten_bundle_loses_its_old_signature(tmp_path):
-    from fulmar_core.policy_bundle import SIGNATURE, read_golden
+    from fulmar_core.loop.policy_bundle import SIGNATURE, read_golden
 
     folder = shutil.copytree(SHIPPED, tmp_path / "bundle")
     (folder / SIGNATURE).write_text("{}")

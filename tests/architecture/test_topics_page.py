@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fulmar_core.topics import WIRES
+from fulmar_core.robots.topics import WIRES
 from tests.architecture.topics_page import DIRECTIONS, page, row
 
 MAKE = "python -m tests.architecture.topics_page > docs/topics.md"

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from fulmar_core.topics import ESTOP_RESET, ESTOP_TRIGGER, GIVE_BACK, WIRES, Wire
+from fulmar_core.robots.topics import ESTOP_RESET, ESTOP_TRIGGER, GIVE_BACK, WIRES, Wire
 
 UNRECORDED = ", ".join(f"`{wire.name}`" for wire in WIRES if not wire.recorded)
 
 INTRODUCTION = f"""\
 # Topics
 
-<!-- Generated from fulmar_core/topics.py: python -m tests.architecture.topics_page > docs/topics.md -->
+<!-- Generated from fulmar_core/robots/topics.py: python -m tests.architecture.topics_page > docs/topics.md -->
 
 Topic names are relative to the robot's namespace, such as `/turtlebot2/odom`, unless they begin with a slash. The
 namespace is the robot's type or its `--name` ([systems.md](systems.md#several-robots-of-one-type)). Frames follow REP

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from fulmar_bringup.domains import reserved_domains
-from fulmar_core.atomic_write import write_whole
+from fulmar_core.config.atomic_write import write_whole
 
 REQUIRED = 0.95  # share of episodes that reach their goal
 SLACK_S = 120.0  # what starting and stopping may take on a busy machine

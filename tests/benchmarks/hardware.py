@@ -14,7 +14,7 @@ from rich.table import Table
 from fulmar_bringup.console import output, print_json
 from fulmar_bringup.progress import work_bar
 from fulmar_cli.commands.arguments import JsonOption
-from fulmar_core.errors import FAILED, UnknownNameError
+from fulmar_core.config.errors import FAILED, UnknownNameError
 from tests.benchmarks.closed_loops import Command
 
 
@@ -107,7 +107,7 @@ def hardware(
     fulmar benchmark hardware --hardware turtlebot2 --episodes 8 --seconds 25
     """
     from fulmar_bringup.system import modules_of
-    from fulmar_cli.extras import require
+    from fulmar_cli.installation.extras import require
     from tests.benchmarks.closed_loops import Campaign, measure
 
     cases = cases_of([name.strip() for name in only.split(",")] if only else None)

@@ -13,7 +13,7 @@ import typer
 from fulmar_bringup.console import output, print_json
 from fulmar_bringup.progress import work_bar
 from fulmar_cli.commands.arguments import JsonOption
-from fulmar_core.errors import FAILED, ConfigError
+from fulmar_core.config.errors import FAILED, ConfigError
 from tests.benchmarks.closed_loops import Command
 
 if TYPE_CHECKING:
@@ -79,7 +79,7 @@ def network(
     fulmar benchmark network --episodes 4 --seconds 20
     """
     from fulmar_bringup.system import modules_of
-    from fulmar_cli.extras import require
+    from fulmar_cli.installation.extras import require
     from fulmar_evaluation.faults.two_hosts import Quality, why_not
     from tests.benchmarks.closed_loops import Campaign, measure
 

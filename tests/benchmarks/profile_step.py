@@ -95,9 +95,9 @@ def serve(arguments: argparse.Namespace) -> None:
     from fulmar_bringup.processes import command_line
     from fulmar_bringup.run_plan import RunPlan
     from fulmar_bringup.system_rows import system_rows
-    from fulmar_core.goal import goal_at
-    from fulmar_core.robot import load_robot
+    from fulmar_core.robots.robot_file import load_robot
     from fulmar_core.tasks import load_task
+    from fulmar_core.tasks.goal import goal_at
     from fulmar_ros.controller_node import ControllerNode
     from fulmar_ros.controller_wires import ControllerWires
     from fulmar_ros.goal_messages import goal_message

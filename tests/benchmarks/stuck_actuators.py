@@ -14,7 +14,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from fulmar_core.disturbances.scenario import load_scenario
+from fulmar_core.worlds.scenario import load_scenario
 from tests.watched_actuators import CLOSED, OPEN, Simulators, Watched, sticking, watch
 
 SYSTEMS = (

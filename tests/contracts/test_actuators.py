@@ -5,19 +5,19 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fulmar_core.actuators.families import FAMILIES
-from fulmar_core.actuators.pushing import PLANAR, Pushing
-from fulmar_core.actuators.refuge import slowdown
-from fulmar_core.actuators.rolling import Rolling
+from fulmar_core.config.errors import ConfigError
 from fulmar_core.dynamics.linear_model import linearise, linearise_wrench
-from fulmar_core.errors import ConfigError
-from fulmar_core.identification.model import nominal_world
-from fulmar_core.motion import actuation_of, move
-from fulmar_core.planar import PlanarState
+from fulmar_core.dynamics.motion import actuation_of, move
+from fulmar_core.loop.teleop import Wish, hand_mapping
+from fulmar_core.robots.actuators.families import FAMILIES
+from fulmar_core.robots.actuators.pushing import PLANAR, Pushing
+from fulmar_core.robots.actuators.refuge import slowdown
+from fulmar_core.robots.actuators.rolling import Rolling
+from fulmar_core.robots.topics import COMMAND, VELOCITY_COMMAND, command_wire
 from fulmar_core.safety.actuator_guard import BRIDGED_S, ActuatorGuard
 from fulmar_core.safety.watchdog import Watchdog
-from fulmar_core.teleop import Wish, hand_mapping
-from fulmar_core.topics import COMMAND, VELOCITY_COMMAND, command_wire
+from fulmar_core.states.planar import PlanarState
+from fulmar_evaluation.identification.model import nominal_world
 from tests.new_robots import robots_of_every_family
 from tests.spaces import pushes_within_its_plane
 

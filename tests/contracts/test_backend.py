@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from fulmar_bringup.system import SIMULATED
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.episode import Episode, draw_episode
-from fulmar_core.flight.trim import find_trim, flying_at
-from fulmar_core.goal import goal_at
-from fulmar_core.planar import PlanarState
-from fulmar_core.sensors.star_tracker import StarTrackerSpec
-from fulmar_core.spatial import SpatialState
+from fulmar_core.dynamics.flight_trim import find_trim, flying_at
+from fulmar_core.robots.sensors.star_tracker import StarTrackerSpec
+from fulmar_core.simulation.episode import Episode, draw_episode
+from fulmar_core.states.planar import PlanarState
+from fulmar_core.states.spatial import SpatialState
+from fulmar_core.tasks.goal import goal_at
+from fulmar_core.worlds.scenario import load_scenario
 from sim_nodes.mock_backend import MockBackend
 from tests.new_robots import robots_of_every_family
 from tests.spaces import SPACECRAFT, task_for

@@ -11,19 +11,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fulmar_core.actuators.families import FAMILIES
-from fulmar_core.control_loop import ControlLoop
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.config.paths import config_names
 from fulmar_core.controllers.classical import LAWS, families_of
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.errors import ConfigError
-from fulmar_core.goal import goal_in_float64
-from fulmar_core.health.filters import HealthSettings
-from fulmar_core.paths import config_names
-from fulmar_core.planar import at_rest
-from fulmar_core.policy_bundle import read_passport
-from fulmar_core.simulation import BatchSimulation
-from fulmar_core.spatial import SpatialState, position_of, quat_of
+from fulmar_core.estimators.actuator_health.filters import HealthSettings
+from fulmar_core.loop.control_loop import ControlLoop
+from fulmar_core.loop.policy_bundle import read_passport
+from fulmar_core.robots.actuators.families import FAMILIES
+from fulmar_core.simulation.simulation import BatchSimulation
+from fulmar_core.states.planar import at_rest
+from fulmar_core.states.spatial import SpatialState, position_of, quat_of
 from fulmar_core.tasks import load_task
+from fulmar_core.tasks.goal import goal_in_float64
+from fulmar_core.worlds.scenario import load_scenario
 from policy_server.controllers import CONTROLLERS, Choice, load_controller, shipped_policies
 from tests.inputs import some_of
 from tests.new_robots import robots_of_every_family

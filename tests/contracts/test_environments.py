@@ -14,9 +14,9 @@ import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.env_checker import check_env
 
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.paths import OWN_FOLDERS, config_names
+from fulmar_core.config.paths import OWN_FOLDERS, config_names
 from fulmar_core.tasks import load_task
+from fulmar_core.worlds.scenario import load_scenario
 from tests.new_robots import robots_of_every_family, write_new_robots
 from tests.pairs import each_pair
 from training.environments import environment_id

@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fulmar_core.control_loop import ControlLoop
 from fulmar_core.controllers.classical import load_classical
-from fulmar_core.disturbances.scenario import Scenario, load_scenario
-from fulmar_core.episode import draw_episodes
-from fulmar_core.goal import goal_in_float64, stack_goals
-from fulmar_core.health.feedback_check import ActuatorFeedback
-from fulmar_core.robot import load_robot
+from fulmar_core.estimators.actuator_health.feedback_check import ActuatorFeedback
+from fulmar_core.loop.control_loop import ControlLoop
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.simulation.episode import draw_episodes
 from fulmar_core.tasks import load_task
+from fulmar_core.tasks.goal import goal_in_float64, stack_goals
+from fulmar_core.worlds.scenario import Scenario, load_scenario
 from sim_nodes.mujoco_backend import MujocoBackend
 
 WITHIN_S = 5.0

@@ -8,15 +8,15 @@ from dataclasses import asdict
 import numpy as np
 import pytest
 
-from fulmar_core.actuators.ackermann import Ackermann
-from fulmar_core.actuators.pushing import Pushing
-from fulmar_core.actuators.reaction_wheels import ReactionWheels
-from fulmar_core.actuators.rolling import Rolling
-from fulmar_core.disturbances.scenario import load_scenario
 from fulmar_core.dynamics.contact import outline_of
-from fulmar_core.episode import draw_episode
+from fulmar_core.robots.actuators.ackermann import Ackermann
+from fulmar_core.robots.actuators.pushing import Pushing
+from fulmar_core.robots.actuators.reaction_wheels import ReactionWheels
+from fulmar_core.robots.actuators.rolling import Rolling
 from fulmar_core.safety.watchdog import default_timeout
-from fulmar_core.simulation import BatchSimulation
+from fulmar_core.simulation.episode import draw_episode
+from fulmar_core.simulation.simulation import BatchSimulation
+from fulmar_core.worlds.scenario import load_scenario
 from sim_nodes.mock_backend import MockBackend
 from tests.new_robots import robots_of_every_family
 from tests.spaces import task_for

@@ -7,16 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fulmar_core.counter_rng import WORLD, Draws
-from fulmar_core.disturbances.scenario import draw_world, load_scenario
-from fulmar_core.disturbances.world import FIELDS
-from fulmar_core.episode import draw_episodes
-from fulmar_core.metrics import episode_metrics
-from fulmar_core.paths import config_names
-from fulmar_core.planar import PlanarState
-from fulmar_core.robot import load_robot
-from fulmar_core.rollout import roll_out_in_batch
+from fulmar_core.config.paths import config_names
+from fulmar_core.loop.rollout import roll_out_in_batch
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.simulation.episode import draw_episodes
+from fulmar_core.simulation.metrics import episode_metrics
+from fulmar_core.states.counter_rng import WORLD, Draws
+from fulmar_core.states.planar import PlanarState
 from fulmar_core.tasks import load_task
+from fulmar_core.worlds.scenario import draw_world, load_scenario
+from fulmar_core.worlds.world import FIELDS
 
 PLATFORM, TASK = load_robot("floating_platform"), load_task("drift_go_to_pose")
 SCENARIOS = {name: load_scenario(name) for name in config_names("scenarios")}

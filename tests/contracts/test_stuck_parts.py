@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fulmar_core.disturbances.parts import Actuation, Stuck, Supply
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.disturbances.stuck import candidates_of
-from fulmar_core.episode import draw_episode
-from fulmar_core.errors import ConfigError
-from fulmar_core.robot import load_robot
-from fulmar_core.simulation import BatchSimulation
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.simulation.episode import draw_episode
+from fulmar_core.simulation.simulation import BatchSimulation
+from fulmar_core.worlds.parts import Actuation, Stuck, Supply
+from fulmar_core.worlds.scenario import load_scenario
+from fulmar_core.worlds.stuck import candidates_of
 from sim_nodes.mock_backend import MockBackend
 from tests.new_robots import robots_of_every_family
 from tests.spaces import task_for

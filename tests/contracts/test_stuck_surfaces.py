@@ -9,22 +9,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fulmar_core.attitude import euler_of, from_euler
-from fulmar_core.control_loop import ControlLoop
-from fulmar_core.disturbances.parts import Actuation, Stuck
-from fulmar_core.disturbances.scenario import load_scenario
+from fulmar_core.controllers.flight_refuge import DESCENDS, LevelDescent
+from fulmar_core.dynamics.flight_dynamics import FlightDynamics
+from fulmar_core.dynamics.flight_trim import find_trim, still_air
 from fulmar_core.dynamics.rigid_body import inertia_of
-from fulmar_core.episode import draw_episode
-from fulmar_core.flight.dynamics import FlightDynamics
-from fulmar_core.flight.refuge import DESCENDS, LevelDescent
-from fulmar_core.flight.trim import find_trim, still_air
-from fulmar_core.goal import goal_in_float64, stack_goals
-from fulmar_core.health.feedback_check import ActuatorFeedback
-from fulmar_core.robot import load_robot
+from fulmar_core.estimators.actuator_health.feedback_check import ActuatorFeedback
+from fulmar_core.loop.control_loop import ControlLoop
+from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.safety.actuator_guard import ActuatorGuard
 from fulmar_core.safety.watchdog import Watchdog
-from fulmar_core.spatial import SpatialState
+from fulmar_core.simulation.episode import draw_episode
+from fulmar_core.states.attitude import euler_of, from_euler
+from fulmar_core.states.spatial import SpatialState
 from fulmar_core.tasks import load_task
+from fulmar_core.tasks.goal import goal_in_float64, stack_goals
+from fulmar_core.worlds.parts import Actuation, Stuck
+from fulmar_core.worlds.scenario import load_scenario
 from policy_server.controllers import Choice, load_controller, usual_hz
 from sim_nodes.mock_backend import MockBackend
 

@@ -9,20 +9,20 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from fulmar_core.attitude import normalised, plus, product, turn
-from fulmar_core.counter_rng import Draws
-from fulmar_core.disturbances.scenario import load_scenario
+from fulmar_core.config.paths import config_names
 from fulmar_core.dynamics.contact import outline_of
-from fulmar_core.dynamics_of import dynamics_of
-from fulmar_core.goal import Goal
-from fulmar_core.observation import Observer
-from fulmar_core.paths import config_names
-from fulmar_core.planar import PlanarState
-from fulmar_core.simulation import BatchSimulation
-from fulmar_core.spatial import SpatialState, position_of, quat_of
-from fulmar_core.state import POSE, TWIST
+from fulmar_core.dynamics.dynamics_of import dynamics_of
+from fulmar_core.robots.topics import GOAL_WIRES
+from fulmar_core.simulation.simulation import BatchSimulation
+from fulmar_core.states.attitude import normalised, plus, product, turn
+from fulmar_core.states.counter_rng import Draws
+from fulmar_core.states.planar import PlanarState
+from fulmar_core.states.spatial import SpatialState, position_of, quat_of
+from fulmar_core.states.state import POSE, TWIST
 from fulmar_core.tasks import ShippedTask, load_task
-from fulmar_core.topics import GOAL_WIRES
+from fulmar_core.tasks.goal import Goal
+from fulmar_core.tasks.observation import Observer
+from fulmar_core.worlds.scenario import load_scenario
 from tests.new_robots import robots_of_every_family
 from tests.pairs import each_pair
 from tests.spaces import at_target

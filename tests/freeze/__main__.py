@@ -9,7 +9,7 @@ import sys
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
-from fulmar_core.paths import config_names
+from fulmar_core.config.paths import config_names
 from tests.freeze.benchmarks import SMALL, documents
 from tests.freeze.tables import TABLES, Rows
 

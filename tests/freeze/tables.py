@@ -14,16 +14,17 @@ from typing import Any
 import numpy as np
 
 from fulmar_bags.contents import open_bag
-from fulmar_core.control_loop import ControlLoop
+from fulmar_core.config.errors import FulmarError
+from fulmar_core.config.paths import config_names
 from fulmar_core.controllers.classical import gains_of
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.errors import FulmarError
-from fulmar_core.goal import goal_in_float64
-from fulmar_core.paths import config_names
-from fulmar_core.robot import Robot, load_robot
-from fulmar_core.simulation import BatchSimulation
+from fulmar_core.loop.control_loop import ControlLoop
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.robots.topics import AIR_BEARING, CLOCK, DIAGNOSTICS, METADATA, STATUS, WIRES
+from fulmar_core.simulation.simulation import BatchSimulation
 from fulmar_core.tasks import Task, load_task
-from fulmar_core.topics import AIR_BEARING, CLOCK, DIAGNOSTICS, METADATA, STATUS, WIRES
+from fulmar_core.tasks.goal import goal_in_float64
+from fulmar_core.worlds.scenario import load_scenario
 from fulmar_evaluation.rerun.reference_bags import REFERENCES, run_reference
 from policy_server.controllers import CONTROLLERS, Choice, load_controller
 from tests.freeze.digest import digest

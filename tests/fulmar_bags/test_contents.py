@@ -13,7 +13,7 @@ from rosbags.rosbag2.enums import CompressionMode, StoragePlugin
 
 from fulmar_bags.contents import open_bag
 from fulmar_bags.decode import joint_vectors, messages, odometries, stamp_of
-from fulmar_core.topics import ACTION, ODOMETRY
+from fulmar_core.robots.topics import ACTION, ODOMETRY
 from tests.foreign_bag import write_foreign
 from tests.fulmar_cli.bag_commands import BAGS, POLICY, answer, ask, file_of
 

@@ -12,7 +12,7 @@ from fulmar_bags.interrupted_bag import interrupted_bag
 from fulmar_bags.mcap_file import BEGUN
 from fulmar_bags.recovery import recover
 from fulmar_bags.writer_thread import RECORDING, BagThread
-from fulmar_core.errors import BagError
+from fulmar_core.config.errors import BagError
 from tests.fulmar_bags.test_writer import START_NS, TOPIC, open_bag, word, words_by_rosbags, write_words
 
 

@@ -14,7 +14,7 @@ from fulmar_bags.decode import messages
 from fulmar_bags.message_types import type_store
 from fulmar_bags.run_record import read_any_run, read_run
 from fulmar_bags.writer import BagWriter
-from fulmar_core.topics import DIAGNOSTICS, ODOMETRY, STATUS
+from fulmar_core.robots.topics import DIAGNOSTICS, ODOMETRY, STATUS
 from tests.fulmar_cli.bag_commands import LQR, answer, ask
 
 ROBOT = "floating_platform"

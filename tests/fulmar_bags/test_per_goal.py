@@ -6,7 +6,7 @@ import pytest
 
 from fulmar_bags.per_goal import BagPerGoal
 from fulmar_bags.writer import BagWriter
-from fulmar_core.errors import BagError
+from fulmar_core.config.errors import BagError
 from tests.fulmar_bags.bags import INFO, START_NS, TOPIC, TYPE, publish_times, word, words_by_rosbags
 
 GOAL, OBSTACLES, S = "/robot/goal", "/robot/obstacles", 1_000_000_000

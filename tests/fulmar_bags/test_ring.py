@@ -15,7 +15,7 @@ from fulmar_bags.mcap_records import bag_files
 from fulmar_bags.ring import BagRing
 from fulmar_bags.writer import BagWriter
 from fulmar_bags.writer_thread import BagThread
-from fulmar_core.errors import BagError
+from fulmar_core.config.errors import BagError
 from tests.fulmar_bags.bags import (
     INFO,
     START_NS,

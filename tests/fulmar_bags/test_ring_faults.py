@@ -6,7 +6,7 @@ import pytest
 
 from fulmar_bags.message_types import type_store
 from fulmar_bags.ring import fault_finder
-from fulmar_core.topics import DIAGNOSTICS, ESTOP, ODOMETRY, STATUS
+from fulmar_core.robots.topics import DIAGNOSTICS, ESTOP, ODOMETRY, STATUS
 
 TOPICS = {
     STATUS: "/it/controller/status",

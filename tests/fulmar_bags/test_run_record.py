@@ -15,10 +15,10 @@ from fulmar_bags.mcap_records import read_records
 from fulmar_bags.message_types import type_store
 from fulmar_bags.run_record import read_run
 from fulmar_bags.writer import BagWriter
-from fulmar_core.errors import BagError
-from fulmar_core.goal import goal_at
-from fulmar_core.robot import load_robot
-from fulmar_core.topics import GOAL_POSES, GOAL_WIRES
+from fulmar_core.config.errors import BagError
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.robots.topics import GOAL_POSES, GOAL_WIRES
+from fulmar_core.tasks.goal import goal_at
 from fulmar_ros.goal_messages import goal_message
 
 

@@ -23,7 +23,7 @@ from fulmar_bags.metadata import read_information
 from fulmar_bags.recovery import recover
 from fulmar_bags.writer import BagWriter
 from fulmar_bags.writer_thread import BagThread
-from fulmar_core.errors import BagError
+from fulmar_core.config.errors import BagError
 from tests.fulmar_bags.bags import publish_times
 
 TOPIC, TYPE = "/robot/word", "std_msgs/msg/String"

@@ -7,8 +7,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from fulmar_core.estimation.kinds import load_estimator
-from fulmar_core.robot import load_robot
+from fulmar_core.estimators.kinds import load_estimator
+from fulmar_core.robots.robot_file import load_robot
 from tests.benchmarks.estimator.comparison import (
     DELAY_LIMIT_S,
     MEAN,

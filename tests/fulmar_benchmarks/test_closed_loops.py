@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from fulmar_core.errors import UnknownNameError
+from fulmar_core.config.errors import UnknownNameError
 from tests.benchmarks.closed_loops import FIRST_SEED, Campaign, Command, Episode, measure
 from tests.benchmarks.hardware import CASES, cases_of
 

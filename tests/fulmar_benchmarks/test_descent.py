@@ -15,13 +15,13 @@ from fulmar_benchmarks.descent.batch import fly_in_batch
 from fulmar_benchmarks.descent.campaign import requirements, summary
 from fulmar_benchmarks.descent.flights import KILLED_S, Descent, DescentLog, Flights
 from fulmar_benchmarks.descent.live import fly_in_lockstep
-from fulmar_core.actuators.refuge import StopAtOnce
-from fulmar_core.attitude import from_euler
-from fulmar_core.errors import ConfigError, UnknownNameError
-from fulmar_core.robot import load_robot
+from fulmar_core.config.errors import ConfigError, UnknownNameError
+from fulmar_core.robots.actuators.refuge import StopAtOnce
+from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.safety.actuator_guard import ActuatorGuard
 from fulmar_core.safety.watchdog import Watchdog
-from fulmar_core.spatial import SpatialState
+from fulmar_core.states.attitude import from_euler
+from fulmar_core.states.spatial import SpatialState
 from fulmar_ros.plant_clock import SimulatedTime
 from fulmar_ros.plant_loops import UnansweredLoop
 from tests.ros.cli import fulmar, json_of
@@ -118,7 +118,7 @@ class Counting:
         self.robot, self.given = load_robot("floating_platform"), list[np.ndarray]()
 
     def step(self, command, ticks=1, *, begins=None):
-        from fulmar_core.backend import Sample
+        from fulmar_core.simulation.backend import Sample
 
         self.given.append(np.array(command))
         return Sample({}, None)

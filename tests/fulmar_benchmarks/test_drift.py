@@ -26,8 +26,8 @@ from fulmar_benchmarks.drift.targets import (
 )
 from fulmar_cli.commands.values import read_names
 from fulmar_cli.main import app
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.errors import UnknownNameError
+from fulmar_core.config.errors import UnknownNameError
+from fulmar_core.worlds.scenario import load_scenario
 
 FEW = "benchmark drift --through batch --controllers lqr --episodes 3 --rows ideal,two_lost,square --jobs 1"
 

@@ -11,7 +11,7 @@ import pytest
 from fulmar_benchmarks.falcon.campaign import Request, cells_of, ground_effect, requirements
 from fulmar_benchmarks.falcon.cells import SCENARIOS, figures, first_flight
 from fulmar_cli.commands.values import read_names
-from fulmar_core.robot import load_robot
+from fulmar_core.robots.robot_file import load_robot
 
 ROBOT = load_robot("airship_v7")
 PUBLISHED = {"rmse_per_axis_m": 0.012}

@@ -15,19 +15,19 @@ pytest.importorskip("mujoco")
 
 from fulmar_benchmarks.rans3d import pace
 from fulmar_benchmarks.rans3d.bound import most_targets
-from fulmar_benchmarks.rans3d.campaign import Request, _pair, _unit
-from fulmar_benchmarks.rans3d.document import document_of, figures_of
+from fulmar_benchmarks.rans3d.campaign import _pair, _unit
+from fulmar_benchmarks.rans3d.document import Request, document_of, figures_of
 from fulmar_benchmarks.rans3d.tables import print_tables
 from fulmar_benchmarks.rans3d.targets import DEAD, EPISODES, ROBOTS, SHIPPED, TASKS, published
 from fulmar_benchmarks.rans3d.unit import HELD, SpaceExtra, longest_run, started_within
 from fulmar_benchmarks.results import PairResult
 from fulmar_cli.main import app
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.episode import Episode, draw_episodes
-from fulmar_core.errors import UnknownNameError
-from fulmar_core.robot import load_robot
-from fulmar_core.spatial import SpatialState
+from fulmar_core.config.errors import UnknownNameError
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.simulation.episode import Episode, draw_episodes
+from fulmar_core.states.spatial import SpatialState
 from fulmar_core.tasks import load_task
+from fulmar_core.worlds.scenario import load_scenario
 
 FEW = "benchmark rans3d --episodes 2 --robots spacecraft_16 --tasks go_to_pose_3d --controllers lqr,policy"
 CELL = {"success_rate", "position_error_m", "attitude_error_deg", "episodes", "published"}

@@ -15,10 +15,10 @@ from fulmar_benchmarks.roboran.campaign import CampaignResult, document_of
 from fulmar_benchmarks.roboran.document import pair_entry
 from fulmar_benchmarks.roboran.targets import ROBOTS, TASKS
 from fulmar_benchmarks.unit import KEPT
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.episode import draw_episodes
-from fulmar_core.robot import load_robot
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.simulation.episode import draw_episodes
 from fulmar_core.tasks import load_task
+from fulmar_core.worlds.scenario import load_scenario
 
 pytestmark = pytest.mark.slow  # every pair is drawn
 EPISODES = 300

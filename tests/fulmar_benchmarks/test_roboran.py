@@ -9,7 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from fulmar_cli.main import app
-from fulmar_core.errors import UnknownNameError
+from fulmar_core.config.errors import UnknownNameError
 
 FEW = (
     "benchmark roboran --through batch --episodes 3 --no-report --robots floating_platform --tasks go_to_pose"

@@ -9,11 +9,11 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.episode import draw_episode
-from fulmar_core.errors import ConfigError, UnknownNameError
-from fulmar_core.robot import load_robot
+from fulmar_core.config.errors import ConfigError, UnknownNameError
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.simulation.episode import draw_episode
 from fulmar_core.tasks import load_task
+from fulmar_core.worlds.scenario import load_scenario
 
 mujoco = pytest.importorskip("mujoco")
 

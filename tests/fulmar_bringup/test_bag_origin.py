@@ -13,9 +13,9 @@ from fulmar_bringup.launched_system import list_nodes
 from fulmar_bringup.node_table import recorder_spec
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.system import Guards, System
-from fulmar_core.calibration import VARIABLE, Calibration, Measured, save_calibration
-from fulmar_core.config import load_config
-from fulmar_core.recording import Recording
+from fulmar_core.config.recording import Recording
+from fulmar_core.config.strict_yaml import load_config
+from fulmar_core.robots.calibration import VARIABLE, Calibration, Measured, save_calibration
 from fulmar_ros.recorder_settings import RecorderSettings
 
 LQR = RunPlan("floating_platform", "go_to_pose", "lqr", "mujoco", 50.0)

@@ -19,10 +19,10 @@ from std_msgs.msg import Bool
 from fulmar_bringup.commissioning.commission import PULSED, WIRINGS, Request, commission, is_right, rewired
 from fulmar_bringup.commissioning.hardware_file import command_of, line_of, wires_of, with_line, write_line
 from fulmar_bringup.commissioning.session import Session
-from fulmar_core.errors import ConfigError, RunFailed
-from fulmar_core.paths import OWN_FOLDERS, config_names
-from fulmar_core.robot import load_robot
-from fulmar_core.topics import ACTUATORS_STATE, AIR_BEARING, COMMAND, DIAGNOSTICS, MOCAP
+from fulmar_core.config.errors import ConfigError, RunFailed
+from fulmar_core.config.paths import OWN_FOLDERS, config_names
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.robots.topics import ACTUATORS_STATE, AIR_BEARING, COMMAND, DIAGNOSTICS, MOCAP
 from fulmar_ros.convert import VectorWriter, stamp_of
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.runtime import spinning

@@ -9,8 +9,8 @@ import pytest
 from fulmar_bringup.plan_checks import usual_controller
 from fulmar_bringup.task_choice import check_heading, default_task
 from fulmar_cli.commands.values import read_goal
-from fulmar_core.errors import ConfigError
-from fulmar_core.robot import load_robot
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.tasks import load_task
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from fulmar_bringup.domains import claimed_domain, reserved_domains
-from fulmar_core.errors import ConfigError
+from fulmar_core.config.errors import ConfigError
 
 
 def test_two_runs_in_one_domain_are_refused_until_the_first_is_over(monkeypatch):

@@ -13,8 +13,8 @@ from fulmar_bags.run_record import HealthSample, read_run
 from fulmar_bringup import run_executor
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.supervisor import Report
-from fulmar_core.errors import RunFailed
-from fulmar_core.wire_check import BETWEEN, WARNINGS, WIRE_WARNINGS
+from fulmar_core.config.errors import RunFailed
+from fulmar_core.robots.wire_check import BETWEEN, WARNINGS, WIRE_WARNINGS
 from fulmar_evaluation.run_summary import summarise, summary_text
 
 PLAN = RunPlan("floating_platform", "go_to_pose", "lqr", "mock", 5.0)

@@ -13,8 +13,8 @@ from fulmar_bringup.node_table import controller_spec
 from fulmar_bringup.operator_rows import run_goals_spec
 from fulmar_bringup.planning import plan_run
 from fulmar_bringup.task_choice import task_of_goals, task_of_run
-from fulmar_core.errors import ConfigError
-from fulmar_core.goal_files import load_goals
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.tasks.goal_files import load_goals
 
 
 @pytest.fixture

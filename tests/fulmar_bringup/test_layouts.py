@@ -13,10 +13,11 @@ import pytest
 import yaml
 
 from fulmar_bringup.layouts.layout_file import PROGRAMS, layout_text, write_layout
-from fulmar_core.errors import ConfigError, UnknownNameError
-from fulmar_core.paths import config_names, config_path
-from fulmar_core.robot import Robot, load_robot
-from fulmar_core.topics import (
+from fulmar_core.config.errors import ConfigError, UnknownNameError
+from fulmar_core.config.paths import config_names, config_path
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.robots.topics import (
     COMMAND,
     ESTOP_RESET,
     ESTOP_TRIGGER,

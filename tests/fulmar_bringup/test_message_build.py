@@ -14,7 +14,7 @@ import pytest
 
 from fulmar_bringup import message_build
 from fulmar_bringup.message_build import SOURCE, install_tf2_msgs
-from fulmar_core.errors import ConfigError, FulmarError
+from fulmar_core.config.errors import ConfigError, FulmarError
 
 REPOSITORY = Path(__file__).parents[2]
 BUILD = (

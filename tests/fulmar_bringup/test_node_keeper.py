@@ -14,7 +14,7 @@ from fulmar_bringup.run_plan import NodeSpec, RunPlan
 from fulmar_bringup.supervisor import Report
 from fulmar_bringup.system import Guards, OwnNode
 from fulmar_bringup.system_rows import system_rows
-from fulmar_core.errors import RunFailed
+from fulmar_core.config.errors import RunFailed
 
 PLAN = RunPlan(
     "floating_platform", "go_to_pose", "lqr", "mujoco", 5.0,

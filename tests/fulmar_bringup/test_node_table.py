@@ -14,8 +14,8 @@ from fulmar_bringup.node_table import controller_spec, plant_spec, recorder_spec
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.system import Guards, default_control_hz, default_guards, load_system
 from fulmar_bringup.system_rows import system_rows
-from fulmar_core.errors import ConfigError, UnknownNameError
-from fulmar_core.paths import OWN_FOLDERS, config_names
+from fulmar_core.config.errors import ConfigError, UnknownNameError
+from fulmar_core.config.paths import OWN_FOLDERS, config_names
 
 PLAN = RunPlan("floating_platform", "go_to_pose", "lqr", "mujoco", 50.0)
 SYSTEMS = pytest.mark.parametrize("system", config_names("systems"))

@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 
 from fulmar_bringup.launched_system import list_nodes
-from fulmar_core.paths import OWN_FOLDERS
+from fulmar_core.config.paths import OWN_FOLDERS
 from tests.own_files import own_folder
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "own-task.md"

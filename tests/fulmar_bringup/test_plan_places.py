@@ -6,7 +6,7 @@ import pytest
 
 from fulmar_bringup import planning
 from fulmar_bringup.system import Guards
-from fulmar_core.errors import ConfigError
+from fulmar_core.config.errors import ConfigError
 
 NARROW = {"area": (0.0, 2.0, -1.0, 1.0)}
 

@@ -10,10 +10,10 @@ import pytest
 
 from fulmar_bringup.node_table import plant_spec
 from fulmar_bringup.run_executor import execute
-from fulmar_core.bundle_signature import make_keys, sign_bundle
-from fulmar_core.errors import BundleError, ConfigError, DeviceError, UnknownNameError
-from fulmar_core.paths import config_directory
-from fulmar_core.recording import Recording
+from fulmar_core.config.errors import BundleError, ConfigError, DeviceError, UnknownNameError
+from fulmar_core.config.paths import config_directory
+from fulmar_core.config.recording import Recording
+from fulmar_core.loop.bundle_signature import make_keys, sign_bundle
 from hardware_drivers.hardware import hardware_path
 from policy_server.controllers import shipped_policy
 

@@ -9,8 +9,8 @@ import pytest
 
 from fulmar_bringup.node_table import controller_spec, plant_spec
 from fulmar_bringup.task_choice import check_heading, default_task, task_of_goals, task_of_run
-from fulmar_core.errors import ConfigError
-from fulmar_core.spatial import SpatialState
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.states.spatial import SpatialState
 
 
 class Still:

@@ -16,7 +16,7 @@ import yaml
 from fulmar_bringup import processes
 from fulmar_bringup.processes import YIELDING, Ended, ProcessGroup, child_environment, command_line
 from fulmar_bringup.run_plan import NodeSpec
-from fulmar_core.yielding import AUTOGROUP, BEHIND
+from fulmar_core.config.yielding import AUTOGROUP, BEHIND
 
 
 def spec(**parameters) -> NodeSpec:
@@ -127,7 +127,7 @@ def test_a_child_is_started_again_in_its_place_also_where_it_hangs(start):
 
 NICE_VALUES = """
 import os, pathlib, sys
-from fulmar_core.yielding import AUTOGROUP, take_place
+from fulmar_core.config.yielding import AUTOGROUP, take_place
 
 def nice():
     return os.getpriority(os.PRIO_PROCESS, 0)

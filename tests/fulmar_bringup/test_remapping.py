@@ -13,7 +13,7 @@ from fulmar_bringup.plan_checks import read_remappings
 from fulmar_bringup.processes import command_line
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.system import Guards
-from fulmar_core.errors import ConfigError
+from fulmar_core.config.errors import ConfigError
 
 NAME = "/vrpn_mocap/body/pose"
 PLAN = RunPlan(

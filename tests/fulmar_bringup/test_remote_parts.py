@@ -13,7 +13,7 @@ from fulmar_bringup.supervisor import Report
 from fulmar_bringup.system import varied_system
 from fulmar_bringup.system_events import SystemEvents
 from fulmar_bringup.system_rows import system_rows
-from fulmar_core.errors import ConfigError, UnknownNameError
+from fulmar_core.config.errors import ConfigError, UnknownNameError
 
 SETUP = {"robot": "floating_platform", "task": "go_to_pose", "control_hz": "50", "rate": "1"}
 

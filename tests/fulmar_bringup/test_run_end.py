@@ -11,8 +11,8 @@ from fulmar_bringup.node_table import plant_spec
 from fulmar_bringup.run_executor import _bring_down, _wait_for_end
 from fulmar_bringup.run_plan import NodeSpec, RunPlan
 from fulmar_bringup.supervisor import Report
-from fulmar_core.actuators.refuge import LANDS_S
-from fulmar_core.errors import RunFailed
+from fulmar_core.config.errors import RunFailed
+from fulmar_core.robots.actuators.refuge import LANDS_S
 from fulmar_core.safety.watchdog import NO_COMMAND
 
 PLAN = RunPlan("floating_platform", "go_to_pose", "lqr", "mujoco", 5.0, duration_s=1.0)

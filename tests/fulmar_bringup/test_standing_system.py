@@ -11,7 +11,7 @@ from fulmar_bringup.progress import live_line
 from fulmar_bringup.run_executor import Execution
 from fulmar_bringup.standing_system import Ending, keep_up, plan_system
 from fulmar_bringup.system import varied_system
-from fulmar_core.errors import ConfigError, UnknownNameError
+from fulmar_core.config.errors import ConfigError, UnknownNameError
 
 
 @pytest.fixture

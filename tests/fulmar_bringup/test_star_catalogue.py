@@ -7,8 +7,8 @@ import zipfile
 import pytest
 
 from fulmar_bringup import star_catalogue
-from fulmar_core.errors import ConfigError, FulmarError
-from fulmar_core.sky import catalogue
+from fulmar_core.config.errors import ConfigError, FulmarError
+from fulmar_core.robots.sensors import catalogue
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ import pytest
 
 from fulmar_bringup import readiness
 from fulmar_bringup.supervisor import Report
-from fulmar_core.errors import RunFailed
+from fulmar_core.config.errors import RunFailed
 
 
 def test_a_node_that_is_not_received_any_more_is_reported_apart_from_one_that_never_was(monkeypatch):

@@ -10,8 +10,8 @@ from fulmar_bringup.launched_system import list_nodes
 from fulmar_bringup.run_plan import NodeSpec, RunPlan
 from fulmar_bringup.system import Guards, load_system
 from fulmar_bringup.system_rows import check_rows, system_rows
-from fulmar_core.errors import ConfigError
-from fulmar_core.paths import config_names
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.config.paths import config_names
 
 PLAN = RunPlan("floating_platform", "go_to_pose", "lqr", "mujoco", 50.0)
 ESTIMATED = replace(PLAN, guards=Guards(estimator="mocap_imu"), lockstep=True)

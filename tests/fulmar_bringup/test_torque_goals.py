@@ -12,17 +12,17 @@ from fulmar_bringup.bag_origin import attachments
 from fulmar_bringup.excitation_plan import torques_note
 from fulmar_bringup.node_table import controller_spec
 from fulmar_bringup.task_choice import task_of_run
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.config.paths import config_names
 from fulmar_core.controllers.controller import Inputs
 from fulmar_core.controllers.excite import excite_of
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.errors import ConfigError
-from fulmar_core.excitation.profiles import DURATION_S, PROFILES
-from fulmar_core.excitation.settings import Torques
-from fulmar_core.goal_files import load_goals, load_torques
-from fulmar_core.paths import config_names
-from fulmar_core.robot import load_robot
-from fulmar_core.simulation import BatchSimulation
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.simulation.simulation import BatchSimulation
 from fulmar_core.tasks import load_task
+from fulmar_core.tasks.excitation import Torques
+from fulmar_core.tasks.goal_files import load_goals, load_torques
+from fulmar_core.tasks.torque_profiles import DURATION_S, PROFILES
+from fulmar_core.worlds.scenario import load_scenario
 
 SATELLITES = ("cubesat_wheels", "microsat", "smallsat")
 

@@ -16,8 +16,8 @@ from fulmar_bringup.launched_system import list_nodes
 from fulmar_bringup.layouts.layout_file import PROGRAMS, layout_text
 from fulmar_bringup.service.device_rules import device_rules
 from fulmar_bringup.service.unit import PASSED, Service, command_of, unit_text
-from fulmar_core.errors import ConfigError
-from fulmar_core.written_text import LINE, NAME, USER, check_written
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.config.written_text import LINE, NAME, USER, check_written
 from hardware_drivers.hardware import load_hardware
 
 SERVICE = Service("a", "mujoco_lqr", ("/bin/fulmar", "up"), "games")

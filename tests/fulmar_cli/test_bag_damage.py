@@ -17,9 +17,9 @@ from fulmar_bags.figures import describe
 from fulmar_bags.message_types import type_store
 from fulmar_bags.ring import FAULTS
 from fulmar_bags.writer import BagWriter
-from fulmar_core.errors import BagError, FulmarError
-from fulmar_core.paths import config_path
-from fulmar_core.topics import ODOMETRY
+from fulmar_core.config.errors import BagError, FulmarError
+from fulmar_core.config.paths import config_path
+from fulmar_core.robots.topics import ODOMETRY
 from tests.foreign_bag import write_foreign
 from tests.fulmar_cli.bag_commands import POLICY, answer, ask, file_of
 

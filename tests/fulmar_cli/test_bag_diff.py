@@ -14,7 +14,7 @@ from fulmar_bags.contents import open_bag
 from fulmar_bags.decode import messages, stamp_of
 from fulmar_bags.message_types import type_store
 from fulmar_bags.writer import BagWriter
-from fulmar_core.topics import ODOMETRY
+from fulmar_core.robots.topics import ODOMETRY
 from tests.fulmar_cli.bag_commands import LQR, POLICY, answer, ask
 
 SCAN, PATH = "sensor_msgs/msg/LaserScan", "nav_msgs/msg/Path"

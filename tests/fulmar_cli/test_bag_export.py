@@ -16,9 +16,9 @@ from fulmar_bags.decode import joint_vectors, odometries
 from fulmar_bags.lerobot import _table
 from fulmar_bags.writer import BagWriter
 from fulmar_cli.main import app
-from fulmar_core.errors import BagError
-from fulmar_core.paths import OWN_FOLDERS, config_path
-from fulmar_core.topics import ACTION, COMMAND, OBSERVATION, ODOMETRY
+from fulmar_core.config.errors import BagError
+from fulmar_core.config.paths import OWN_FOLDERS, config_path
+from fulmar_core.robots.topics import ACTION, COMMAND, OBSERVATION, ODOMETRY
 from tests.foreign_bag import write_foreign
 from tests.fulmar_cli.bag_commands import BAGS, POLICY, answer, ask
 from tests.fulmar_cli.test_bag_diff import SCAN, bag_of, scan

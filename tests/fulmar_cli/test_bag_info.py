@@ -13,7 +13,7 @@ from fulmar_bags.decode import stamps_ns
 from fulmar_bags.figures import describe
 from fulmar_bags.ring import FAULTS
 from fulmar_bags.writer import BagWriter
-from fulmar_core.topics import ODOMETRY
+from fulmar_core.robots.topics import ODOMETRY
 from tests.fulmar_cli.bag_commands import POLICY, answer, ask
 
 

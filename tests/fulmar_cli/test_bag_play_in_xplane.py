@@ -16,9 +16,9 @@ from fulmar_bags.contents import open_bag
 from fulmar_bags.message_types import type_store
 from fulmar_bags.writer import BagWriter
 from fulmar_bringup import xplane_player
-from fulmar_core.attitude import from_euler
-from fulmar_core.errors import BagError, DeviceError
-from fulmar_core.topics import ODOMETRY
+from fulmar_core.config.errors import BagError, DeviceError
+from fulmar_core.robots.topics import ODOMETRY
+from fulmar_core.states.attitude import from_euler
 from hardware_drivers.ports import UdpPort
 from hardware_drivers.xplane_link import XPlaneLink
 from tests.fulmar_cli.bag_commands import answer, ask

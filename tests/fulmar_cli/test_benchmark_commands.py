@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 from fulmar_bringup.console import write_line
 from fulmar_cli.commands import benchmark as commands
 from fulmar_cli.commands.arguments import renamed
-from fulmar_core.errors import ConfigError
+from fulmar_core.config.errors import ConfigError
 
 MACHINERY = sorted(commands.OF_A_CHECKOUT)
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from fulmar_core.paths import OWN_FOLDERS, config_names, config_path
-from fulmar_core.robot import load_robot
+from fulmar_core.config.paths import OWN_FOLDERS, config_names, config_path
+from fulmar_core.robots.robot_file import load_robot
 from tests import new_robots
 from tests.fulmar_cli.command_line import complaint
 

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from fulmar_core import policy_bundle
-from fulmar_core.paths import config_directory
+from fulmar_core.config.paths import config_directory
+from fulmar_core.loop import policy_bundle
 from tests.fulmar_cli.command_line import EVALUATE, RUN, SHIPPED, complaint
 
 CRAFT = ["run", "spacecraft_16"]

@@ -8,11 +8,11 @@ import pytest
 
 from fulmar_bringup.bag_origin import attachments
 from fulmar_bringup.run_plan import RunPlan
-from fulmar_core.config import load_config
+from fulmar_core.config.paths import OWN_FOLDERS
+from fulmar_core.config.strict_yaml import load_config
 from fulmar_core.controllers.classical import gains_of
 from fulmar_core.controllers.lqr import LqrWeights
-from fulmar_core.paths import OWN_FOLDERS
-from fulmar_core.robot import load_robot
+from fulmar_core.robots.robot_file import load_robot
 from fulmar_evaluation import run_outcome
 from fulmar_ros.recorder_settings import RecorderSettings
 from tests.new_robots import TASKS, write_new_robots

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from fulmar_cli.diagnosis.devices import diagnose_hardware
-from fulmar_core.errors import ConfigError
-from fulmar_core.paths import config_names
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.config.paths import config_names
 from hardware_drivers.devices import UNPROTECTED, own_watchdog
 from hardware_drivers.hardware import load_hardware
 

@@ -20,8 +20,8 @@ from fulmar_bringup.planning import plan_run
 from fulmar_bringup.readiness import command_input, wait_for_publisher, wait_for_reader
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.supervisor import Report
-from fulmar_core.errors import ConfigError, RunFailed
-from fulmar_core.wire_check import Offer
+from fulmar_core.config.errors import ConfigError, RunFailed
+from fulmar_core.robots.wire_check import Offer
 from fulmar_evaluation.run_summary import summarise, summary_text
 from fulmar_ros.recorder_health import COMMANDERS
 from tests.fulmar_cli.command_line import complaint

@@ -9,9 +9,9 @@ import pytest
 
 from fulmar_bringup.operator_rows import goals_spec
 from fulmar_cli.commands.goals import goals
-from fulmar_core.errors import ConfigError, UnknownNameError
-from fulmar_core.goal_files import Poses, Positions, load_goal_file, single_goal
-from fulmar_core.paths import config_names
+from fulmar_core.config.errors import ConfigError, UnknownNameError
+from fulmar_core.config.paths import config_names
+from fulmar_core.tasks.goal_files import Poses, Positions, load_goal_file, single_goal
 from fulmar_ros.goal_node import GoalSettings
 
 

@@ -10,8 +10,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from fulmar_cli import installed_as
-from fulmar_cli.installed_as import install_command, repair_command
+from fulmar_cli.installation import installed_as
+from fulmar_cli.installation.installed_as import install_command, repair_command
 
 WHEEL = "file:///srv/fulmar-0.1.0-py3-none-any.whl"
 

@@ -12,8 +12,8 @@ import pytest
 import typer
 
 from fulmar_cli import main
-from fulmar_cli.extras import EXTRAS
-from fulmar_cli.installed_as import install_command
+from fulmar_cli.installation.extras import EXTRAS
+from fulmar_cli.installation.installed_as import install_command
 from tests.fulmar_cli.bag_commands import POLICY
 from tests.fulmar_cli.command_line import SHIPPED
 

@@ -24,15 +24,15 @@ from mcap.writer import MCAP0_MAGIC
 from fulmar_bags.contents import open_bag
 from fulmar_bags.event_files import open_event_file
 from fulmar_bags.recovery import recover
-from fulmar_core.bundle_signature import verify_bundle
-from fulmar_core.calibration import load_calibration
-from fulmar_core.errors import FulmarError
-from fulmar_core.estimation.kinds import load_estimator
-from fulmar_core.goal_files import load_goals
-from fulmar_core.policy_bundle import GOLDEN, NETWORK, PASSPORT, SIGNATURE, read_bundle
-from fulmar_core.robot import load_robot
-from fulmar_core.sky import catalogue
+from fulmar_core.config.errors import FulmarError
+from fulmar_core.estimators.kinds import load_estimator
+from fulmar_core.loop.bundle_signature import verify_bundle
+from fulmar_core.loop.policy_bundle import GOLDEN, NETWORK, PASSPORT, SIGNATURE, read_bundle
+from fulmar_core.robots.calibration import load_calibration
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.robots.sensors import catalogue
 from fulmar_core.tasks import load_task
+from fulmar_core.tasks.goal_files import load_goals
 from hardware_drivers.hardware import load_hardware
 from policy_server.controllers import shipped_policies
 from policy_server.policy import Policy

@@ -9,7 +9,7 @@ import pytest
 from fulmar_bringup.commissioning.hardware_file import wires_of
 from fulmar_bringup.launched_system import list_nodes
 from fulmar_cli.diagnosis.devices import diagnose_hardware
-from fulmar_core.errors import ConfigError
+from fulmar_core.config.errors import ConfigError
 from hardware_drivers.hardware import load_hardware
 from tests.fulmar_cli.command_line import RUN, complaint
 from tests.own_files import own_folder

@@ -22,9 +22,9 @@ from fulmar_bags.event_files import EventFile, open_event_file
 from fulmar_bags.event_packets import events_of_cloud
 from fulmar_bags.wire_reader import WireReader
 from fulmar_cli.main import app
-from fulmar_core.errors import BagError, ConfigError
-from fulmar_core.sky.events import Events, joined
-from fulmar_core.topics import EVENTS
+from fulmar_core.config.errors import BagError, ConfigError
+from fulmar_core.dynamics.sky.events import Events, joined
+from fulmar_core.robots.topics import EVENTS
 from tests.fulmar_cli.bag_commands import POLICY
 
 AEDAT4 = Path(__file__).parents[1] / "fulmar_bags" / "event_files" / "stars.aedat4"

@@ -12,7 +12,7 @@ from rosbags.rosbag2.enums import StoragePlugin
 from fulmar_bags.contents import open_bag
 from fulmar_bags.message_types import type_store
 from fulmar_bags.run_record import read_any_run
-from fulmar_core.errors import BagError
+from fulmar_core.config.errors import BagError
 from fulmar_evaluation.report.writer import check_overwrite, default_report, source_mark
 from fulmar_evaluation.run_evaluation import evaluate_run
 from tests.foreign_bag import write_foreign

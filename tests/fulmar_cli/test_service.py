@@ -11,8 +11,8 @@ import pytest
 
 from fulmar_bringup.service.device_rules import device_groups, device_rules
 from fulmar_bringup.service.unit import RT_LIMIT, Service, command_of, system_of_unit, unit_text
-from fulmar_core.errors import BAD_USAGE, DONE, FAILED
-from fulmar_core.paths import config_names
+from fulmar_core.config.errors import BAD_USAGE, DONE, FAILED
+from fulmar_core.config.paths import config_names
 from hardware_drivers.hardware import load_hardware
 from tests.own_files import own_folder
 

@@ -16,8 +16,8 @@ pytest.importorskip("stable_baselines3")
 from fulmar_cli.commands.benchmark_training import training
 from fulmar_cli.commands.policies import policies
 from fulmar_cli.commands.train import train
-from fulmar_core.calibration import Calibration, Measured, calibration_path, save_calibration
-from fulmar_core.errors import ConfigError
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.robots.calibration import Calibration, Measured, calibration_path, save_calibration
 from training.jobs import Outcome
 from training.progress import LearningBar
 from training.run_folder import learning_in, read_start, write_start
@@ -178,7 +178,7 @@ def test_training_says_when_it_ends_early(learned, monkeypatch, tmp_path, more, 
 
 
 def test_the_rate_of_the_commands_may_be_another_than_the_robot_s(learned, tmp_path):
-    from fulmar_core.robot import load_robot
+    from fulmar_core.robots.robot_file import load_robot
 
     assert call(train, *PLATFORM, "--control-hz", 50, "--out", tmp_path / "run")[0] == 0
     (job,) = learned
@@ -190,7 +190,7 @@ def test_the_rate_of_the_commands_may_be_another_than_the_robot_s(learned, tmp_p
 
 
 def test_a_run_is_resumed_with_the_settings_and_limits_it_began_with(learned, tmp_path):
-    from fulmar_core.robot import load_robot
+    from fulmar_core.robots.robot_file import load_robot
     from fulmar_core.tasks import load_task
     from training.settings import load_training_settings, write_training_settings
 

@@ -21,7 +21,7 @@ from typing import Any
 import typer
 
 from fulmar_cli import main
-from fulmar_cli.extras import EXTRAS
+from fulmar_cli.installation.extras import EXTRAS
 
 PACKAGES = (
     "fulmar_core", "fulmar_bags", "fulmar_ros", "fulmar_bringup", "fulmar_evaluation", "fulmar_benchmarks",

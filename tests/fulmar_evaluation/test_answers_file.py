@@ -18,8 +18,8 @@ from fulmar_bags.figures import controllers_of
 from fulmar_bags.message_types import type_store
 from fulmar_bags.writer import BagWriter
 from fulmar_cli.main import app
-from fulmar_core.errors import ConfigError
-from fulmar_core.topics import ACTION, METADATA, ODOMETRY
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.robots.topics import ACTION, METADATA, ODOMETRY
 from tests.foreign_bag import write_foreign
 
 POLICY = Path(__file__).resolve().parents[1] / "replay" / "bags" / "floating_platform_go_to_pose_policy"

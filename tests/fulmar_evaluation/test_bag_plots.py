@@ -10,7 +10,7 @@ import pytest
 from fulmar_bags.contents import open_bag
 from fulmar_bags.decode import odometries
 from fulmar_bags.run_record import read_run
-from fulmar_core.topics import ODOMETRY
+from fulmar_core.robots.topics import ODOMETRY
 from fulmar_evaluation.report.bag_report import _drawings
 from fulmar_evaluation.report.control_plot import open_spans
 from fulmar_evaluation.run_evaluation import evaluate_run

@@ -9,10 +9,10 @@ import pytest
 
 from fulmar_bags.contents import open_bag
 from fulmar_bags.writer import BagWriter
+from fulmar_core.config.errors import ConfigError, UnknownNameError
+from fulmar_core.config.paths import OWN_FOLDERS, config_names, config_path
 from fulmar_core.controllers.classical import gains_of, gains_path
-from fulmar_core.errors import ConfigError, UnknownNameError
-from fulmar_core.paths import OWN_FOLDERS, config_names, config_path
-from fulmar_core.robot import load_robot
+from fulmar_core.robots.robot_file import load_robot
 from fulmar_evaluation.rerun.embedded_configs import knowing_what_it_carries, knowing_what_they_carry
 
 TURTLEBOT = config_path("robots", "turtlebot2").read_text()

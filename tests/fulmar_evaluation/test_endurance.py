@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from fulmar_core.wire_check import BETWEEN, WARNINGS
+from fulmar_core.robots.wire_check import BETWEEN, WARNINGS
 from fulmar_evaluation.faults import endurance
 from fulmar_evaluation.faults.endurance import complaint, endured
 from fulmar_evaluation.faults.observer import HealthStatus

@@ -8,8 +8,8 @@ import pytest
 from typer.testing import CliRunner
 
 from fulmar_cli.main import app
-from fulmar_core.errors import ConfigError
-from fulmar_core.figures import FIGURES, SUCCESS, meanings
+from fulmar_core.config.errors import ConfigError
+from fulmar_evaluation.figures import FIGURES, SUCCESS, meanings
 
 POSE = "evaluate floating_platform go_to_pose --controller lqr --through batch"
 TIMING = {"wall_s", "steps_per_s"}

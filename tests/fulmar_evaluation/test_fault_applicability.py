@@ -8,13 +8,13 @@ from pathlib import Path
 
 import pytest
 
-from fulmar_core.flight.trim import find_trim
-from fulmar_core.goal_files import load_goals
-from fulmar_core.paths import config_names
-from fulmar_core.planar import PlanarState
-from fulmar_core.robot import load_robot
+from fulmar_core.config.paths import config_names
+from fulmar_core.dynamics.flight_trim import find_trim
+from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.safety.geofence import is_inside
-from fulmar_core.spatial import SpatialState
+from fulmar_core.states.planar import PlanarState
+from fulmar_core.states.spatial import SpatialState
+from fulmar_core.tasks.goal_files import load_goals
 from fulmar_evaluation.faults import command_faults
 from fulmar_evaluation.faults.fault import possible
 from fulmar_evaluation.faults.fault_environment import (

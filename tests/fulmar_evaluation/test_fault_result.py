@@ -15,7 +15,7 @@ import pytest
 
 from fulmar_bags.contents import open_bag
 from fulmar_bags.decode import stamps_ns
-from fulmar_core.topics import ODOMETRY
+from fulmar_core.robots.topics import ODOMETRY
 from fulmar_evaluation.faults.fault import stopped
 from fulmar_evaluation.faults.fault_environment import request_of
 from fulmar_evaluation.faults.live_system import LiveSystem

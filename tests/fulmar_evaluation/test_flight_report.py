@@ -14,13 +14,13 @@ from fulmar_bags.decode import odometries
 from fulmar_bags.run_record import NO_SURFACES, read_run
 from fulmar_core.controllers.classical import load_classical
 from fulmar_core.controllers.controller import Inputs
-from fulmar_core.disturbances.scenario import Scenario
-from fulmar_core.episode import draw_episode
-from fulmar_core.references.flight_paths import PATHS
-from fulmar_core.robot import load_robot
-from fulmar_core.spatial import SpatialState
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.robots.topics import ODOMETRY
+from fulmar_core.simulation.episode import draw_episode
+from fulmar_core.states.spatial import SpatialState
 from fulmar_core.tasks import load_task
-from fulmar_core.topics import ODOMETRY
+from fulmar_core.tasks.references.flight_paths import PATHS
+from fulmar_core.worlds.scenario import Scenario
 from fulmar_evaluation.report.bag_report import _drawings
 from fulmar_evaluation.report.flight_plot import draw_flight, draw_surfaces, reference_places
 from fulmar_evaluation.report.run_report import write_report

@@ -7,9 +7,9 @@ from nav_msgs.msg import Odometry
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 
-from fulmar_core.robot import load_robot
-from fulmar_core.robot_name import frames_of
-from fulmar_core.topics import ACTUATORS_STATE, TRUTH, command_wire
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.robots.topics import ACTUATORS_STATE, TRUTH, command_wire
+from fulmar_core.wires.robot_name import frames_of
 from fulmar_evaluation.faults.flight_watch import FlightWatch
 from fulmar_evaluation.faults.observer import RunObserver
 

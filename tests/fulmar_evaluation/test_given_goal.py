@@ -11,7 +11,7 @@ import pytest
 from fulmar_bags.contents import open_bag
 from fulmar_bags.control_steps import control_steps_of
 from fulmar_bags.run_record import read_run
-from fulmar_core.errors import BagError, ConfigError
+from fulmar_core.config.errors import BagError, ConfigError
 from fulmar_evaluation.run_evaluation import evaluate_run
 
 BAG = Path(__file__).resolve().parents[1] / "replay/bags/floating_platform_go_to_pose_policy"

@@ -6,8 +6,8 @@ import json
 
 import pytest
 
-from fulmar_core.calibration import load_calibration
-from fulmar_core.robot import load_robot
+from fulmar_core.robots.calibration import load_calibration
+from fulmar_core.robots.robot_file import load_robot
 
 pytest.importorskip("mujoco")
 

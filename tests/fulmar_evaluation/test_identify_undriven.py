@@ -9,8 +9,8 @@ import pytest
 from typer.testing import CliRunner
 
 from fulmar_cli.main import app
-from fulmar_core.calibration import load_calibration
-from fulmar_core.errors import ConfigError
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.robots.calibration import load_calibration
 from tests.synthetic_run import Plan, write_run
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fulmar_core.config import load_config
+from fulmar_core.config.strict_yaml import load_config
 from fulmar_evaluation.faults.fault_environment import FaultEnvironment, request_of
 from fulmar_evaluation.faults.launched import RUN, WrittenRequest, command_of
 

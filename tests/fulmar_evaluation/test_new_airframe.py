@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fulmar_core.config import load_config
-from fulmar_core.errors import ConfigError
-from fulmar_core.flight.atmosphere import SEA_LEVEL
-from fulmar_core.robot import load_robot_file
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.config.strict_yaml import load_config
+from fulmar_core.robots.airframe.atmosphere import SEA_LEVEL
+from fulmar_core.robots.robot_file import load_robot_file
 from fulmar_evaluation.new_airframe import coefficient_set as module
 from fulmar_evaluation.new_airframe.coefficient_set import coefficient_set
 from fulmar_evaluation.new_airframe.geometry import Flap, Geometry

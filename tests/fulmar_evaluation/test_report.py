@@ -12,7 +12,7 @@ import pytest
 
 from fulmar_bags.run_record import read_run
 from fulmar_bags.writer import BagWriter
-from fulmar_core.errors import ConfigError
+from fulmar_core.config.errors import ConfigError
 from fulmar_evaluation.report.control_plot import open_spans, watchdog_spans
 from fulmar_evaluation.report.run_report import write_report
 from fulmar_evaluation.report.style import colours

@@ -18,11 +18,11 @@ from fulmar_bags.contents import open_bag
 from fulmar_bags.control_steps import control_steps_of
 from fulmar_bags.writer import BagWriter
 from fulmar_cli.main import app
-from fulmar_core.calibration import VARIABLE, Calibration, Measured, save_calibration
-from fulmar_core.errors import BagError, ConfigError
-from fulmar_core.policy_bundle import NETWORK, Golden, read_golden, read_passport, write_bundle
-from fulmar_core.robot import load_robot
-from fulmar_core.topics import ODOMETRY
+from fulmar_core.config.errors import BagError, ConfigError
+from fulmar_core.loop.policy_bundle import NETWORK, Golden, read_golden, read_passport, write_bundle
+from fulmar_core.robots.calibration import VARIABLE, Calibration, Measured, save_calibration
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.robots.topics import ODOMETRY
 from fulmar_evaluation.rerun import live_node
 from fulmar_evaluation.rerun.embedded_configs import calibrated_as
 from fulmar_evaluation.rerun.reference_bags import TOLERANCES

@@ -13,10 +13,10 @@ from fulmar_bags.contents import Bag, Topic, open_bag
 from fulmar_bags.control_steps import ControlSteps, control_steps_of
 from fulmar_bags.figures import describe
 from fulmar_bags.message_types import type_store
+from fulmar_core.config.errors import BagError, RunFailed
 from fulmar_core.controllers.classical import load_classical
 from fulmar_core.controllers.controller import Inputs
-from fulmar_core.errors import BagError, RunFailed
-from fulmar_core.topics import ESTOP, ESTOP_RELEASED, METADATA, SWAP, Wire
+from fulmar_core.robots.topics import ESTOP, ESTOP_RELEASED, METADATA, SWAP, Wire
 from fulmar_evaluation.rerun.live_node import rerun_through_node
 from fulmar_evaluation.rerun.replay_controllers import answers_of
 from fulmar_evaluation.rerun.rerun import Answers, rerun

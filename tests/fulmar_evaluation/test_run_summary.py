@@ -10,8 +10,8 @@ import pytest
 
 from fulmar_bags.run_record import Motion, Places, read_run
 from fulmar_bags.writer import BagWriter
-from fulmar_core.errors import BagError
-from fulmar_core.rotation import yaw_of
+from fulmar_core.config.errors import BagError
+from fulmar_core.states.rotation import yaw_of
 from fulmar_core.tasks import load_task
 from fulmar_evaluation.run_evaluation import _goals, evaluate_run
 from fulmar_evaluation.run_summary import latencies_ms, summarise, summary_text

@@ -16,11 +16,11 @@ from fulmar_bags.contents import open_bag
 from fulmar_bags.decode import odometries
 from fulmar_bags.run_record import read_run
 from fulmar_cli.main import app
-from fulmar_core.attitude import angle_between
-from fulmar_core.calibration import load_calibration
-from fulmar_core.rotation import rotate
-from fulmar_core.spatial import SpatialState, quat_of
-from fulmar_core.topics import ODOMETRY
+from fulmar_core.robots.calibration import load_calibration
+from fulmar_core.robots.topics import ODOMETRY
+from fulmar_core.states.attitude import angle_between
+from fulmar_core.states.rotation import rotate
+from fulmar_core.states.spatial import SpatialState, quat_of
 from fulmar_evaluation.report.bag_report import _drawings
 from fulmar_evaluation.report.control_plot import actuators_height, draw_actuators, open_spans
 from fulmar_evaluation.report.error_plot import draw_progress, strips

@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from fulmar_core.actuators.response import Response
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.episode import draw_episodes
-from fulmar_core.planar import at_rest
-from fulmar_core.robot import load_robot
-from fulmar_core.seeds import EVALUATION_SEED
-from fulmar_core.simulation import BatchSimulation
+from fulmar_core.config.seeds import EVALUATION_SEED
+from fulmar_core.robots.actuators.response import Response
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.simulation.episode import draw_episodes
+from fulmar_core.simulation.simulation import BatchSimulation
+from fulmar_core.states.planar import at_rest
 from fulmar_core.tasks import load_task
+from fulmar_core.worlds.scenario import load_scenario
 from fulmar_evaluation.bounds import (
     Motions,
     bound_of,

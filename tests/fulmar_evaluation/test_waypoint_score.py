@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.episode import Episode, draw_episodes
-from fulmar_core.figures import FIGURES
-from fulmar_core.goal import goal_at, stack_goals
-from fulmar_core.planar import at_rest
-from fulmar_core.robot import load_robot
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.simulation.episode import Episode, draw_episodes
+from fulmar_core.states.planar import at_rest
 from fulmar_core.tasks import load_task
+from fulmar_core.tasks.goal import goal_at, stack_goals
+from fulmar_core.worlds.scenario import load_scenario
+from fulmar_evaluation.figures import FIGURES
 from fulmar_evaluation.waypoint_score import WaypointBound, bound_figures, has_bound, waypoint_bound
 
 TASK = load_task("go_through_positions")

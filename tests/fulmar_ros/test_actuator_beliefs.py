@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fulmar_core.controller_settings import ControllerSettings
-from fulmar_core.health.applied import AppliedHistory
-from fulmar_core.health.beliefs import NO_EFFECT, Beliefs
-from fulmar_core.robot import load_robot
+from fulmar_core.estimators.actuator_health.applied import AppliedHistory
+from fulmar_core.estimators.actuator_health.beliefs import NO_EFFECT, Beliefs
+from fulmar_core.loop.controller_settings import ControllerSettings
+from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.safety.input_gate import Measurement
-from fulmar_core.state import RigidBodyState
+from fulmar_core.states.state import RigidBodyState
 from fulmar_ros.actuator_beliefs import ActuatorBeliefs
 
 STEP_NS = 200_000_000

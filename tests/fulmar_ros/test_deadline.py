@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from fulmar_core.process import (
+from fulmar_core.config.process import (
     CONTROL_PRIORITY,
     PLANT_PRIORITY,
     give_up_priority,

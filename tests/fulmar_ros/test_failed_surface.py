@@ -9,11 +9,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fulmar_core.backend import Sample
-from fulmar_core.health.feedback_check import ActuatorFeedback
-from fulmar_core.robot import load_robot
-from fulmar_core.sensors.reading import Reading
-from fulmar_core.sensors.surfaces import SurfacePositions
+from fulmar_core.estimators.actuator_health.feedback_check import ActuatorFeedback
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.robots.sensors.surfaces import SurfacePositions
+from fulmar_core.simulation.backend import Sample
+from fulmar_core.wires.reading import Reading
 from fulmar_ros.plant_clock import SimulatedTime
 from fulmar_ros.plant_loops import RealtimeLoop
 

@@ -18,9 +18,9 @@ from fulmar_bags.message_reader import (
     obstacles_of,
     stamp_ns,
 )
-from fulmar_core.goal import goal_at
-from fulmar_core.planar import PlanarState
-from fulmar_core.robot_name import frames_of
+from fulmar_core.states.planar import PlanarState
+from fulmar_core.tasks.goal import goal_at
+from fulmar_core.wires.robot_name import frames_of
 from fulmar_ros.goal_messages import goal_message, obstacles_message
 
 NAN = float("nan")

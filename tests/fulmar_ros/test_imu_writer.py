@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from fulmar_core.robot import load_robot
-from fulmar_core.sensors.imu import ImuSample
-from fulmar_core.sensors.reading import Reading
-from fulmar_core.sensors.table import SENSORS
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.robots.sensors.imu import ImuSample
+from fulmar_core.robots.sensors.table import SENSORS
+from fulmar_core.wires.reading import Reading
 from fulmar_ros.sensor_wires import ReadingWriter
 
 TURN = np.array([0.0, 0.0, 0.3])

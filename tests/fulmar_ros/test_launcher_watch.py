@@ -9,7 +9,7 @@ import time
 
 import pytest
 
-from fulmar_core.process import LAUNCHER_PID, is_stopped
+from fulmar_core.config.process import LAUNCHER_PID, is_stopped
 from fulmar_ros.launcher_watch import LOOK_S, STOPPED_S, WORDS, LauncherWatch
 
 

@@ -7,8 +7,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from fulmar_core.errors import LockstepError
-from fulmar_core.robot import load_robot
+from fulmar_core.config.errors import LockstepError
+from fulmar_core.robots.robot_file import load_robot
 from fulmar_ros.plant_clock import SimulatedTime
 from fulmar_ros.plant_loops import LockstepLoop
 

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 
 from fulmar_bags.message_reader import obstacles_of
-from fulmar_core.control_loop import ControlLoop
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.episode import draw_episode
-from fulmar_core.goal import goal_at
-from fulmar_core.mission import Mission
-from fulmar_core.observation import Observer
-from fulmar_core.planar import at_rest
-from fulmar_core.robot import load_robot
+from fulmar_core.loop.control_loop import ControlLoop
+from fulmar_core.loop.mission import Mission
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.simulation.episode import draw_episode
+from fulmar_core.states.planar import at_rest
 from fulmar_core.tasks import load_task
+from fulmar_core.tasks.goal import goal_at
+from fulmar_core.tasks.observation import Observer
+from fulmar_core.worlds.scenario import load_scenario
 from fulmar_ros.goal_messages import obstacles_message
 
 S = 1_000_000_000

@@ -8,7 +8,7 @@ import time
 import numpy as np
 import pytest
 
-from fulmar_core.robot import load_robot
+from fulmar_core.robots.robot_file import load_robot
 from fulmar_ros.motion_capture import MotionCapture, PacedCapture, SteppedCapture, capture_maker, moved_on
 from tests.states import planar_state
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from rclpy.serialization import serialize_message
 
-from fulmar_core.controller_settings import ControllerSettings
-from fulmar_core.robot import load_robot
+from fulmar_core.loop.controller_settings import ControllerSettings
+from fulmar_core.robots.robot_file import load_robot
 from fulmar_ros.convert import OdometryReader, OdometryWriter
 from tests.states import planar_state
 

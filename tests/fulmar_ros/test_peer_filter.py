@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from fulmar_core.errors import ConfigError
+from fulmar_core.config.errors import ConfigError
 from fulmar_ros.peer_filter import PeerFilter, addresses_of, attach, program
 
 DOMAIN = 100  # used by no test, since tests reserve theirs at random: the ports below are bound here alone

@@ -9,9 +9,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fulmar_core.backend import Sample
-from fulmar_core.robot import load_robot
-from fulmar_core.sensors.reading import Reading
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.simulation.backend import Sample
+from fulmar_core.wires.reading import Reading
 from fulmar_ros.plant_clock import SimulatedTime, WallTime
 from fulmar_ros.plant_loops import RealtimeLoop
 from tests.states import planar_state

@@ -9,7 +9,7 @@ import pytest
 from geometry_msgs.msg import InertiaStamped
 from sensor_msgs.msg import JointState
 
-from fulmar_core.robot import load_robot
+from fulmar_core.robots.robot_file import load_robot
 from fulmar_ros.convert import stamp_of
 from fulmar_ros.satellite_inputs import SatelliteInputs
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from fulmar_bags.message_reader import reading_of
-from fulmar_core.robot import load_robot
-from fulmar_core.robot_name import PLAIN, Frames
-from fulmar_core.sensors.reading import Reading
-from fulmar_core.sensors.star_tracker import StarTrackerSpec
-from fulmar_core.sensors.table import SENSORS
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.robots.sensors.star_tracker import StarTrackerSpec
+from fulmar_core.robots.sensors.table import SENSORS
+from fulmar_core.wires.reading import Reading
+from fulmar_core.wires.robot_name import PLAIN, Frames
 from fulmar_ros.sensor_wires import ReadingWriter, SensorWires
 from tests.states import planar_state
 

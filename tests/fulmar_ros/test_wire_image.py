@@ -10,9 +10,9 @@ from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
 
 from fulmar_bags.message_reader import measurement_of
-from fulmar_core.robot import load_robot
-from fulmar_core.robot_name import frames_of
-from fulmar_core.state import RigidBodyState
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.states.state import RigidBodyState
+from fulmar_core.wires.robot_name import frames_of
 from fulmar_ros.convert import (
     OdometryReader,
     OdometryWriter,

@@ -8,14 +8,15 @@ from collections.abc import Callable
 
 import numpy as np
 
-from fulmar_core.backend import Sample
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.episode import Episode, draw_episode
-from fulmar_core.planar import at_rest
-from fulmar_core.robot import Robot, load_robot
-from fulmar_core.sensors.imu import ImuSample
-from fulmar_core.sensors.reading import Reading
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.robots.sensors.imu import ImuSample
+from fulmar_core.simulation.backend import Sample
+from fulmar_core.simulation.episode import Episode, draw_episode
+from fulmar_core.states.planar import at_rest
 from fulmar_core.tasks import load_task
+from fulmar_core.wires.reading import Reading
+from fulmar_core.worlds.scenario import load_scenario
 from sim_nodes.emulators.device import EmulatedDevice
 from sim_nodes.mock_backend import MockBackend
 

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from fulmar_core.backend import Sample
+from fulmar_core.simulation.backend import Sample
 from hardware_drivers.driver_backend import DriverBackend, backend_of
 from hardware_drivers.mavlink_driver import MavlinkDriver
 from hardware_drivers.settings import MavlinkBoat, Thrust

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fulmar_core.robot import load_robot
+from fulmar_core.robots.robot_file import load_robot
 from hardware_drivers.devices import make_device
 from hardware_drivers.driver_backend import DriverBackend
 from hardware_drivers.hardware import load_hardware

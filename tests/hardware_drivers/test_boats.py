@@ -16,9 +16,9 @@ import numpy as np
 import pytest
 from pymavlink import mavutil
 
-from fulmar_core.errors import ConfigError, DeviceError
-from fulmar_core.planar import PlanarState
-from fulmar_core.robot import load_robot
+from fulmar_core.config.errors import ConfigError, DeviceError
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.states.planar import PlanarState
 from hardware_drivers.driver_backend import backend_of
 from hardware_drivers.kingfisher_driver import KingfisherDriver
 from hardware_drivers.mavlink_autopilot import ARMED

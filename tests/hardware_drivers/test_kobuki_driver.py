@@ -8,8 +8,8 @@ import time
 import numpy as np
 import pytest
 
-from fulmar_core.errors import DeviceError
-from fulmar_core.planar import PlanarState
+from fulmar_core.config.errors import DeviceError
+from fulmar_core.states.planar import PlanarState
 from hardware_drivers.driver_backend import backend_of
 from hardware_drivers.kobuki_driver import LIFTED_S, KobukiDriver
 from hardware_drivers.settings import Kobuki
@@ -217,6 +217,6 @@ def test_a_port_that_does_not_exist_is_refused_with_a_hint(tmp_path):
 
 
 def _robot():
-    from fulmar_core.robot import load_robot
+    from fulmar_core.robots.robot_file import load_robot
 
     return load_robot("turtlebot2")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from fulmar_core.errors import DeviceError
+from fulmar_core.config.errors import DeviceError
 from hardware_drivers.mavlink_autopilot import ARMED, BEATLESS_S, LAG_S, Autopilot
 from tests.hardware_drivers.bench import until
 from tests.hardware_drivers.boat_bench import boat, drive, driven

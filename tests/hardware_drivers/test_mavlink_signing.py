@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from fulmar_core.errors import ConfigError
+from fulmar_core.config.errors import ConfigError
 from hardware_drivers.mavlink_address import place_of
 from hardware_drivers.mavlink_signing import (
     BEHIND,

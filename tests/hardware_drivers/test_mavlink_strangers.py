@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from fulmar_core.errors import DeviceError
+from fulmar_core.config.errors import DeviceError
 from hardware_drivers.mavlink_signing import KEY_BYTES
 from tests.hardware_drivers.bench import until
 from tests.hardware_drivers.boat_bench import START, boat, drive, driven

@@ -7,9 +7,9 @@ import threading
 import numpy as np
 import pytest
 
-from fulmar_core.backend import AirBearing
-from fulmar_core.errors import ConfigError, DeviceError
-from fulmar_core.robot import load_robot
+from fulmar_core.config.errors import ConfigError, DeviceError
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.simulation.backend import AirBearing
 from hardware_drivers.devices import make_device, when_the_driver_dies
 from hardware_drivers.driver import MEMBERS, DeviceDriver
 from hardware_drivers.driver_backend import STOPS

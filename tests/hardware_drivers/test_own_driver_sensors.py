@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 import yaml
 
-from fulmar_core.errors import DeviceError
-from fulmar_core.paths import config_path
+from fulmar_core.config.errors import DeviceError
+from fulmar_core.config.paths import config_path
 from tests.hardware_drivers.own_board import PLATFORM, made, with_method
 
-STARS = """from fulmar_core.sensors.reading import Reading
+STARS = """from fulmar_core.wires.reading import Reading
         from hardware_drivers.feedback import Report
         return Report(None, None, 7, {{{name!r}: {reading}}})"""
 

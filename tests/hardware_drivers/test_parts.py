@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fulmar_core.rotation import rotate, yaw_of
+from fulmar_core.states.rotation import rotate, yaw_of
 from hardware_drivers.earth_frame import LocalFrame, attitude
 from hardware_drivers.feedback import DeviceTime
 from hardware_drivers.valves import ValveTiming, from_message, to_message

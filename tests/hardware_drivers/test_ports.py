@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from fulmar_core.errors import DeviceError
+from fulmar_core.config.errors import DeviceError
 from hardware_drivers.ports import Reader, TcpPort, open_port
 from tests.hardware_drivers.bench import until
 

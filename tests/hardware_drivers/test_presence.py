@@ -9,7 +9,7 @@ from dataclasses import replace
 import gpiod
 import pytest
 
-from fulmar_core.errors import DeviceError
+from fulmar_core.config.errors import DeviceError
 from hardware_drivers.hardware import load_hardware
 from hardware_drivers.presence import check_presence
 from hardware_drivers.settings import Kobuki

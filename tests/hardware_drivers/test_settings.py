@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fulmar_core.errors import ConfigError
-from fulmar_core.paths import config_names
-from fulmar_core.robot import load_robot
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.config.paths import config_names
+from fulmar_core.robots.robot_file import load_robot
 from hardware_drivers.devices import UNPROTECTED, own_watchdog, when_the_driver_dies
 from hardware_drivers.hardware import hardware_of, hardware_path, load_hardware
 

@@ -8,12 +8,12 @@ import gpiod
 import numpy as np
 import pytest
 
-from fulmar_core.backend import AirBearing
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.episode import draw_episode
-from fulmar_core.errors import DeviceError
-from fulmar_core.robot import load_robot
+from fulmar_core.config.errors import DeviceError
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.simulation.backend import AirBearing
+from fulmar_core.simulation.episode import draw_episode
 from fulmar_core.tasks import load_task
+from fulmar_core.worlds.scenario import load_scenario
 from hardware_drivers.devices import make_device
 from hardware_drivers.driver_backend import DriverBackend, backend_of
 from hardware_drivers.gpio import output_lines

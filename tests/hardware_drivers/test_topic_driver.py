@@ -7,8 +7,8 @@ import time
 import numpy as np
 import pytest
 
-from fulmar_core.errors import DeviceError
-from fulmar_core.robot import load_robot
+from fulmar_core.config.errors import DeviceError
+from fulmar_core.robots.robot_file import load_robot
 from hardware_drivers.driver_backend import STOPS, DriverBackend, backend_of
 from hardware_drivers.settings import LONGEST_LINGER_S, Bearing, ValveTopic
 from hardware_drivers.topic_driver import LONELY_S, Listeners, TopicDriver, ValveTopicDriver

@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 import pytest
 
-from fulmar_core.robot import load_robot
+from fulmar_core.robots.robot_file import load_robot
 from hardware_drivers.mavlink_driver import override_of
 from hardware_drivers.settings import MavlinkBoat, Thrust
 from hardware_drivers.wiring import channel_velocity, channels

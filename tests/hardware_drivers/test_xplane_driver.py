@@ -8,8 +8,8 @@ import time
 import numpy as np
 import pytest
 
-from fulmar_core.errors import ConfigError, DeviceError
-from fulmar_core.rotation import rotate
+from fulmar_core.config.errors import ConfigError, DeviceError
+from fulmar_core.states.rotation import rotate
 from hardware_drivers.driver_backend import DriverBackend, backend_of
 from hardware_drivers.hardware import load_hardware
 from hardware_drivers.xplane_driver import XPlaneDriver

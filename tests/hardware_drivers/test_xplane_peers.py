@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 
-from fulmar_core.errors import DeviceError
+from fulmar_core.config.errors import DeviceError
 from hardware_drivers.driver_backend import DriverBackend
 from hardware_drivers.presence import check_presence
 from hardware_drivers.xplane_driver import XPlaneDriver

@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fulmar_core.robot import Limits
-from fulmar_core.rotation import rotate
-from fulmar_core.state import RigidBodyState
+from fulmar_core.robots.robot import Limits
+from fulmar_core.states.rotation import rotate
+from fulmar_core.states.state import RigidBodyState
 from hardware_drivers.believable_motion import unbelievable
 from hardware_drivers.earth_frame import LocalFrame
 from hardware_drivers.xplane_messages import KEEP, Position, Values

@@ -11,12 +11,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.episode import Episode, draw_episode
-from fulmar_core.flight.trim import find_trim, flying_at
-from fulmar_core.robot import load_robot
-from fulmar_core.spatial import SpatialState
+from fulmar_core.dynamics.flight_trim import find_trim, flying_at
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.simulation.episode import Episode, draw_episode
+from fulmar_core.states.spatial import SpatialState
 from fulmar_core.tasks import load_task
+from fulmar_core.worlds.scenario import load_scenario
 from hardware_drivers.driver_backend import DriverBackend, backend_of
 from hardware_drivers.settings import Geodetic, XPlane
 from hardware_drivers.xplane_driver import XPlaneDriver

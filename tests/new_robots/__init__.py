@@ -7,9 +7,10 @@ from typing import Any
 
 import yaml
 
-from fulmar_core.config import load_config
-from fulmar_core.paths import config_names, config_path
-from fulmar_core.robot import Robot, load_robot
+from fulmar_core.config.paths import config_names, config_path
+from fulmar_core.config.strict_yaml import load_config
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.robot_file import load_robot
 
 # Tasks by robot; no law here parks a car.
 TASKS = {

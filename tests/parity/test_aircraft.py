@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from fulmar_core.controllers.classical import load_classical
-from fulmar_core.disturbances.parts import Air
-from fulmar_core.disturbances.scenario import Scenario
-from fulmar_core.robot import load_robot
-from fulmar_core.rollout import roll_out_in_backends, roll_out_in_batch
+from fulmar_core.loop.rollout import roll_out_in_backends, roll_out_in_batch
+from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.tasks import load_task
+from fulmar_core.worlds.parts import Air
+from fulmar_core.worlds.scenario import Scenario
 from sim_nodes.mock_backend import MockBackend
 from sim_nodes.mujoco_backend import MujocoBackend
 

@@ -7,19 +7,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fulmar_core.actuators.rolling import Rolling
-from fulmar_core.disturbances.parts import Actuation
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.episode import Episode, draw_episode
-from fulmar_core.goal import goal_at
-from fulmar_core.observation import slewed
-from fulmar_core.paths import config_names
-from fulmar_core.planar import PlanarState
-from fulmar_core.robot import load_robot
-from fulmar_core.rollout import roll_out_in_backends, roll_out_in_batch
-from fulmar_core.simulation import BatchSimulation
-from fulmar_core.spatial import SpatialState
+from fulmar_core.config.paths import config_names
+from fulmar_core.loop.rollout import roll_out_in_backends, roll_out_in_batch
+from fulmar_core.robots.actuators.rolling import Rolling
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.simulation.episode import Episode, draw_episode
+from fulmar_core.simulation.simulation import BatchSimulation
+from fulmar_core.states.planar import PlanarState
+from fulmar_core.states.spatial import SpatialState
 from fulmar_core.tasks import load_task
+from fulmar_core.tasks.goal import goal_at
+from fulmar_core.tasks.observation import slewed
+from fulmar_core.worlds.parts import Actuation
+from fulmar_core.worlds.scenario import load_scenario
 from sim_nodes.mock_backend import MockBackend
 from tests.new_robots import new_robot
 from tests.spaces import SPACECRAFT, task_for
@@ -281,7 +281,7 @@ class Reflex(Swaying):
 
 
 def test_more_episodes_than_simulators_are_run_in_turns(monkeypatch):
-    from fulmar_core import rollout
+    from fulmar_core.loop import rollout
 
     task, scenario = replace(POSE, episode_s=2.0), load_scenario("nominal")
     seen = []

@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fulmar_core.attitude import angle_between, turn_back
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.episode import draw_episode
-from fulmar_core.robot import load_robot
-from fulmar_core.simulation import BatchSimulation
-from fulmar_core.spatial import SpatialState
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.simulation.episode import draw_episode
+from fulmar_core.simulation.simulation import BatchSimulation
+from fulmar_core.states.attitude import angle_between, turn_back
+from fulmar_core.states.spatial import SpatialState
 from fulmar_core.tasks import load_task
+from fulmar_core.worlds.scenario import load_scenario
 from sim_nodes.mock_backend import MockBackend
 from tests.new_robots import new_robot
 

@@ -11,24 +11,24 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fulmar_core import rollout
-from fulmar_core.attitude import exponential, normalised, plus, product
-from fulmar_core.controller_settings import ControllerSettings
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.episode import draw_episodes
-from fulmar_core.goal import goal_in_float64
-from fulmar_core.guarded_loop import GuardedLoop
-from fulmar_core.paths import config_names
-from fulmar_core.planar import PlanarState
-from fulmar_core.robot import load_robot
-from fulmar_core.safety.fallback import ControllerSwitch, Standby
+from fulmar_core.config.paths import config_names
+from fulmar_core.loop import rollout
+from fulmar_core.loop.controller_settings import ControllerSettings
+from fulmar_core.loop.fallback import ControllerSwitch, Standby
+from fulmar_core.loop.guarded_loop import GuardedLoop
+from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.safety.input_gate import Measurement
 from fulmar_core.safety.motion_agreement import MotionAgreement
-from fulmar_core.sensors.reading import Reading
-from fulmar_core.simulation import BatchSimulation
-from fulmar_core.spatial import SpatialState
-from fulmar_core.state import State
+from fulmar_core.simulation.episode import draw_episodes
+from fulmar_core.simulation.simulation import BatchSimulation
+from fulmar_core.states.attitude import exponential, normalised, plus, product
+from fulmar_core.states.planar import PlanarState
+from fulmar_core.states.spatial import SpatialState
+from fulmar_core.states.state import State
 from fulmar_core.tasks import load_task
+from fulmar_core.tasks.goal import goal_in_float64
+from fulmar_core.wires.reading import Reading
+from fulmar_core.worlds.scenario import load_scenario
 from sim_nodes.mock_backend import MockBackend
 from tests.spaces import robot_for
 from tests.states import received_targets

@@ -7,12 +7,12 @@ import itertools
 import numpy as np
 import pytest
 
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.paths import config_names
-from fulmar_core.planar import PlanarState
-from fulmar_core.robot import load_robot
-from fulmar_core.simulation import BatchSimulation
+from fulmar_core.config.paths import config_names
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.simulation.simulation import BatchSimulation
+from fulmar_core.states.planar import PlanarState
 from fulmar_core.tasks import load_task
+from fulmar_core.worlds.scenario import load_scenario
 from tests.new_robots import new_robot
 from tests.pairs import covering
 from tests.spaces import robot_for

@@ -1,8 +1,8 @@
 """Lift and induced drag of airship_v7's wing near the ground, by OpenAeroStruct's vortex lattice, as one JSON object.
 
-It made tests/fulmar_core/flight/ground_effect.json:
+It made tests/fulmar_core/dynamics/ground_effect.json:
 
-    .venv-peers/bin/python tests/peers/ground_effect_table.py > tests/fulmar_core/flight/ground_effect.json
+    .venv-peers/bin/python tests/peers/ground_effect_table.py > tests/fulmar_core/dynamics/ground_effect.json
 """
 
 from __future__ import annotations

@@ -13,12 +13,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.disturbances.spatial_world import zenith
 from fulmar_core.dynamics.gyrostat import Flywheels, gyrostat_step
-from fulmar_core.dynamics.rigid_body import gravity_gradient_torque
-from fulmar_core.robot import load_robot
-from fulmar_core.spatial import SpatialState
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.states.spatial import SpatialState
+from fulmar_core.worlds.scenario import load_scenario
+from fulmar_core.worlds.spatial_world import gravity_gradient_torque, zenith
 from tests.peers.environment import run_peer
 
 SCRIPT = Path(__file__).with_name("drive_gyrostat.py")

@@ -11,8 +11,8 @@ import pytest
 
 from fulmar_bags.contents import open_bag
 from fulmar_bags.decode import joint_vectors
-from fulmar_core.robot import load_robot
-from fulmar_core.topics import ACTION, OBSERVATION
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.robots.topics import ACTION, OBSERVATION
 from tests.fulmar_cli.bag_commands import BAGS, LQR, POLICY, answer
 from tests.peers.environment import run_peer
 

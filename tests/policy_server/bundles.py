@@ -7,17 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fulmar_core.errors import BundleError
-from fulmar_core.observation import Observer
-from fulmar_core.policy_bundle import (
+from fulmar_core.config.errors import BundleError
+from fulmar_core.loop.policy_bundle import (
     NETWORK,
     Golden,
     read_golden,
     read_passport,
     write_bundle,
 )
-from fulmar_core.robot import load_robot
+from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.tasks import load_task
+from fulmar_core.tasks.observation import Observer
 from policy_server.controllers import policies_directory
 from policy_server.policy import Policy
 

@@ -6,12 +6,12 @@ import shutil
 
 import pytest
 
-from fulmar_core.observation import Observer
-from fulmar_core.policy_bundle import (
+from fulmar_core.loop.policy_bundle import (
     FORMAT,
     Passport,
     write_bundle,
 )
+from fulmar_core.tasks.observation import Observer
 from tests.policy_server.bundles import (
     ROLLING,
     ROLLING_TASK,

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from fulmar_core.controllers.controller import Inputs
-from fulmar_core.goal import Goal
-from fulmar_core.planar import PlanarState
+from fulmar_core.states.planar import PlanarState
+from fulmar_core.tasks.goal import Goal
 
 
 def inputs_seeing(observations: Any) -> Inputs:

@@ -10,20 +10,20 @@ import numpy as np
 import onnxruntime
 import pytest
 
+from fulmar_core.config.errors import BundleError
 from fulmar_core.controllers.disturbance_inputs import ESTIMATOR, disturbance_terms
-from fulmar_core.errors import BundleError
-from fulmar_core.goal import goal_at
-from fulmar_core.health.actuator_estimator import ActuatorEstimate
-from fulmar_core.health.thruster_health import Health
-from fulmar_core.observation import Observer
-from fulmar_core.planar import PlanarState, at_rest
-from fulmar_core.policy_bundle import (
+from fulmar_core.estimators.actuator_health.actuator_estimator import ActuatorEstimate
+from fulmar_core.estimators.actuator_health.thruster_health import Health
+from fulmar_core.loop.policy_bundle import (
     GOLDEN,
     NETWORK,
     PASSPORT,
     read_golden,
     read_passport,
 )
+from fulmar_core.states.planar import PlanarState, at_rest
+from fulmar_core.tasks.goal import goal_at
+from fulmar_core.tasks.observation import Observer
 from policy_server.controllers import shipped_policies, shipped_policy
 from tests.inputs import inputs_at
 from tests.policy_server.bundles import (
@@ -260,7 +260,7 @@ def test_what_was_verified_is_what_runs_though_the_files_are_exchanged_afterward
     """A forger who writes as soon as the signature was checked: other network, golden vectors and passport, all hashes
     in order."""
     pytest.importorskip("cryptography")
-    from fulmar_core.bundle_signature import make_keys, sign_bundle, verify_bundle
+    from fulmar_core.loop.bundle_signature import make_keys, sign_bundle, verify_bundle
 
     make_keys(tmp_path / "private.pem", tmp_path / "lab.pem")
     sign_bundle(folder, tmp_path / "private.pem")

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fulmar_core.errors import BundleError
-from fulmar_core.policy_bundle import (
+from fulmar_core.config.errors import BundleError
+from fulmar_core.loop.policy_bundle import (
     read_golden,
 )
 from policy_server.policy import Policy

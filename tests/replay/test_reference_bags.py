@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from fulmar_bags.comparison import first_difference
-from fulmar_core.robot import load_robot
+from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.safety.input_gate import InputGate
 from fulmar_core.tasks.go_to_pose import GoToPose
 from fulmar_evaluation.rerun.reference_bags import LARGEST, REFERENCES, check_reference

@@ -14,7 +14,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
-from fulmar_core.topics import DIAGNOSTICS
+from fulmar_core.robots.topics import DIAGNOSTICS
 from fulmar_ros.controller_node import ControllerNode
 from fulmar_ros.plant_node import PlantNode
 from fulmar_ros.qos import subscriber_qos

@@ -6,11 +6,11 @@ import shutil
 from dataclasses import replace
 from pathlib import Path
 
-from fulmar_core.controller_settings import ControllerSettings
 from fulmar_core.controllers.classical import load_classical
 from fulmar_core.controllers.law import Law
-from fulmar_core.policy_bundle import NETWORK, read_golden, read_passport, write_bundle
-from fulmar_core.robot import Robot
+from fulmar_core.loop.controller_settings import ControllerSettings
+from fulmar_core.loop.policy_bundle import NETWORK, read_golden, read_passport, write_bundle
+from fulmar_core.robots.robot import Robot
 from fulmar_core.tasks import Task
 from policy_server.controllers import shipped_policy
 

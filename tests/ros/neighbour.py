@@ -19,9 +19,9 @@ from std_msgs.msg import Bool
 from visualization_msgs.msg import MarkerArray
 
 from fulmar_core.controllers.controller import Inputs
-from fulmar_core.goal import goal_at
-from fulmar_core.robot import Robot, load_robot
-from fulmar_core.topics import (
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.robots.topics import (
     ACTUATORS_STATE,
     AIR_BEARING,
     COMMAND,
@@ -32,6 +32,7 @@ from fulmar_core.topics import (
     VELOCITY_COMMAND,
     Wire,
 )
+from fulmar_core.tasks.goal import goal_at
 from fulmar_ros.convert import OdometryWriter, VectorWriter
 from fulmar_ros.goal_messages import goal_message
 from fulmar_ros.message_class import message_class

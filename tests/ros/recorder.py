@@ -13,7 +13,7 @@ from mcap_ros2.decoder import DecoderFactory
 from nav_msgs.msg import Odometry
 from rosbags.highlevel import AnyReader
 
-from fulmar_core.topics import ODOMETRY
+from fulmar_core.robots.topics import ODOMETRY
 from fulmar_ros.qos import publisher_qos
 
 ROBOT = "/floating_platform"

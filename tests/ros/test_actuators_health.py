@@ -10,11 +10,11 @@ from mcap.reader import make_reader
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.episode import draw_episode
-from fulmar_core.robot import load_robot
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.robots.topics import ACTUATORS_HEALTH, COMMAND
+from fulmar_core.simulation.episode import draw_episode
 from fulmar_core.tasks import load_task
-from fulmar_core.topics import ACTUATORS_HEALTH, COMMAND
+from fulmar_core.worlds.scenario import load_scenario
 from fulmar_ros.controller_node import ControllerNode
 from fulmar_ros.qos import subscriber_qos
 from tests.conftest import RosDomain

@@ -9,8 +9,8 @@ import pytest
 from std_msgs.msg import Bool
 
 from fulmar_bags.run_record import read_run
+from fulmar_core.robots.topics import SIMULATION_START_NS
 from fulmar_core.safety.arbiter import BEARING_OFF
-from fulmar_core.topics import SIMULATION_START_NS
 from tests.conftest import RosDomain
 from tests.ros.cli import fulmar, json_of
 from tests.ros.neighbour import Neighbour, Stream, until

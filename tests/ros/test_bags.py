@@ -15,8 +15,8 @@ from fulmar_bags.contents import open_bag
 from fulmar_bags.decode import stamps_ns
 from fulmar_bags.message_reader import stamp_ns
 from fulmar_bringup.player import play, schedule
-from fulmar_core.errors import ConfigError
-from fulmar_core.topics import CLOCK, ODOMETRY
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.robots.topics import CLOCK, ODOMETRY
 from fulmar_evaluation.rerun.reference_bags import TOLERANCES
 from fulmar_ros.qos import subscriber_qos
 from tests.conftest import RosDomain

@@ -9,9 +9,9 @@ from collections.abc import Iterator
 import pytest
 from std_srvs.srv import Trigger
 
-from fulmar_core.errors import FulmarError
-from fulmar_core.topics import GIVE_BACK
-from fulmar_core.wire_check import WARNINGS
+from fulmar_core.config.errors import FulmarError
+from fulmar_core.robots.topics import GIVE_BACK
+from fulmar_core.robots.wire_check import WARNINGS
 from fulmar_ros.runtime import spinning
 from hardware_drivers.driver_node import DriverNode
 from tests.hardware_drivers.bench import Bench

@@ -12,7 +12,7 @@ import pytest
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 
-from fulmar_core.topics import DEVICE_STATE, ESTOP_TRIGGER
+from fulmar_core.robots.topics import DEVICE_STATE, ESTOP_TRIGGER
 from fulmar_ros.qos import subscriber_qos
 from hardware_drivers.hardware import load_hardware
 from hardware_drivers.settings import MavlinkBoat

@@ -16,13 +16,11 @@ from rclpy.lifecycle import TransitionCallbackReturn
 from sensor_msgs.msg import JointState
 
 from fulmar_bags.message_reader import stamp_ns
-from fulmar_core.controller_settings import ControllerSettings
 from fulmar_core.controllers.controller import Inputs
 from fulmar_core.controllers.lqr import Lqr
-from fulmar_core.goal import goal_at
-from fulmar_core.robot import Robot
-from fulmar_core.tasks.go_to_pose import GoToPose
-from fulmar_core.topics import (
+from fulmar_core.loop.controller_settings import ControllerSettings
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.topics import (
     ACTUATORS_STATE,
     AIR_BEARING,
     COMMAND,
@@ -35,6 +33,8 @@ from fulmar_core.topics import (
     SWAP,
     TRUTH,
 )
+from fulmar_core.tasks.go_to_pose import GoToPose
+from fulmar_core.tasks.goal import goal_at
 from fulmar_ros import deadline
 from fulmar_ros.controller_node import ControllerNode
 from fulmar_ros.goal_messages import goal_message

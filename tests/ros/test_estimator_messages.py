@@ -15,10 +15,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from sensor_msgs.msg import JointState, PointCloud2
 
-from fulmar_core.estimation.kinds import KINDS
-from fulmar_core.robot import load_robot
-from fulmar_core.sky.events import Events
-from fulmar_core.topics import SENSOR_WIRES
+from fulmar_core.dynamics.sky.events import Events
+from fulmar_core.estimators.kinds import KINDS
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.robots.topics import SENSOR_WIRES
 from fulmar_ros.convert import stamp_of
 from fulmar_ros.estimator_node import BROKEN, EstimatorNode
 from fulmar_ros.estimator_wires import READERS

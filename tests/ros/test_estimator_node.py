@@ -13,9 +13,9 @@ from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu
 
-from fulmar_core.errors import ConfigError
-from fulmar_core.estimation.frozen import POSE_FROZEN
-from fulmar_core.topics import IMU, MOCAP, ODOMETRY, Wire
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.estimators.motion.frozen import POSE_FROZEN
+from fulmar_core.robots.topics import IMU, MOCAP, ODOMETRY, Wire
 from fulmar_ros.convert import PoseWriter, stamp_of
 from fulmar_ros.estimator_node import EstimatorNode
 from fulmar_ros.qos import publisher_qos, subscriber_qos

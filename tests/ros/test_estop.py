@@ -22,8 +22,8 @@ from fulmar_bringup import robot_operator
 from fulmar_bringup.estop_robots import Stopped, release_without_node, stop_robots
 from fulmar_bringup.robot_operator import running_robots, unfit_publishers
 from fulmar_cli.commands.estop import estop
-from fulmar_core.errors import RunFailed
-from fulmar_core.topics import ESTOP, ESTOP_RESET, ESTOP_TRIGGER
+from fulmar_core.config.errors import RunFailed
+from fulmar_core.robots.topics import ESTOP, ESTOP_RESET, ESTOP_TRIGGER
 from fulmar_ros.estop_node import EstopNode
 from fulmar_ros.plant_node import PlantNode
 from fulmar_ros.qos import publisher_qos, subscriber_qos

@@ -11,8 +11,8 @@ from rclpy.duration import Duration
 from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 
-from fulmar_core.goal import goal_at
-from fulmar_core.topics import ESTOP, ESTOP_RESET, GOAL_POSE
+from fulmar_core.robots.topics import ESTOP, ESTOP_RESET, GOAL_POSE
+from fulmar_core.tasks.goal import goal_at
 from fulmar_ros.goal_messages import goal_message
 from tests.conftest import RosDomain
 from tests.ros.cli import json_of, start_fulmar

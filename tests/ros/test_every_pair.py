@@ -18,17 +18,18 @@ from rclpy.signals import SignalHandlerOptions
 
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.supervisor import Supervisor
-from fulmar_core.actuators.rolling import Rolling
-from fulmar_core.backend import Sample
+from fulmar_core.config.paths import config_names
 from fulmar_core.controllers.controller import Controller, Inputs
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.episode import draw_episode, episode_steps
-from fulmar_core.flight.trim import find_trim
-from fulmar_core.observation import Observer
-from fulmar_core.paths import config_names
-from fulmar_core.robot import Robot, load_robot
-from fulmar_core.rollout import roll_out_in_backends
+from fulmar_core.dynamics.flight_trim import find_trim
+from fulmar_core.loop.rollout import roll_out_in_backends
+from fulmar_core.robots.actuators.rolling import Rolling
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.simulation.backend import Sample
+from fulmar_core.simulation.episode import draw_episode, episode_steps
 from fulmar_core.tasks import Task, load_task
+from fulmar_core.tasks.observation import Observer
+from fulmar_core.worlds.scenario import load_scenario
 from fulmar_ros.controller_node import ControllerNode
 from fulmar_ros.plant_node import PlantNode
 from fulmar_ros.runtime import spinning
@@ -148,7 +149,7 @@ def check_pair(robot: Robot, task: Task, make: Callable[[Robot, Task], Controlle
 
             plant.run_episode(episode, number=number, seed=SEED, steps=steps, on_step=on_step)
     assert episode_steps(task, dt) >= steps
-    with patch("fulmar_core.rollout.episode_steps", return_value=steps):  # as far as they are compared
+    with patch("fulmar_core.loop.rollout.episode_steps", return_value=steps):  # as far as they are compared
         alone = roll_out_in_backends(
             make(robot, task),
             lambda: MujocoBackend.of(robot, task, scenario),

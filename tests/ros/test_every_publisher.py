@@ -16,11 +16,11 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
-from fulmar_core.controller_settings import ControllerSettings
 from fulmar_core.controllers.law import Law
-from fulmar_core.robot import Robot
+from fulmar_core.loop.controller_settings import ControllerSettings
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.topics import DIAGNOSTICS, ESTOP, IMU, SWAP
 from fulmar_core.tasks import Task, load_task
-from fulmar_core.topics import DIAGNOSTICS, ESTOP, IMU, SWAP
 from fulmar_ros.controller_node import ControllerNode
 from fulmar_ros.estimator_node import EstimatorNode
 from fulmar_ros.estop_node import EstopNode

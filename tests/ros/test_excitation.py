@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 
 from fulmar_bags.run_record import read_run
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.episode import draw_episode
-from fulmar_core.robot import load_robot
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.simulation.episode import draw_episode
 from fulmar_core.tasks import load_task
+from fulmar_core.worlds.scenario import load_scenario
 from tests.conftest import RosDomain
 from tests.ros.cli import fulmar, json_of
 

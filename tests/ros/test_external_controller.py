@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from fulmar_core.errors import FAILED
+from fulmar_core.config.errors import FAILED
 from tests.conftest import RosDomain
 from tests.ros.cli import fulmar, json_of, run_in_real_time
 

@@ -14,11 +14,11 @@ import pytest
 from std_msgs.msg import String
 
 from fulmar_bringup.robot_operator import Operator
-from fulmar_core.bundle_signature import make_keys, sign_bundle
+from fulmar_core.config.errors import FulmarError, RunFailed
 from fulmar_core.controllers.controller import Inputs
-from fulmar_core.errors import FulmarError, RunFailed
-from fulmar_core.health.beliefs import Beliefs
-from fulmar_core.topics import METADATA, SWAP
+from fulmar_core.estimators.actuator_health.beliefs import Beliefs
+from fulmar_core.loop.bundle_signature import make_keys, sign_bundle
+from fulmar_core.robots.topics import METADATA, SWAP
 from fulmar_ros.controller_node import ControllerNode
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.runtime import spinning

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 from sensor_msgs.msg import Joy
 
-from fulmar_core.paths import OWN_FOLDERS
-from fulmar_core.topics import JOY
+from fulmar_core.config.paths import OWN_FOLDERS
+from fulmar_core.robots.topics import JOY
 from fulmar_ros.plant_node import PlantNode
 from fulmar_ros.qos import publisher_qos
 from fulmar_ros.runtime import spinning

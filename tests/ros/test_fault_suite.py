@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from fulmar_cli.commands.faults import names_in
-from fulmar_core.errors import ConfigError, UnknownNameError
+from fulmar_core.config.errors import ConfigError, UnknownNameError
 from fulmar_evaluation.faults import command_faults
 from fulmar_evaluation.faults.fault import Fault, Outcome, stopped
 from fulmar_evaluation.faults.fault_environment import request_of

@@ -15,7 +15,7 @@ import pytest
 import yaml
 
 from fulmar_bags.run_record import read_run
-from fulmar_core.robot import load_robot
+from fulmar_core.robots.robot_file import load_robot
 from tests.conftest import RosDomain
 from tests.ros.cli import (
     child_running,

@@ -11,10 +11,10 @@ from tf2_msgs.msg import TFMessage
 
 from fulmar_bags.contents import open_bag
 from fulmar_bags.decode import NS, messages, stamps_ns
-from fulmar_core.robot import load_robot
-from fulmar_core.robot_name import frames_of
-from fulmar_core.topics import DESCRIPTION, ODOMETRY, STATIC_TRANSFORMS, TRANSFORMS
-from fulmar_core.urdf import body_frames, urdf_of
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.robots.topics import DESCRIPTION, ODOMETRY, STATIC_TRANSFORMS, TRANSFORMS
+from fulmar_core.robots.urdf import body_frames, urdf_of
+from fulmar_core.wires.robot_name import frames_of
 from fulmar_ros.plant_node import PlantNode
 from fulmar_ros.qos import subscriber_qos
 from fulmar_ros.runtime import spinning

@@ -17,10 +17,10 @@ from geometry_msgs.msg import PointStamped, PoseStamped, TwistStamped
 from nav_msgs.msg import Path
 
 from fulmar_bags.message_reader import stamp_ns
-from fulmar_core.errors import ConfigError
-from fulmar_core.goal_files import single_goal
-from fulmar_core.robot import load_robot
-from fulmar_core.topics import GOAL_WIRES
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.robots.topics import GOAL_WIRES
+from fulmar_core.tasks.goal_files import single_goal
 from fulmar_ros.goal_messages import TYPES
 from fulmar_ros.goal_node import GoalNode
 from fulmar_ros.qos import subscriber_qos

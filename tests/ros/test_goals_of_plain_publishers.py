@@ -16,8 +16,8 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import Bool
 
-from fulmar_core.goal import goal_at
-from fulmar_core.topics import ESTOP, GOAL_POSES, GOAL_WIRES, TRUTH
+from fulmar_core.robots.topics import ESTOP, GOAL_POSES, GOAL_WIRES, TRUTH
+from fulmar_core.tasks.goal import goal_at
 from fulmar_ros.controller_node import ControllerNode
 from fulmar_ros.goal_messages import goal_message
 from fulmar_ros.goal_node import GoalNode

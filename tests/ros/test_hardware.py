@@ -29,9 +29,9 @@ from fulmar_bringup.node_table import emulator_spec, plant_spec
 from fulmar_bringup.processes import ProcessGroup
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.system import default_hardware
-from fulmar_core.errors import DeviceError, FulmarError
-from fulmar_core.paths import config_names, config_path
-from fulmar_core.topics import AIR_BEARING, DEVICE_STATE
+from fulmar_core.config.errors import DeviceError, FulmarError
+from fulmar_core.config.paths import config_names, config_path
+from fulmar_core.robots.topics import AIR_BEARING, DEVICE_STATE
 from fulmar_ros.qos import subscriber_qos
 from hardware_drivers.devices import own_watchdog, when_the_driver_dies
 from hardware_drivers.driver_node import DriverNode

@@ -10,7 +10,7 @@ import yaml
 
 from fulmar_bags.contents import open_bag
 from fulmar_bags.decode import odometries
-from fulmar_core.paths import OWN_FOLDERS, config_path
+from fulmar_core.config.paths import OWN_FOLDERS, config_path
 from tests.conftest import RosDomain
 from tests.ros.cli import fulmar, json_of
 

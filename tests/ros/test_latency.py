@@ -9,7 +9,7 @@ import pytest
 from fulmar_benchmarks.latency.cells import Cell, cells_of, measure
 from fulmar_benchmarks.latency.endurance import endure
 from fulmar_cli.commands.benchmark_latency import latency
-from fulmar_core.errors import ConfigError
+from fulmar_core.config.errors import ConfigError
 
 pytestmark = pytest.mark.real_time
 

@@ -6,7 +6,7 @@ import signal
 from pathlib import Path
 
 from fulmar_bringup.launched_command import launched
-from fulmar_core.errors import DONE
+from fulmar_core.config.errors import DONE
 from tests.conftest import RosDomain
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from fulmar_core.paths import OWN_FOLDERS
+from fulmar_core.config.paths import OWN_FOLDERS
 from tests.conftest import RosDomain
 from tests.ros.cli import fulmar, json_of, start_fulmar
 from tests.ros.wires import wires_of

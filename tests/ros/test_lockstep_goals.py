@@ -13,7 +13,7 @@ from rclpy.duration import Duration
 from rclpy.signals import SignalHandlerOptions
 
 from fulmar_bags.contents import open_bag
-from fulmar_core.topics import GOAL_POSE
+from fulmar_core.robots.topics import GOAL_POSE
 from fulmar_ros.operator_subscription import subscribe_every
 from fulmar_ros.qos import EVERYTHING, publish_patiently, publisher_qos
 from fulmar_ros.runtime import spinning

@@ -13,9 +13,9 @@ import pytest
 
 from fulmar_bags.run_record import read_run
 from fulmar_bringup.launched_command import LaunchedCommand, launched
-from fulmar_core.attitude import euler_of
-from fulmar_core.errors import DONE, FAILED
-from fulmar_core.robot import load_robot
+from fulmar_core.config.errors import DONE, FAILED
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.states.attitude import euler_of
 from tests.conftest import RosDomain
 from tests.ros.cli import WATCHDOG_TRIP, under_way
 
@@ -137,7 +137,7 @@ def test_a_helper_that_dies_or_hangs_below_up_is_started_again_and_control_goes_
 
 
 def takes_part(process: int) -> bool:
-    """Whether a process that gave way while it started does so no longer; see `fulmar_core.yielding`."""
+    """Whether a process that gave way while it started does so no longer; see `fulmar_core.config.yielding`."""
     group = Path(f"/proc/{process}/autogroup")
     return not group.exists() or group.read_text(encoding="ascii").split()[-1] == "0"
 

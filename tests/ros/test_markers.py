@@ -13,9 +13,9 @@ from rclpy.qos import QoSProfile
 from visualization_msgs.msg import Marker, MarkerArray
 
 from fulmar_bags.run_record import read_run
-from fulmar_core.errors import BAD_USAGE, DONE
-from fulmar_core.goal import goal_at
-from fulmar_core.topics import MARKERS
+from fulmar_core.config.errors import BAD_USAGE, DONE
+from fulmar_core.robots.topics import MARKERS
+from fulmar_core.tasks.goal import goal_at
 from fulmar_ros.goal_messages import goal_message
 from tests.conftest import RosDomain
 from tests.ros.cli import child_running, fulmar, start_fulmar

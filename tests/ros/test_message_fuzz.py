@@ -25,8 +25,8 @@ from std_msgs.msg import Bool, Float32MultiArray, Int16MultiArray, String
 from visualization_msgs.msg import Marker, MarkerArray
 
 from fulmar_bags.message_reader import goal_of
-from fulmar_core.robot import load_robot
-from fulmar_core.topics import IMU, MOCAP, SENSOR_WIRES
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.robots.topics import IMU, MOCAP, SENSOR_WIRES
 from fulmar_ros.controller_node import ControllerNode
 from fulmar_ros.convert import OdometryWriter
 from fulmar_ros.estimator_node import EstimatorNode

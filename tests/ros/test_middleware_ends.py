@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from fulmar_core.errors import BAD_USAGE, DONE
+from fulmar_core.config.errors import BAD_USAGE, DONE
 from tests.conftest import RosDomain
 
 # Watches over shared memory for all participants of a process; the middleware joins it when it is unloaded.

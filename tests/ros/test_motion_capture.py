@@ -15,7 +15,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy, qos_profile_sensor_data
 from fulmar_bags.contents import open_bag
 from fulmar_bags.message_reader import stamp_ns
 from fulmar_bags.tables import rows
-from fulmar_core.topics import MOCAP, ODOMETRY
+from fulmar_core.robots.topics import MOCAP, ODOMETRY
 from fulmar_ros.plant_node import PlantNode
 from fulmar_ros.runtime import spinning
 from sim_nodes.sim_node import make_backend

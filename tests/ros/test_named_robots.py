@@ -13,8 +13,8 @@ from nav_msgs.msg import Odometry
 from fulmar_bags.contents import open_bag
 from fulmar_bags.decode import messages
 from fulmar_bags.run_record import read_run
-from fulmar_core.errors import DONE, FAILED
-from fulmar_core.topics import CLOCK, GOAL_POSE, IMU, ODOMETRY, TRUTH
+from fulmar_core.config.errors import DONE, FAILED
+from fulmar_core.robots.topics import CLOCK, GOAL_POSE, IMU, ODOMETRY, TRUTH
 from fulmar_ros.plant_node import PlantNode
 from fulmar_ros.qos import subscriber_qos
 from fulmar_ros.runtime import spinning

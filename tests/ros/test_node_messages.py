@@ -17,8 +17,8 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import JointState
 from visualization_msgs.msg import MarkerArray
 
-from fulmar_core.lockstep_period import counts_of
-from fulmar_core.robot import load_robot
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.wires.lockstep_period import counts_of
 from fulmar_ros.lockstep_answer import LockstepAnswer
 from fulmar_ros.markers_node import MarkersNode
 from fulmar_ros.plant_period import PlantPeriod

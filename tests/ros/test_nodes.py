@@ -23,9 +23,9 @@ from fulmar_bringup.node_table import (
 from fulmar_bringup.operator_rows import goals_spec, run_goals_spec
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.system import Guards
-from fulmar_core.controller_settings import ControllerSettings
-from fulmar_core.errors import ConfigError
-from fulmar_core.topics import (
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.loop.controller_settings import ControllerSettings
+from fulmar_core.robots.topics import (
     COMMAND,
     ODOMETRY,
 )

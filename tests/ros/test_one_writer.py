@@ -15,8 +15,8 @@ import pytest
 
 from fulmar_bringup.launch_check import refuse_living_plants
 from fulmar_bringup.run_plan import NodeSpec
-from fulmar_core.errors import ConfigError
-from fulmar_core.topics import AIR_BEARING, COMMAND, ODOMETRY, Wire
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.robots.topics import AIR_BEARING, COMMAND, ODOMETRY, Wire
 from fulmar_ros.controller_node import ControllerNode
 from fulmar_ros.plant_node import PlantNode
 from tests.conftest import RosDomain

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from fulmar_core.errors import BAD_USAGE
+from fulmar_core.config.errors import BAD_USAGE
 from tests.conftest import RosDomain
 from tests.ros.cli import fulmar, json_of
 

@@ -22,10 +22,10 @@ from fulmar_bags.message_reader import stamp_ns
 from fulmar_bringup.node_table import plant_spec
 from fulmar_bringup.processes import ProcessGroup
 from fulmar_bringup.run_plan import RunPlan
-from fulmar_core.errors import BAD_USAGE, FAILED
-from fulmar_core.paths import config_path
-from fulmar_core.topics import GIVE_BACK, SENSOR_WIRES
-from fulmar_core.wire_check import WARNINGS
+from fulmar_core.config.errors import BAD_USAGE, FAILED
+from fulmar_core.config.paths import config_path
+from fulmar_core.robots.topics import GIVE_BACK, SENSOR_WIRES
+from fulmar_core.robots.wire_check import WARNINGS
 from fulmar_ros.qos import subscriber_qos
 from fulmar_ros.runtime import spinning
 from hardware_drivers.driver_node import DriverNode
@@ -97,7 +97,7 @@ def board(node: DriverNode) -> ModuleType:
 STARS = """
     def read(self):
         import time
-        from fulmar_core.sensors.reading import Reading
+        from fulmar_core.wires.reading import Reading
         from hardware_drivers.feedback import Report
         now_ns = time.time_ns()
         measured_ns = now_ns // 500_000_000 * 500_000_000  # twice a second

@@ -13,11 +13,11 @@ from typer.testing import CliRunner
 
 from fulmar_bags.run_record import read_run
 from fulmar_cli.main import app
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.episode import draw_episode
-from fulmar_core.errors import ConfigError
-from fulmar_core.robot import load_robot
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.simulation.episode import draw_episode
 from fulmar_core.tasks import load_task
+from fulmar_core.worlds.scenario import load_scenario
 from tests.conftest import RosDomain
 from tests.own_files import own_folder
 from tests.ros.cli import fulmar, json_of

@@ -16,11 +16,11 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 
 from fulmar_bags.message_reader import stamp_ns
-from fulmar_core.backend import Sample
+from fulmar_core.robots.topics import COMMAND, ODOMETRY, SIMULATION_START_NS
 from fulmar_core.safety.actuator_guard import ActuatorGuard
 from fulmar_core.safety.watchdog import Watchdog
-from fulmar_core.sensors.reading import Reading
-from fulmar_core.topics import COMMAND, ODOMETRY, SIMULATION_START_NS
+from fulmar_core.simulation.backend import Sample
+from fulmar_core.wires.reading import Reading
 from fulmar_ros.convert import VectorWriter
 from fulmar_ros.plant_node import PlantNode
 from fulmar_ros.plant_wires import PlantWires

@@ -25,8 +25,8 @@ from rosbags.rosbag2 import Reader
 from std_msgs.msg import String
 
 from fulmar_bags.contents import open_bag
-from fulmar_core.errors import LockstepError
-from fulmar_core.topics import GOAL_POSE, METADATA
+from fulmar_core.config.errors import LockstepError
+from fulmar_core.robots.topics import GOAL_POSE, METADATA
 from fulmar_ros.qos import publish_patiently, publisher_qos
 from tests.ros.recorder import ROBOT, odometry, publish, wait_for
 
@@ -219,7 +219,7 @@ import sys, time
 import rclpy
 from nav_msgs.msg import Odometry
 from rclpy.duration import Duration
-from fulmar_core.topics import ODOMETRY
+from fulmar_core.robots.topics import ODOMETRY
 from fulmar_ros.qos import publisher_qos
 from fulmar_ros.middleware import set_up_middleware
 set_up_middleware()

@@ -11,7 +11,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from rosbags.highlevel import AnyReader
 from std_msgs.msg import Bool, String
 
-from fulmar_core.topics import ESTOP, METADATA
+from fulmar_core.robots.topics import ESTOP, METADATA
 from fulmar_ros.qos import publisher_qos
 from tests.ros.recorder import ROBOT, odometry, publish, wait_for
 

@@ -10,9 +10,9 @@ import pytest
 
 from fulmar_bags.contents import open_bag
 from fulmar_bags.wire_reader import WireReader
-from fulmar_core.paths import OWN_FOLDERS
-from fulmar_core.robot import load_robot
-from fulmar_core.topics import INERTIA, INERTIA_STATUS, RATE, TRUTH, Wire
+from fulmar_core.config.paths import OWN_FOLDERS
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.robots.topics import INERTIA, INERTIA_STATUS, RATE, TRUTH, Wire
 from tests.conftest import RosDomain
 from tests.ros.cli import fulmar, json_of
 from tests.ros.wires import wires_of

@@ -17,8 +17,8 @@ import pytest
 from fulmar_bringup.robot_operator import Operator
 from fulmar_bringup.service.installation import UNITS
 from fulmar_bringup.service.unit import command_of
-from fulmar_core.errors import DONE
-from fulmar_core.paths import config_path
+from fulmar_core.config.errors import DONE
+from fulmar_core.config.paths import config_path
 from tests.conftest import RosDomain
 from tests.ros.cli import fulmar
 from tests.ros.neighbour import ROBOT, Neighbour, until

@@ -11,7 +11,7 @@ import psutil
 import pytest
 import yaml
 
-from fulmar_core.paths import OWN_FOLDERS, config_path
+from fulmar_core.config.paths import OWN_FOLDERS, config_path
 from tests.conftest import RosDomain
 from tests.ros.cli import fulmar, json_of, run_in_real_time
 

@@ -13,9 +13,9 @@ from scipy.spatial.transform import Rotation
 from fulmar_bags.contents import Bag, open_bag
 from fulmar_bags.decode import messages, odometries
 from fulmar_bags.message_reader import reading_of
-from fulmar_core.paths import OWN_FOLDERS, config_path
-from fulmar_core.sensors.table import SENSORS
-from fulmar_core.topics import SENSOR_WIRES, TRUTH
+from fulmar_core.config.paths import OWN_FOLDERS, config_path
+from fulmar_core.robots.sensors.table import SENSORS
+from fulmar_core.robots.topics import SENSOR_WIRES, TRUTH
 from tests.conftest import RosDomain
 from tests.ros.cli import fulmar, json_of
 

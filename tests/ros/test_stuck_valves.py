@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from fulmar_core.health.beliefs import Beliefs
+from fulmar_core.estimators.actuator_health.beliefs import Beliefs
 from fulmar_ros.actuator_beliefs import ActuatorBeliefs
 from fulmar_ros.controller_node import ControllerNode
 from tests.conftest import RosDomain

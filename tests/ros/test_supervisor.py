@@ -16,9 +16,9 @@ from std_msgs.msg import Bool, String
 
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.supervisor import Supervisor, supervisor
-from fulmar_core.errors import RunFailed
-from fulmar_core.goal import goal_at
-from fulmar_core.topics import ESTOP, ESTOP_RELEASED, GOAL_POSE
+from fulmar_core.config.errors import RunFailed
+from fulmar_core.robots.topics import ESTOP, ESTOP_RELEASED, GOAL_POSE
+from fulmar_core.tasks.goal import goal_at
 from fulmar_ros.controller_node import ControllerNode
 from fulmar_ros.living_plant import TwinRunError
 from fulmar_ros.operator_subscription import subscribe_every

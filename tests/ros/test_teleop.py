@@ -14,7 +14,7 @@ from rclpy.node import Node
 from sensor_msgs.msg import JointState, Joy
 from std_srvs.srv import Trigger
 
-from fulmar_core.topics import GIVE_BACK, JOY, TELEOP
+from fulmar_core.robots.topics import GIVE_BACK, JOY, TELEOP
 from fulmar_ros import teleop_node
 from fulmar_ros.plant_node import PlantNode
 from fulmar_ros.qos import publisher_qos, subscriber_qos

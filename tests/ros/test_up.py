@@ -16,8 +16,8 @@ from rclpy.duration import Duration
 
 from fulmar_bags.run_record import read_run
 from fulmar_bringup.robot_operator import Operator
-from fulmar_core.errors import BAD_USAGE, DONE, FAILED
-from fulmar_core.goal import goal_at
+from fulmar_core.config.errors import BAD_USAGE, DONE, FAILED
+from fulmar_core.tasks.goal import goal_at
 from fulmar_ros.goal_messages import goal_message
 from policy_server.controllers import shipped_policy
 from tests.conftest import RosDomain

@@ -20,7 +20,7 @@ from fulmar_bringup.node_table import emulator_spec, plant_spec
 from fulmar_bringup.processes import ProcessGroup
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.system import default_hardware
-from fulmar_core.topics import DEVICE_STATE, TRUTH
+from fulmar_core.robots.topics import DEVICE_STATE, TRUTH
 from fulmar_ros.qos import subscriber_qos
 from hardware_drivers.hardware import load_hardware
 from tests.conftest import RosDomain

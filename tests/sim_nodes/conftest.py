@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.episode import Episode, draw_episode
-from fulmar_core.goal import goal_at
-from fulmar_core.planar import PlanarState
+from fulmar_core.simulation.episode import Episode, draw_episode
+from fulmar_core.states.planar import PlanarState
+from fulmar_core.tasks.goal import goal_at
+from fulmar_core.worlds.scenario import load_scenario
 from tests.spaces import task_for
 
 

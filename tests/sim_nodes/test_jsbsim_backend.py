@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.episode import draw_episode
-from fulmar_core.errors import ConfigError
-from fulmar_core.flight.trim import find_trim, flying_at
-from fulmar_core.robot import load_robot
-from fulmar_core.spatial import SpatialState
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.dynamics.flight_trim import find_trim, flying_at
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.simulation.episode import draw_episode
+from fulmar_core.states.spatial import SpatialState
 from fulmar_core.tasks import load_task
+from fulmar_core.worlds.scenario import load_scenario
 from sim_nodes.jsbsim_backend import JsbsimBackend
 from sim_nodes.mock_backend import MockBackend
 

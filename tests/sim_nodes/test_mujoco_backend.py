@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fulmar_core.actuators.rolling import Rolling
-from fulmar_core.dynamics.hydrodynamics import GRAVITY
-from fulmar_core.errors import SafetyError
-from fulmar_core.paths import config_names
-from fulmar_core.planar import PlanarState
-from fulmar_core.robot import load_robot
-from fulmar_core.sensors.star_tracker import StarTrackerSpec
-from fulmar_core.spatial import SpatialState
+from fulmar_core.config.errors import SafetyError
+from fulmar_core.config.paths import config_names
+from fulmar_core.robots.actuators.rolling import Rolling
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.robots.sensors.star_tracker import StarTrackerSpec
+from fulmar_core.states.gravity import GRAVITY
+from fulmar_core.states.planar import PlanarState
+from fulmar_core.states.spatial import SpatialState
 
 mujoco = pytest.importorskip("mujoco")
 

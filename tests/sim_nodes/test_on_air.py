@@ -7,16 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fulmar_core.backend import AirBearing
-from fulmar_core.control_loop import ControlLoop
 from fulmar_core.controllers.classical import load_classical
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.episode import Episode, draw_episode
-from fulmar_core.goal import goal_at
-from fulmar_core.health.applied import AppliedHistory
-from fulmar_core.planar import PlanarState, at_rest
-from fulmar_core.robot import load_robot
+from fulmar_core.estimators.actuator_health.applied import AppliedHistory
+from fulmar_core.loop.control_loop import ControlLoop
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.simulation.backend import AirBearing
+from fulmar_core.simulation.episode import Episode, draw_episode
+from fulmar_core.states.planar import PlanarState, at_rest
 from fulmar_core.tasks import load_task
+from fulmar_core.tasks.goal import goal_at
+from fulmar_core.worlds.scenario import load_scenario
 from sim_nodes.mock_backend import MockBackend
 from sim_nodes.mujoco_backend import MujocoBackend
 from sim_nodes.on_air import OnAir

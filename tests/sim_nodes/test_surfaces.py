@@ -8,15 +8,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.episode import draw_episode
-from fulmar_core.flight.trim import find_trim
-from fulmar_core.robot import load_robot
-from fulmar_core.sensors.kind import Truth
-from fulmar_core.sensors.simulated import SimulatedSensors
-from fulmar_core.sensors.surfaces import SurfacePositions, SurfacesSpec
-from fulmar_core.state import RigidBodyState
+from fulmar_core.dynamics.flight_trim import find_trim
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.robots.sensors.kind import Truth
+from fulmar_core.robots.sensors.simulated import SimulatedSensors
+from fulmar_core.robots.sensors.surfaces import SurfacePositions, SurfacesSpec
+from fulmar_core.simulation.episode import draw_episode
+from fulmar_core.states.state import RigidBodyState
 from fulmar_core.tasks import load_task
+from fulmar_core.worlds.scenario import load_scenario
 from sim_nodes.jsbsim_backend import JsbsimBackend
 from sim_nodes.mock_backend import MockBackend
 from sim_nodes.mujoco_backend import MujocoBackend

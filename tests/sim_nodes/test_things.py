@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fulmar_core.paths import config_names
-from fulmar_core.planar import PlanarState
-from fulmar_core.robot import load_robot
+from fulmar_core.config.paths import config_names
+from fulmar_core.dynamics.things import Thing
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.states.planar import PlanarState
 from fulmar_core.tasks import load_task
 from fulmar_core.tasks.obstacles import TOUCH, clearance
-from fulmar_core.things import Thing
 from sim_nodes.mock_backend import MockBackend
 
 mujoco = pytest.importorskip("mujoco")

@@ -5,16 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fulmar_core.backend import Sample
 from fulmar_core.controllers.classical import load_classical
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.episode import Episode
-from fulmar_core.metrics import successes
-from fulmar_core.robot import load_robot
-from fulmar_core.rollout import roll_out_in_backends
+from fulmar_core.loop.rollout import roll_out_in_backends
+from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.safety.actuator_guard import ActuatorGuard
 from fulmar_core.safety.watchdog import Watchdog
+from fulmar_core.simulation.backend import Sample
+from fulmar_core.simulation.episode import Episode
+from fulmar_core.simulation.metrics import successes
 from fulmar_core.tasks import load_task
+from fulmar_core.worlds.scenario import load_scenario
 from sim_nodes.mock_backend import MockBackend
 
 BOAT, TASK = load_robot("kingfisher"), load_task("go_to_position")

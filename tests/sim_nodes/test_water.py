@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fulmar_core.dynamics.hydrodynamics import GRAVITY
-from fulmar_core.robot import load_robot
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.states.gravity import GRAVITY
 
 mujoco = pytest.importorskip("mujoco")
 

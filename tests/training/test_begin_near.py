@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.flight.trim import find_trim
-from fulmar_core.robot import load_robot
+from fulmar_core.dynamics.flight_trim import find_trim
+from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.tasks import load_task
+from fulmar_core.worlds.scenario import load_scenario
 from training.learners import begin_near, build_learner, first_action
 from training.settings import OffPolicy, load_training_settings
 from training.train import train

@@ -9,11 +9,11 @@ import pytest
 import torch
 from stable_baselines3.common.vec_env import VecNormalize
 
+from fulmar_core.config.errors import ConfigError
 from fulmar_core.controllers.classical import load_classical
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.errors import ConfigError
-from fulmar_core.robot import load_robot
+from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.tasks import load_task
+from fulmar_core.worlds.scenario import load_scenario
 from training.behavior_cloning import BehaviorCloningPPO, expert_of
 from training.checkpoint import load_checkpoint
 from training.fast_ppo import FastPPO

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from fulmar_core.errors import ConfigError
+from fulmar_core.config.errors import ConfigError
 from training.benchmark import benchmark_jobs, compare
 from training.jobs import Outcome
 from training.settings import load_training_settings

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import pytest
 
-from fulmar_core.calibration import Calibration, Measured, save_calibration
-from fulmar_core.robot import load_robot, use_calibration
+from fulmar_core.robots.calibration import Calibration, Measured, save_calibration
+from fulmar_core.robots.robot_file import load_robot, use_calibration
 from training import jobs
 from training.jobs import Job, learn
 from training.progress import progress_file

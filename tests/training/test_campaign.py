@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from fulmar_core.seeds import EVALUATION_SEED
+from fulmar_core.config.seeds import EVALUATION_SEED
 from training.campaign import CAMPAIGN_FILE, run_campaign, summarised
 from training.executors import LocalExecutor
 from training.jobs import Job, Outcome, run_job

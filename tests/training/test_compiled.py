@@ -10,12 +10,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.learning_step import observed_step
-from fulmar_core.paths import config_names
-from fulmar_core.robot import load_robot
-from fulmar_core.simulation import BatchSimulation
+from fulmar_core.config.paths import config_names
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.simulation.learning_step import observed_step
+from fulmar_core.simulation.simulation import BatchSimulation
 from fulmar_core.tasks import load_task
+from fulmar_core.worlds.scenario import load_scenario
 from tests.new_robots import new_robot
 from tests.pairs import each_pair
 from training import kernel
@@ -198,7 +198,7 @@ def test_worlds_that_are_built_anew_are_found_compiled(environments):
 STEP_ONCE = """
 import sys
 import numpy as np
-from fulmar_core.errors import ConfigError
+from fulmar_core.config.errors import ConfigError
 from tests.training.test_compiled import RANDOMISED, ROBOT, TASK, BatchSimulation, CompiledStep
 batch = BatchSimulation(ROBOT, TASK, RANDOMISED, worlds=7, seed=5)
 try:

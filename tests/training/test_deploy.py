@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from stable_baselines3.common.vec_env import VecNormalize
 
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.observation import Observer
-from fulmar_core.robot import load_robot
+from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.tasks import load_task
+from fulmar_core.tasks.observation import Observer
+from fulmar_core.worlds.scenario import load_scenario
 from policy_server.policy import Policy
 from tests.policy_server.observed import inputs_seeing
 from training.deploy import deployed_network

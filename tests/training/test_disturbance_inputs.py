@@ -3,19 +3,19 @@
 import numpy as np
 import pytest
 
-from fulmar_core.control_loop import ControlLoop
 from fulmar_core.controllers.disturbance_inputs import (
     ESTIMATOR,
     PUSH_TERMS,
     disturbance_terms,
     with_disturbances,
 )
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.goal import goal_in_float64
-from fulmar_core.observation import Observer
-from fulmar_core.robot import load_robot
-from fulmar_core.simulation import BatchSimulation
+from fulmar_core.loop.control_loop import ControlLoop
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.simulation.simulation import BatchSimulation
 from fulmar_core.tasks import load_task
+from fulmar_core.tasks.goal import goal_in_float64
+from fulmar_core.tasks.observation import Observer
+from fulmar_core.worlds.scenario import load_scenario
 from training.vec_env import BatchVecEnv
 
 ROBOT, TASK = load_robot("floating_platform"), load_task("drift_go_to_pose")

@@ -9,13 +9,13 @@ import numpy as np
 import onnxruntime
 import pytest
 
+from fulmar_core.config.errors import ConfigError
 from fulmar_core.controllers.disturbance_inputs import disturbance_terms
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.errors import ConfigError
-from fulmar_core.holdability import uncontrollable_losses
-from fulmar_core.observation import Observer
-from fulmar_core.robot import load_robot
+from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.tasks import load_task
+from fulmar_core.tasks.observation import Observer
+from fulmar_core.worlds.holdability import uncontrollable_losses
+from fulmar_core.worlds.scenario import load_scenario
 from policy_server.policy import Policy
 from training import fallback_policy, jobs
 from training.export import export

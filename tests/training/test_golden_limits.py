@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from onnxruntime import InferenceSession
 
-from fulmar_core.policy_bundle import Golden, read_bundle, read_passport
-from fulmar_core.robot import load_robot
+from fulmar_core.loop.policy_bundle import Golden, read_bundle, read_passport
+from fulmar_core.robots.robot_file import load_robot
 from policy_server.controllers import policies_directory
 from training.golden_limits import reached, with_limits
 

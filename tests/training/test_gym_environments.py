@@ -13,11 +13,11 @@ pytest.importorskip("stable_baselines3")
 import gymnasium
 from gymnasium.utils.env_checker import check_env
 
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.errors import ConfigError, UnknownNameError
-from fulmar_core.paths import config_names, config_path
-from fulmar_core.robot import load_robot
+from fulmar_core.config.errors import ConfigError, UnknownNameError
+from fulmar_core.config.paths import config_names, config_path
+from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.tasks import load_task
+from fulmar_core.worlds.scenario import load_scenario
 from training.environments import environment_id, register_tasks
 from training.vec_env import BatchVecEnv
 

@@ -10,17 +10,17 @@ import onnx
 import pytest
 import torch
 
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.errors import ConfigError
-from fulmar_core.goal import Goal, no_obstacles
-from fulmar_core.metrics import summary
-from fulmar_core.observation import Observer
-from fulmar_core.planar import PlanarState
-from fulmar_core.policy_bundle import read_golden, read_passport
-from fulmar_core.robot import load_robot
-from fulmar_core.rollout import roll_out_in_backends
-from fulmar_core.seeds import EVALUATION_SEED
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.config.seeds import EVALUATION_SEED
+from fulmar_core.loop.policy_bundle import read_golden, read_passport
+from fulmar_core.loop.rollout import roll_out_in_backends
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.simulation.metrics import summary
+from fulmar_core.states.planar import PlanarState
 from fulmar_core.tasks import load_task
+from fulmar_core.tasks.goal import Goal, no_obstacles
+from fulmar_core.tasks.observation import Observer
+from fulmar_core.worlds.scenario import load_scenario
 from policy_server.policy import Policy
 from sim_nodes.mujoco_backend import MujocoBackend
 from tests.policy_server.observed import inputs_seeing

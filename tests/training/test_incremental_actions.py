@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from stable_baselines3.common.vec_env import VecNormalize
 
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.errors import ConfigError
-from fulmar_core.robot import load_robot
-from fulmar_core.symmetry import Mirror
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.simulation.symmetry import Mirror
 from fulmar_core.tasks import load_task
+from fulmar_core.worlds.scenario import load_scenario
 from training.deploy import deployed_network
 from training.learners import build_learner
 from training.network import load_network, save_network

@@ -9,10 +9,10 @@ import pytest
 import torch
 from stable_baselines3.common.vec_env import VecNormalize
 
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.robot import load_robot
-from fulmar_core.symmetry import Mirror
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.simulation.symmetry import Mirror
 from fulmar_core.tasks import load_task
+from fulmar_core.worlds.scenario import load_scenario
 from training.deploy import deployed_network
 from training.learners import build_learner
 from training.settings import load_training_settings

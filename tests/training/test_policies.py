@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from fulmar_core.policy_bundle import read_passport
+from fulmar_core.loop.policy_bundle import read_passport
 from policy_server.controllers import policies_directory
 from policy_server.policy import Policy
 from training import policies

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 import torch
 
-from fulmar_core.errors import ConfigError
-from fulmar_core.robot import load_robot
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.tasks import load_task
 from training.checkpoint import load_checkpoint
 from training.fast_ppo import FastPPO
@@ -48,7 +48,7 @@ def weights(folder, settings):
 
 
 def _scenario(settings):
-    from fulmar_core.disturbances.scenario import load_scenario
+    from fulmar_core.worlds.scenario import load_scenario
 
     return load_scenario(settings.scenario)
 

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import pytest
 
-from fulmar_core.errors import ConfigError, UnknownNameError
-from fulmar_core.paths import config_names
-from fulmar_core.robot import load_robot
+from fulmar_core.config.errors import ConfigError, UnknownNameError
+from fulmar_core.config.paths import config_names
+from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.tasks import load_task
 from tests.new_robots import new_robot
 from training.settings import (

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 import torch
 
-from fulmar_core.errors import ConfigError
-from fulmar_core.policy_bundle import read_golden, read_passport
-from fulmar_core.seeds import EVALUATION_SEED, HELD_OUT_SEED
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.config.seeds import EVALUATION_SEED, HELD_OUT_SEED
+from fulmar_core.loop.policy_bundle import read_golden, read_passport
 from policy_server.policy import Policy
 from tests.policy_server.observed import inputs_seeing
 from training.deploy import deployed_network

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from stable_baselines3.common.vec_env import VecNormalize
 
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.robot import load_robot
+from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.tasks import load_task
+from fulmar_core.worlds.scenario import load_scenario
 from training.vec_env import BatchVecEnv
 
 WORLDS = 16

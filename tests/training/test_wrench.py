@@ -9,12 +9,12 @@ import pytest
 import torch
 from stable_baselines3.common.vec_env import VecNormalize
 
-from fulmar_core.control_loop import ControlLoop
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.goal import goal_in_float64
-from fulmar_core.policy_bundle import read_golden
-from fulmar_core.robot import load_robot
+from fulmar_core.loop.control_loop import ControlLoop
+from fulmar_core.loop.policy_bundle import read_golden
+from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.tasks import load_task
+from fulmar_core.tasks.goal import goal_in_float64
+from fulmar_core.worlds.scenario import load_scenario
 from policy_server.policy import Policy
 from training.deploy import deployed_network
 from training.export import export

@@ -11,7 +11,7 @@ from rich.table import Table
 from fulmar_bringup.console import console, output, print_json
 from fulmar_bringup.progress import step_bar
 from fulmar_cli.commands.arguments import JsonOption, SeedOption, renamed
-from fulmar_core.errors import FAILED
+from fulmar_core.config.errors import FAILED
 
 
 def estimator(
@@ -47,14 +47,14 @@ def estimator(
     """
     import dataclasses
 
-    from fulmar_cli.extras import require
-    from fulmar_core.robot import load_robot
+    from fulmar_cli.installation.extras import require
+    from fulmar_core.robots.robot_file import load_robot
 
     plot = plot or old_plot
     require("filterpy", *(["matplotlib"] if plot else []))
-    from fulmar_core.errors import ConfigError
-    from fulmar_core.estimation.kinds import load_estimator
-    from fulmar_core.estimation.settings import PlanarMotionSettings
+    from fulmar_core.config.errors import ConfigError
+    from fulmar_core.estimators.kinds import load_estimator
+    from fulmar_core.estimators.motion.settings import PlanarMotionSettings
     from tests.benchmarks.estimator.comparison import MEAN, RATES_HZ, compare, requirements_met
     from tests.benchmarks.estimator.comparison import as_json as rows_of
     from tests.benchmarks.estimator.drive import drives as drive_about

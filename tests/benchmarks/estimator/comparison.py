@@ -8,12 +8,12 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from fulmar_core.estimation.planar_motion import PlanarMotionEstimator
-from fulmar_core.estimation.settings import PlanarMotionSettings
-from fulmar_core.robot import Limits
-from fulmar_core.rotation import from_yaw
-from fulmar_core.sensors.imu import ImuSample
-from fulmar_core.sensors.reading import Reading
+from fulmar_core.estimators.motion.planar_motion import PlanarMotionEstimator
+from fulmar_core.estimators.motion.settings import PlanarMotionSettings
+from fulmar_core.robots.robot import Limits
+from fulmar_core.robots.sensors.imu import ImuSample
+from fulmar_core.states.rotation import from_yaw
+from fulmar_core.wires.reading import Reading
 from tests.benchmarks.estimator.drive import TICK_S, Drive
 
 POSES = 30

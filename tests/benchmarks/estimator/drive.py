@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fulmar_core.control_loop import ControlLoop
 from fulmar_core.controllers.classical import load_classical
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.goal import Goal, goal_in_float64
-from fulmar_core.planar import to_body
-from fulmar_core.robot import Robot
-from fulmar_core.simulation import BatchSimulation
+from fulmar_core.loop.control_loop import ControlLoop
+from fulmar_core.robots.robot import Robot
+from fulmar_core.simulation.simulation import BatchSimulation
+from fulmar_core.states.planar import to_body
 from fulmar_core.tasks import load_task
+from fulmar_core.tasks.goal import Goal, goal_in_float64
+from fulmar_core.worlds.scenario import load_scenario
 
 TICK_S = 0.005  # of the physics and of the inertial unit: 200 Hz
 GRAVITY = 9.81

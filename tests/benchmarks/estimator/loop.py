@@ -11,18 +11,18 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from fulmar_core.backend import Sample
-from fulmar_core.control_loop import ControlLoop
 from fulmar_core.controllers.controller import Controller
-from fulmar_core.disturbances.scenario import Scenario
-from fulmar_core.episode import draw_episode
-from fulmar_core.estimation.estimator import Estimator
-from fulmar_core.goal import goal_in_float64
-from fulmar_core.robot import Robot
+from fulmar_core.estimators.motion.estimator import Estimator
+from fulmar_core.loop.control_loop import ControlLoop
+from fulmar_core.robots.robot import Robot
 from fulmar_core.safety.input_gate import InputGate, Measurement
-from fulmar_core.sensors.reading import Reading
-from fulmar_core.state import RigidBodyState
+from fulmar_core.simulation.backend import Sample
+from fulmar_core.simulation.episode import draw_episode
+from fulmar_core.states.state import RigidBodyState
 from fulmar_core.tasks import Task
+from fulmar_core.tasks.goal import goal_in_float64
+from fulmar_core.wires.reading import Reading
+from fulmar_core.worlds.scenario import Scenario
 from sim_nodes.mujoco_backend import MujocoBackend
 
 NEW_GOAL_S = 20.0  # after which a robot that moves gets another goal

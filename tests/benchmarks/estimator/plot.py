@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
-from fulmar_core.estimation.settings import PlanarMotionSettings
-from fulmar_core.robot import Limits
+from fulmar_core.estimators.motion.settings import PlanarMotionSettings
+from fulmar_core.robots.robot import Limits
 from fulmar_evaluation.report.style import ALARM, INK, house_style, legend, quiet_grid
 from tests.benchmarks.estimator.comparison import MEAN, RATES_HZ, WITH_IMU, Figures, estimate_by
 from tests.benchmarks.estimator.drive import Drive

@@ -16,16 +16,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from fulmar_core.controller_settings import ControllerSettings
 from fulmar_core.controllers.classical import load_classical
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.estimation.kinds import default_estimator, make_estimator
-from fulmar_core.robot import Robot, load_robot
-from fulmar_core.rotation import from_yaw, multiply
-from fulmar_core.sensors.imu import ImuSample
-from fulmar_core.spatial import SpatialState
-from fulmar_core.state import RigidBodyState
+from fulmar_core.estimators.kinds import default_estimator, make_estimator
+from fulmar_core.loop.controller_settings import ControllerSettings
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.robots.sensors.imu import ImuSample
+from fulmar_core.states.rotation import from_yaw, multiply
+from fulmar_core.states.spatial import SpatialState
+from fulmar_core.states.state import RigidBodyState
 from fulmar_core.tasks import load_task
+from fulmar_core.worlds.scenario import load_scenario
 from tests.benchmarks.estimator.loop import (
     Change,
     EstimatedState,

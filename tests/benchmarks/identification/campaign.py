@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 
 from fulmar_benchmarks.workers import ended_with_us, one_thread_each
-from fulmar_core.actuators.differential_drive import DifferentialDrive
-from fulmar_core.identification.identify import Weight, identify
-from fulmar_core.robot import load_robot
+from fulmar_core.robots.actuators.differential_drive import DifferentialDrive
+from fulmar_core.robots.robot_file import load_robot
 from fulmar_evaluation.driven_run import driven_run
+from fulmar_evaluation.identification.identify import Weight, identify
 from tests.benchmarks.identification.driving import draw_machine, drive, speeds_of_wheels
 
 # Long enough that the intervals are a third of what is asked for, and short enough for one tank of air.

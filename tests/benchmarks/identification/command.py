@@ -12,7 +12,7 @@ from rich.table import Table
 from fulmar_bringup.console import console, output, print_json
 from fulmar_bringup.progress import work_bar
 from fulmar_cli.commands.arguments import JsonOption, SeedOption
-from fulmar_core.errors import FAILED, UnknownNameError
+from fulmar_core.config.errors import FAILED, UnknownNameError
 
 ROBOTS = ("floating_platform", "kingfisher", "turtlebot2", "jetbot")
 
@@ -50,7 +50,7 @@ def identify(
 
     fulmar benchmark identify --robots kingfisher,turtlebot2 --platforms 5
     """
-    from fulmar_cli.extras import require
+    from fulmar_cli.installation.extras import require
     from tests.benchmarks.identification.campaign import Trial, document_of, run_identification
 
     require("mujoco")

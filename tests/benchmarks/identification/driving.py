@@ -10,21 +10,21 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_core.actuators.differential_drive import DifferentialDrive
-from fulmar_core.actuators.thrusters import Thrusters
-from fulmar_core.calibration import DRAGS
-from fulmar_core.control_loop import ControlLoop
 from fulmar_core.controllers.excite import Excite
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.disturbances.world import World
-from fulmar_core.dynamics.hydrodynamics import GRAVITY
-from fulmar_core.episode import Episode, draw_episode
-from fulmar_core.goal import stack_goals
-from fulmar_core.planar import PlanarState, at_rest
-from fulmar_core.robot import Robot
-from fulmar_core.state import RigidBodyState
+from fulmar_core.loop.control_loop import ControlLoop
+from fulmar_core.robots.actuators.differential_drive import DifferentialDrive
+from fulmar_core.robots.actuators.thrusters import Thrusters
+from fulmar_core.robots.calibration import DRAGS
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.topics import ACTUATORS_STATE, ODOMETRY
+from fulmar_core.simulation.episode import Episode, draw_episode
+from fulmar_core.states.gravity import GRAVITY
+from fulmar_core.states.planar import PlanarState, at_rest
+from fulmar_core.states.state import RigidBodyState
 from fulmar_core.tasks import load_task
-from fulmar_core.topics import ACTUATORS_STATE, ODOMETRY
+from fulmar_core.tasks.goal import stack_goals
+from fulmar_core.worlds.scenario import load_scenario
+from fulmar_core.worlds.world import World
 from sim_nodes.mujoco_backend import MujocoBackend
 from tests.synthetic_run import NS, RunMessages
 

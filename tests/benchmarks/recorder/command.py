@@ -10,7 +10,7 @@ import typer
 
 from fulmar_bringup.console import console, output, print_json
 from fulmar_cli.commands.arguments import JsonOption
-from fulmar_core.errors import FAILED, ConfigError, UnknownNameError
+from fulmar_core.config.errors import FAILED, ConfigError, UnknownNameError
 
 
 def recorder(
@@ -53,7 +53,7 @@ def recorder(
 
     fulmar benchmark recorder --parts loss,kills --loss-s 30 --kills 10 --json
     """
-    from fulmar_cli.extras import require
+    from fulmar_cli.installation.extras import require
     from tests.benchmarks.recorder.document import PARTS, Asked, measure
 
     names = tuple(name.strip() for name in parts.split(","))

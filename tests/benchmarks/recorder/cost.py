@@ -26,12 +26,12 @@ from fulmar_bringup.readiness import while_starting
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.supervisor import Supervisor, supervisor
 from fulmar_bringup.system_rows import system_rows
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.episode import draw_episode
-from fulmar_core.errors import RunFailed
-from fulmar_core.robot import load_robot
+from fulmar_core.config.errors import RunFailed
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.robots.topics import SIMULATION_START_NS
+from fulmar_core.simulation.episode import draw_episode
 from fulmar_core.tasks import load_task
-from fulmar_core.topics import SIMULATION_START_NS
+from fulmar_core.worlds.scenario import load_scenario
 from fulmar_ros.deadline import Spread
 from fulmar_ros.plant_node import PlantNode
 from fulmar_ros.runtime import settle_memory, spinning

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from fulmar_bringup.run_plan import RunPlan
-from fulmar_core.provenance import fulmar_version, git_revision
+from fulmar_core.config.provenance import fulmar_version, git_revision
 from tests.benchmarks.recorder.cost import cost_of_recording
 from tests.benchmarks.recorder.loss import killed, lost_in_lock_step, lost_in_real_time
 

@@ -15,9 +15,9 @@ from fulmar_bags.run_record import read_run
 from fulmar_bringup.domains import own_domain
 from fulmar_bringup.planning import plan_run
 from fulmar_bringup.run_plan import RunPlan
-from fulmar_core.errors import RunFailed
-from fulmar_core.recording import Recording
-from fulmar_core.topics import (
+from fulmar_core.config.errors import RunFailed
+from fulmar_core.config.recording import Recording
+from fulmar_core.robots.topics import (
     ACTION,
     ACTUATORS_STATE,
     COMMAND,

@@ -26,10 +26,11 @@ from fulmar_bags.mcap_records import bag_files
 from fulmar_bringup.processes import child_environment, command_line
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.system_rows import system_rows
-from fulmar_core.errors import RunFailed
-from fulmar_core.process import PLANT_PRIORITY, take_priority
-from fulmar_core.robot import Robot, load_robot
-from fulmar_core.topics import COMMAND, ODOMETRY
+from fulmar_core.config.errors import RunFailed
+from fulmar_core.config.process import PLANT_PRIORITY, take_priority
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.robots.topics import COMMAND, ODOMETRY
 from fulmar_ros.convert import stamp_of
 from fulmar_ros.deadline import Deadlines
 from fulmar_ros.qos import publisher_qos

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fulmar_core.robot import load_robot
+from fulmar_core.robots.robot_file import load_robot
 
 THRUSTERS = load_robot("floating_platform").actuators
 NAMES = THRUSTERS.names

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fulmar_core.goal import goal_at, goals_at, stack_goals
-from fulmar_core.robot import load_robot
+from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.safety.convergence import ConvergenceMonitor, TimeToGoal
 from fulmar_core.tasks import load_task
+from fulmar_core.tasks.goal import goal_at, goals_at, stack_goals
 from tests.states import planar_state
 
 DT = 0.2

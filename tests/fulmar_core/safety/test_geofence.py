@@ -6,8 +6,8 @@ import math
 
 import pytest
 
-from fulmar_core.errors import ConfigError
-from fulmar_core.robot import load_robot
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.safety.geofence import (
     NO_AREA,
     check_area,

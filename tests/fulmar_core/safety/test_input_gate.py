@@ -7,10 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fulmar_core.robot import Limits, load_robot
+from fulmar_core.robots.robot import Limits
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.robots.sensors.repetition import FROZEN_AFTER
 from fulmar_core.safety.input_gate import CONTRADICTION, FROZEN, InputGate, Measurement
-from fulmar_core.sensors.repetition import FROZEN_AFTER
-from fulmar_core.state import RigidBodyState
+from fulmar_core.states.state import RigidBodyState
 from tests.states import planar_state
 
 LIMITS = Limits(geofence=8.0, speed=2.0, yaw_rate=6.0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from fulmar_core.errors import SafetyError
+from fulmar_core.config.errors import SafetyError
 from fulmar_core.safety.watchdog import LONGEST_S, Watchdog, checked_timeout, default_timeout
 
 MS = 1_000_000

@@ -12,9 +12,9 @@ from fulmar_bags.contents import Bag, Topic
 from fulmar_bags.decode import by_stamp
 from fulmar_bags.figures import provenance
 from fulmar_bags.tables import Row, columns, rows
-from fulmar_core.errors import ConfigError, UnknownNameError
-from fulmar_core.robot_name import Frames
-from fulmar_core.topics import CLOCK, DIAGNOSTICS, METADATA, STATUS
+from fulmar_core.config.errors import ConfigError, UnknownNameError
+from fulmar_core.robots.topics import CLOCK, DIAGNOSTICS, METADATA, STATUS
+from fulmar_core.wires.robot_name import Frames
 
 
 @dataclass(frozen=True)

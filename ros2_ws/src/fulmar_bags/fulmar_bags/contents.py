@@ -29,9 +29,9 @@ from fulmar_bags.metadata import metadata_refusal
 from fulmar_bags.ring import FAULTS
 from fulmar_bags.writer import RUN_KEY, RUN_RECORD
 from fulmar_bags.writer_thread import RECORDING
-from fulmar_core.errors import BagError, UnknownNameError
-from fulmar_core.robot_name import PLAIN, Frames, namespace_of
-from fulmar_core.topics import ODOMETRY, TRUTH, WIRES, Wire
+from fulmar_core.config.errors import BagError, UnknownNameError
+from fulmar_core.robots.topics import ODOMETRY, TRUTH, WIRES, Wire
+from fulmar_core.wires.robot_name import PLAIN, Frames, namespace_of
 
 
 @dataclass

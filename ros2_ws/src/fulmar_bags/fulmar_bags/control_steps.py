@@ -13,15 +13,11 @@ from fulmar_bags.contents import Bag, Topic, json_object
 from fulmar_bags.decode import NS, Odometries, Vectors, by_stamp, odometries
 from fulmar_bags.recorded_estop import estop_messages
 from fulmar_bags.wire_reader import ABSENT, Received, WireReader
-from fulmar_core.controller_settings import ControllerSettings
-from fulmar_core.errors import BagError, ConfigError
-from fulmar_core.goal import PoseTuple
-from fulmar_core.robot import Robot, load_robot
-from fulmar_core.robot_name import Frames
-from fulmar_core.safety.geofence import NO_AREA
-from fulmar_core.state import State
-from fulmar_core.tasks import Task, load_recorded_task, load_task
-from fulmar_core.topics import (
+from fulmar_core.config.errors import BagError, ConfigError
+from fulmar_core.loop.controller_settings import ControllerSettings
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.robots.topics import (
     ACTION,
     ACTUATORS_STATE,
     AIR_BEARING,
@@ -31,6 +27,11 @@ from fulmar_core.topics import (
     VELOCITY_COMMAND,
     command_wire,
 )
+from fulmar_core.safety.geofence import NO_AREA
+from fulmar_core.states.state import State
+from fulmar_core.tasks import Task, load_recorded_task, load_task
+from fulmar_core.tasks.goal import PoseTuple
+from fulmar_core.wires.robot_name import Frames
 
 
 @dataclass(frozen=True)

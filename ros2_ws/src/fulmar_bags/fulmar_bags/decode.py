@@ -15,7 +15,7 @@ import numpy as np
 
 from fulmar_bags.contents import Topic
 from fulmar_bags.message_types import ENCAPSULATION, LITTLE_ENDIAN, Walk, type_store
-from fulmar_core.topics import TRANSFORMS
+from fulmar_core.robots.topics import TRANSFORMS
 
 NS = 1_000_000_000
 TWIST = "geometry_msgs/msg/Twist"

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 from fulmar_bags.mcap_records import UNPACK_LEAST, UNPACK_RATIO
-from fulmar_core.errors import BagError, ConfigError
-from fulmar_core.sky.events import Events, as_polarities, joined
+from fulmar_core.config.errors import BagError, ConfigError
+from fulmar_core.dynamics.sky.events import Events, as_polarities, joined
 
 DSEC, AEDAT4 = (".h5", ".hdf5"), (".aedat4",)
 BLOCK = 1_000_000  # events that are read at once

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_core.sky.events import Events, as_polarities
+from fulmar_core.dynamics.sky.events import Events, as_polarities
 
 POINT = np.dtype([("x", "<u2"), ("y", "<u2"), ("t", "<u8"), ("p", "u1")])
 UINT8, UINT16, UINT32 = 2, 4, 6  # of sensor_msgs/PointField

@@ -10,10 +10,10 @@ import numpy as np
 
 from fulmar_bags.contents import Bag, Topic, json_object, span_ns
 from fulmar_bags.decode import messages, stamps_ns
-from fulmar_core.errors import ConfigError
-from fulmar_core.paths import config_path
-from fulmar_core.provenance import MADE_BY, PATCH
-from fulmar_core.topics import COMMAND, METADATA, ODOMETRY, VELOCITY_COMMAND
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.config.paths import config_path
+from fulmar_core.config.provenance import MADE_BY, PATCH
+from fulmar_core.robots.topics import COMMAND, METADATA, ODOMETRY, VELOCITY_COMMAND
 
 NS = 1_000_000_000
 GAP = 2.5  # periods without a message that count as a gap

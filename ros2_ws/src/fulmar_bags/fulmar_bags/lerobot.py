@@ -17,7 +17,7 @@ import pyarrow.parquet as pq
 
 from fulmar_bags.control_steps import ControlSteps
 from fulmar_bags.figures import GAP, NS
-from fulmar_core.errors import BagError, ConfigError
+from fulmar_core.config.errors import BagError, ConfigError
 
 VERSION = "v3.0"
 CHUNK = 1000  # files of one folder

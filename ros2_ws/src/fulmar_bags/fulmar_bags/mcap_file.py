@@ -23,8 +23,8 @@ from mcap.writer import MCAP0_MAGIC, Writer
 
 from fulmar_bags.message_types import MessageType, offered_qos
 from fulmar_bags.metadata import BagSpan
-from fulmar_core.atomic_write import sync_folder
-from fulmar_core.topics import Delivery
+from fulmar_core.config.atomic_write import sync_folder
+from fulmar_core.robots.topics import Delivery
 
 
 def _provisional_end() -> bytes:

@@ -23,8 +23,8 @@ from mcap.writer import MCAP0_MAGIC
 
 from fulmar_bags.mcap_file import BEGUN
 from fulmar_bags.metadata import read_custom, read_information
-from fulmar_core.bounded_file import ENDLESS, bounded_file
-from fulmar_core.errors import BagError
+from fulmar_core.config.bounded_file import ENDLESS, bounded_file
+from fulmar_core.config.errors import BagError
 
 Record = Schema | Channel | Message | Metadata | Attachment
 

@@ -13,13 +13,13 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_core.errors import shortened
-from fulmar_core.robot_name import PLAIN, Frames
+from fulmar_core.config.errors import shortened
+from fulmar_core.robots.sensors.imu import UNKNOWN
+from fulmar_core.robots.sensors.kind import SensorKind
 from fulmar_core.safety.input_gate import Measurement
-from fulmar_core.sensors.imu import UNKNOWN
-from fulmar_core.sensors.kind import SensorKind
-from fulmar_core.sensors.reading import Reading
-from fulmar_core.state import RigidBodyState
+from fulmar_core.states.state import RigidBodyState
+from fulmar_core.wires.reading import Reading
+from fulmar_core.wires.robot_name import PLAIN, Frames
 
 NS = 1_000_000_000
 FRAME, BODY_FRAME = PLAIN.odom, PLAIN.base

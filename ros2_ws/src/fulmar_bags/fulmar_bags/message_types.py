@@ -18,8 +18,8 @@ from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
 
-from fulmar_core.errors import BagError
-from fulmar_core.topics import Delivery
+from fulmar_core.config.errors import BagError
+from fulmar_core.robots.topics import Delivery
 
 # The value of an unset duration in rmw.
 _FOREVER = {"sec": 9223372036, "nsec": 854775807}

@@ -10,9 +10,9 @@ from typing import Any
 
 import yaml
 
-from fulmar_core import yaml_text
-from fulmar_core.atomic_write import write_whole
-from fulmar_core.bounded_file import RECORD_BYTES, RefusedFileError, read_bounded
+from fulmar_core.config import yaml_text
+from fulmar_core.config.atomic_write import write_whole
+from fulmar_core.config.bounded_file import RECORD_BYTES, RefusedFileError, read_bounded
 
 METADATA_FILE = "metadata.yaml"
 # Ten times as fast, where PyYAML was built with it; this runs twice a second beside everything that controls.

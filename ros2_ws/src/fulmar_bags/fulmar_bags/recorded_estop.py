@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from fulmar_bags.wire_reader import Received, WireReader
-from fulmar_core.errors import BagError
+from fulmar_core.config.errors import BagError
+from fulmar_core.robots.topics import ESTOP, ESTOP_RELEASED
 from fulmar_core.safety.estop import TIMEOUT_NS, EstopMonitor
-from fulmar_core.topics import ESTOP, ESTOP_RELEASED
 
 # A message reaches the controller and the recorder at different times; within this span the record decides.
 SLACK_NS = 50_000_000

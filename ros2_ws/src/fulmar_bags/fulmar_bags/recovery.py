@@ -13,9 +13,9 @@ from mcap.well_known import Profile
 from fulmar_bags.mcap_file import BagFile, mcap_writer
 from fulmar_bags.mcap_records import bag_files, plain_name, read_records
 from fulmar_bags.metadata import BagSpan, TopicCount, read_custom, write_metadata
-from fulmar_core import yaml_text
-from fulmar_core.atomic_write import sync_folder
-from fulmar_core.errors import BagError
+from fulmar_core.config import yaml_text
+from fulmar_core.config.atomic_write import sync_folder
+from fulmar_core.config.errors import BagError
 
 _QOS = "offered_qos_profiles"  # of a channel's metadata: YAML in a text
 

@@ -15,7 +15,7 @@ from typing import Any
 
 from fulmar_bags.message_types import type_store
 from fulmar_bags.writer import BagCounts, BagWriter
-from fulmar_core.topics import DIAGNOSTICS, ESTOP, STATUS, Wire
+from fulmar_core.robots.topics import DIAGNOSTICS, ESTOP, STATUS, Wire
 
 FAULTS = "fulmar_faults"  # entry of `custom_data`: JSON list of when and why
 MAX_BYTES = 64 << 20  # of memory

@@ -13,12 +13,9 @@ from fulmar_bags.decode import NS, Odometries, Vectors, odometries
 from fulmar_bags.figures import controller_of
 from fulmar_bags.wire_reader import Received, WireReader
 from fulmar_bags.writer import RUN_RECORD
-from fulmar_core.errors import BagError, ConfigError
-from fulmar_core.paths import config_names
-from fulmar_core.rotation import rotate
-from fulmar_core.state import RigidBodyState
-from fulmar_core.tasks import Task, load_recorded_task
-from fulmar_core.topics import (
+from fulmar_core.config.errors import BagError, ConfigError
+from fulmar_core.config.paths import config_names
+from fulmar_core.robots.topics import (
     ACTUATORS_STATE,
     COMMAND,
     DIAGNOSTICS,
@@ -29,6 +26,9 @@ from fulmar_core.topics import (
     TRUTH,
     VELOCITY_COMMAND,
 )
+from fulmar_core.states.rotation import rotate
+from fulmar_core.states.state import RigidBodyState
+from fulmar_core.tasks import Task, load_recorded_task
 
 
 @dataclass(frozen=True)

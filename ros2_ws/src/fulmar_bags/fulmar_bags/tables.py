@@ -11,7 +11,7 @@ import numpy as np
 
 from fulmar_bags.contents import Bag, Topic
 from fulmar_bags.decode import has_header, messages, stamp_of
-from fulmar_core.errors import BagError
+from fulmar_core.config.errors import BagError
 
 MOST_ENTRIES = 64  # of one array in columns of their own; what is longer stays together
 Row = dict[str, Any]  # numbers, texts, and arrays of what is longer

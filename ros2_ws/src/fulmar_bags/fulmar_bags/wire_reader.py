@@ -19,9 +19,9 @@ from fulmar_bags.decode import (
     twist_vectors,
 )
 from fulmar_bags.message_reader import goal_of, obstacles_of, thing_of
-from fulmar_core.robot_name import Frames
+from fulmar_core.robots.topics import GOAL_WIRES, OBSTACLES, VELOCITY_COMMAND, Wire, goal_wires
 from fulmar_core.tasks import Task
-from fulmar_core.topics import GOAL_WIRES, OBSTACLES, VELOCITY_COMMAND, Wire, goal_wires
+from fulmar_core.wires.robot_name import Frames
 
 ABSENT = -1  # index of what is not there
 

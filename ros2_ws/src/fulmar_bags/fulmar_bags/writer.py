@@ -15,9 +15,9 @@ from fulmar_bags.interrupted_bag import FinishedPart, interrupted_bag
 from fulmar_bags.mcap_file import BagPart, Topic
 from fulmar_bags.message_types import message_type, offered_qos
 from fulmar_bags.metadata import BagSpan, TopicCount, write_metadata
-from fulmar_core.atomic_write import sync_folder
-from fulmar_core.errors import BagError
-from fulmar_core.topics import Delivery
+from fulmar_core.config.atomic_write import sync_folder
+from fulmar_core.config.errors import BagError
+from fulmar_core.robots.topics import Delivery
 
 RUN_RECORD = "fulmar"  # name of the MCAP metadata record and of the entry in `custom_data`
 RUN_KEY = "run"

@@ -19,8 +19,8 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from fulmar_bags.writer import BagCounts
-from fulmar_core.errors import BagError
-from fulmar_core.yielding import BEHIND
+from fulmar_core.config.errors import BagError
+from fulmar_core.config.yielding import BEHIND
 
 MAX_QUEUED = 100_000  # messages that may wait for the thread
 MAX_WAITING = 64 << 20  # bytes that may wait for the thread, and as many for a disk that refuses them

@@ -6,8 +6,8 @@ import tempfile
 import time
 from pathlib import Path
 
-from fulmar_core.errors import ConfigError
-from fulmar_core.robot import Robot
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.robots.robot import Robot
 from sim_nodes.jsbsim_craft import silent_model
 from sim_nodes.jsbsim_model import FOOT, write_aircraft
 

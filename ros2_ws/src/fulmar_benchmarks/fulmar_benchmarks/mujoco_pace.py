@@ -14,10 +14,10 @@ import mujoco.rollout
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from fulmar_core.disturbances.scenario import Scenario
-from fulmar_core.episode import draw_episode
-from fulmar_core.robot import Robot
+from fulmar_core.robots.robot import Robot
+from fulmar_core.simulation.episode import draw_episode
 from fulmar_core.tasks import Task
+from fulmar_core.worlds.scenario import Scenario
 from sim_nodes.mujoco_model import Scene
 from sim_nodes.mujoco_model.floater import Floater
 

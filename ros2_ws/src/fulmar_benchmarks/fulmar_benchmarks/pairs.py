@@ -14,10 +14,10 @@ import policy_server
 import sim_nodes
 from fulmar_benchmarks.unit import Unit
 from fulmar_bringup.run_plan import RunPlan
-from fulmar_core.errors import BundleError, ConfigError
-from fulmar_core.paths import config_files
-from fulmar_core.policy_bundle import read_passport
-from fulmar_core.robot import load_robot
+from fulmar_core.config.errors import BundleError, ConfigError
+from fulmar_core.config.paths import config_files
+from fulmar_core.loop.policy_bundle import read_passport
+from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.tasks import load_task
 from fulmar_evaluation.evaluation import Trial
 from policy_server.controllers import policies_directory

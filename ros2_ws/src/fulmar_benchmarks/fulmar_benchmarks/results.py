@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 import fulmar_evaluation.bounds
-from fulmar_core.atomic_write import whole_file
-from fulmar_core.episode import Episode
+from fulmar_core.config.atomic_write import whole_file
+from fulmar_core.simulation.episode import Episode
 from fulmar_evaluation.evaluation import Trial
 from fulmar_evaluation.waypoint_score import WaypointBound, waypoint_bound
 
@@ -26,7 +26,7 @@ class PairResult:
 
     about: dict[str, Any]  # JSON-ready: what was run, and what is said in words
     succeeded: np.ndarray  # (episodes,) truth values
-    figures: dict[str, np.ndarray]  # (episodes,) by the names of `fulmar_core.figures`
+    figures: dict[str, np.ndarray]  # (episodes,) by the names of `fulmar_evaluation.figures`
     map_xy: np.ndarray  # (episodes, 2) where an episode lies in the map of successes
     over_time: np.ndarray  # (quantiles, steps) of the error, or of the goals reached
     paths: np.ndarray  # (kept, steps, 3) x [m], y [m], yaw [rad] of the first episodes

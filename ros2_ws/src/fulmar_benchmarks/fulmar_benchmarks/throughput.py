@@ -22,14 +22,14 @@ from typing import Any, Protocol
 import numpy as np
 
 from fulmar_benchmarks.mujoco_pace import DIFFERENT, SEED, AfloatPace, MujocoPace, random_commands
-from fulmar_core.disturbances.scenario import Scenario
-from fulmar_core.episode import episode_steps
-from fulmar_core.errors import ConfigError
-from fulmar_core.learning_step import observed_step
-from fulmar_core.robot import Robot
-from fulmar_core.rotation import Array
-from fulmar_core.simulation import BatchSimulation
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.robots.robot import Robot
+from fulmar_core.simulation.episode import episode_steps
+from fulmar_core.simulation.learning_step import observed_step
+from fulmar_core.simulation.simulation import BatchSimulation
+from fulmar_core.states.rotation import Array
 from fulmar_core.tasks import Task
+from fulmar_core.worlds.scenario import Scenario
 
 # What is timed beside the batch, and the name of the ratio to it.
 MUJOCO, IN_WATER, BY_EULER, JSBSIM = "mujoco", "mujoco_with_water", "mujoco_euler", "jsbsim"

@@ -13,10 +13,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fulmar_benchmarks.results import QUANTILES, PairResult, cached_bound
-from fulmar_benchmarks.roboran.targets import CONTROL_HZ, GOAL_STEPS
-from fulmar_core.episode import Episode, episode_steps
-from fulmar_core.metrics import Trajectories, counts_targets, first_steps
-from fulmar_core.planar import wrapped
+from fulmar_core.simulation.episode import Episode, episode_steps
+from fulmar_core.simulation.metrics import Trajectories, counts_targets, first_steps
+from fulmar_core.states.planar import wrapped
 from fulmar_evaluation.evaluation import Progress, Tally, Trial, runs_of
 from fulmar_evaluation.waypoint_score import bound_figures, has_bound
 
@@ -24,6 +23,8 @@ if TYPE_CHECKING:
     from fulmar_evaluation.ros_evaluation import RosPool
 
 KEPT = 48  # episodes whose paths are kept
+CONTROL_HZ = 10.0  # of the environments of RoboRAN (facts §2.1)
+GOAL_STEPS = 1000  # horizon of its go_through_positions
 FEW_WORLDS = 64  # of the second run in batch, which must give the same numbers
 COMPARED = 256  # episodes of that second run
 # How long one step takes, in steps of a batch; for the progress bar.

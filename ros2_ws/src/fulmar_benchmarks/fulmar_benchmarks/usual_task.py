@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from fulmar_core.robot import Robot
-from fulmar_core.spatial import SpatialState
+from fulmar_core.robots.robot import Robot
+from fulmar_core.states.spatial import SpatialState
 
 
 def usual_task(robot: Robot) -> str:

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 from fulmar_benchmarks.results import PairResult
 from fulmar_benchmarks.unit import Unit, done_already, run_unit
 from fulmar_bringup.domains import environment
-from fulmar_core.errors import RunFailed
-from fulmar_core.process import end_with
+from fulmar_core.config.errors import RunFailed
+from fulmar_core.config.process import end_with
 
 if TYPE_CHECKING:
     from fulmar_evaluation.ros_evaluation import RosPool

@@ -9,17 +9,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fulmar_bringup.system import System
-from fulmar_core.calibration import calibration_path
+from fulmar_core.config.paths import config_path
+from fulmar_core.config.provenance import fulmar_version, git_revision
 from fulmar_core.controllers.classical import gains_of, gains_path
-from fulmar_core.disturbances.scenario import scenario_path
-from fulmar_core.estimation.kinds import estimator_path
-from fulmar_core.goal_files import goal_file_path
-from fulmar_core.paths import config_path
-from fulmar_core.policy_bundle import PASSPORT
-from fulmar_core.provenance import fulmar_version, git_revision
-from fulmar_core.robot import load_robot
+from fulmar_core.estimators.kinds import estimator_path
+from fulmar_core.loop.policy_bundle import PASSPORT
+from fulmar_core.robots.calibration import calibration_path
+from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.tasks import load_task
+from fulmar_core.tasks.goal_files import goal_file_path
 from fulmar_core.tasks.own_task import OwnTask
+from fulmar_core.worlds.scenario import scenario_path
 from policy_server.controllers import controller_entry, shipped_policy
 
 if TYPE_CHECKING:

@@ -10,10 +10,10 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.node import Node
 
 from fulmar_bringup.run_plan import NODES, PARTS, PLANT, REPORTING
-from fulmar_core.robot_name import namespace_of
+from fulmar_core.robots.topics import DIAGNOSTICS, ESTOP_TRIGGER
 from fulmar_core.safety.estop import HOLDS, SILENT
 from fulmar_core.safety.watchdog import NO_COMMAND
-from fulmar_core.topics import DIAGNOSTICS, ESTOP_TRIGGER
+from fulmar_core.wires.robot_name import namespace_of
 from fulmar_ros.operator_subscription import subscribe_every
 from fulmar_ros.runtime import ros_node
 

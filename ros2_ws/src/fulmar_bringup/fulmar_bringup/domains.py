@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TextIO
 
-from fulmar_core.errors import ConfigError
+from fulmar_core.config.errors import ConfigError
 
 
 @contextlib.contextmanager

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from fulmar_core.errors import ConfigError
+from fulmar_core.config.errors import ConfigError
 from hardware_drivers.hardware import Hardware
 from hardware_drivers.settings import (
     Driver,

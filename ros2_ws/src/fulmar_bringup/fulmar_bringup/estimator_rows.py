@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from fulmar_bringup.run_plan import NodeSpec, Parameter, RunPlan, node_row
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.estimation.kinds import estimator_kind
-from fulmar_core.robot import load_robot
-from fulmar_core.topics import ANSWER, EVENTS, EVENTS_2, PERIOD, TRUTH, Wire
+from fulmar_core.estimators.kinds import estimator_kind
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.robots.topics import ANSWER, EVENTS, EVENTS_2, PERIOD, TRUTH, Wire
+from fulmar_core.worlds.scenario import load_scenario
 
 CAMERA = "event_camera"  # name of the node
 

@@ -16,9 +16,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, String
 from std_srvs.srv import Trigger
 
-from fulmar_core.robot_name import namespace_of
-from fulmar_core.safety.estop import EstopButton
-from fulmar_core.topics import (
+from fulmar_core.robots.topics import (
     COMMAND,
     ESTOP,
     ESTOP_RELEASED,
@@ -28,6 +26,8 @@ from fulmar_core.topics import (
     VELOCITY_COMMAND,
     Wire,
 )
+from fulmar_core.safety.estop import EstopButton
+from fulmar_core.wires.robot_name import namespace_of
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 
 Answer = tuple[bool, str]  # whether it was done, and the answer of the service

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from fulmar_core.actuators.reaction_wheels import ReactionWheels
-from fulmar_core.errors import ConfigError
-from fulmar_core.excitation.profiles import gain_of, profile_of
-from fulmar_core.excitation.settings import Torques
-from fulmar_core.goal_files import load_goal_file, load_torques
-from fulmar_core.robot import Robot
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.robots.actuators.reaction_wheels import ReactionWheels
+from fulmar_core.robots.robot import Robot
+from fulmar_core.tasks.excitation import Torques
+from fulmar_core.tasks.goal_files import load_goal_file, load_torques
+from fulmar_core.tasks.torque_profiles import gain_of, profile_of
 
 EXCITE = "excite"  # name of the controller
 

@@ -11,10 +11,14 @@ from pathlib import Path
 import numpy as np
 
 from fulmar_bringup.task_choice import task_of_goals
-from fulmar_core.attitude import angle_between
-from fulmar_core.errors import ConfigError
-from fulmar_core.goal import PoseTuple
-from fulmar_core.goal_files import (
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.robots.robot import Robot
+from fulmar_core.safety.geofence import check_places, farthest_goal
+from fulmar_core.states.attitude import angle_between
+from fulmar_core.states.spatial import quat_of
+from fulmar_core.tasks import Task, load_task
+from fulmar_core.tasks.goal import PoseTuple
+from fulmar_core.tasks.goal_files import (
     FollowedPath,
     GoalFile,
     Poses,
@@ -24,11 +28,7 @@ from fulmar_core.goal_files import (
     goal_file_path,
     load_goals,
 )
-from fulmar_core.goal_sequence import goal_sequence
-from fulmar_core.robot import Robot
-from fulmar_core.safety.geofence import check_places, farthest_goal
-from fulmar_core.spatial import quat_of
-from fulmar_core.tasks import Task, load_task
+from fulmar_core.tasks.goal_sequence import goal_sequence
 
 GOALS_HZ = 10.0  # of a goal node, at most
 TRIED = 720  # places along a path where a step is measured
@@ -158,7 +158,7 @@ def _check_turning(turns: np.ndarray, ahead: np.ndarray, goals: str, robot: Robo
 
 
 def first_targets(file: GoalFile) -> np.ndarray:
-    """Targets that the file begins with, as in `fulmar_core.goal.Goal`."""
+    """Targets that the file begins with, as in `fulmar_core.tasks.goal.Goal`."""
     return np.zeros((1, 3)) if isinstance(file, FollowedPath) else file.targets()
 
 

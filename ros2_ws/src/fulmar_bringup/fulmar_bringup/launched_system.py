@@ -14,10 +14,10 @@ from fulmar_bringup.plan_checks import adapter_path, check_external
 from fulmar_bringup.run_plan import NodeSpec, RunPlan
 from fulmar_bringup.system import default_hardware, varied_system
 from fulmar_bringup.system_rows import own_nodes, system_rows
-from fulmar_core.errors import ConfigError
-from fulmar_core.robot import load_robot
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.config.written_text import check_lines
+from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.tasks import load_task
-from fulmar_core.written_text import check_lines
 from hardware_drivers.hardware import load_hardware
 from hardware_drivers.own_driver import check_own_driver
 

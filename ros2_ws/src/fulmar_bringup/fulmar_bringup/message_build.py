@@ -16,7 +16,7 @@ from collections.abc import Callable, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 
-from fulmar_core.errors import ConfigError, FulmarError
+from fulmar_core.config.errors import ConfigError, FulmarError
 
 PACKAGE = "tf2_msgs"
 SOURCE = Path(__file__).parent / PACKAGE

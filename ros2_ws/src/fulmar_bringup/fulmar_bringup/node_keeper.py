@@ -12,7 +12,7 @@ from fulmar_bringup.node_loss import ENDS
 from fulmar_bringup.processes import Ended, ProcessGroup
 from fulmar_bringup.run_plan import NodeSpec
 from fulmar_bringup.supervisor import Supervisor
-from fulmar_core.errors import RunFailed
+from fulmar_core.config.errors import RunFailed
 
 LOOK_S = 0.25  # between two looks at the states of processes
 STOPPED_S = 3.0  # in its tracks, as by SIGSTOP, before a process counts as lost

@@ -8,13 +8,11 @@ from pathlib import Path
 from fulmar_bringup.emulation import Emulation
 from fulmar_bringup.estimator_rows import estimator_specs, robot_row, simulates_without_noise
 from fulmar_bringup.run_plan import NodeSpec, Parameter, RunPlan
-from fulmar_core.actuators.refuge import LANDS_S
-from fulmar_core.estimation.kinds import estimator_kind, load_estimator
-from fulmar_core.recording import Recording
-from fulmar_core.robot import load_robot
-from fulmar_core.safety.geofence import NO_AREA
-from fulmar_core.tasks import load_task
-from fulmar_core.topics import (
+from fulmar_core.config.recording import Recording
+from fulmar_core.estimators.kinds import estimator_kind, load_estimator
+from fulmar_core.robots.actuators.refuge import LANDS_S
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.robots.topics import (
     ACTION,
     ACTUATORS_STATE,
     ANSWER,
@@ -38,6 +36,8 @@ from fulmar_core.topics import (
     command_wire,
     goal_wires,
 )
+from fulmar_core.safety.geofence import NO_AREA
+from fulmar_core.tasks import load_task
 from hardware_drivers.hardware import load_hardware
 from policy_server.controllers import controller_entry
 

@@ -8,10 +8,7 @@ from fulmar_bringup.estimator_rows import robot_row
 from fulmar_bringup.goal_plan import goal_rate, is_path_of_places
 from fulmar_bringup.node_loss import RESTARTS
 from fulmar_bringup.run_plan import NodeSpec, Parameter, RunPlan, node_row
-from fulmar_core.robot_name import namespace_of
-from fulmar_core.safety.geofence import NO_AREA
-from fulmar_core.tasks import load_task
-from fulmar_core.topics import (
+from fulmar_core.robots.topics import (
     ACTUATORS_STATE,
     DIAGNOSTICS,
     GOAL_WIRES,
@@ -23,6 +20,9 @@ from fulmar_core.topics import (
     TELEOP,
     goal_wires,
 )
+from fulmar_core.safety.geofence import NO_AREA
+from fulmar_core.tasks import load_task
+from fulmar_core.wires.robot_name import namespace_of
 
 
 def goals_spec(

@@ -17,21 +17,21 @@ from fulmar_bringup.system import (
     Guards,
     default_hardware,
 )
-from fulmar_core.bundle_signature import verify_bundle
-from fulmar_core.controller_settings import POLICY
+from fulmar_core.config.errors import BundleError, ConfigError, UnknownNameError
+from fulmar_core.config.own_class import is_own
+from fulmar_core.config.paths import config_names
 from fulmar_core.controllers.classical import has_law
-from fulmar_core.disturbances.scenario import Scenario
-from fulmar_core.errors import BundleError, ConfigError, UnknownNameError
-from fulmar_core.estimation.kinds import check_estimator, default_estimator, estimator_kind
-from fulmar_core.goal import Goal, PoseTuple
-from fulmar_core.own_class import is_own
-from fulmar_core.paths import config_names
-from fulmar_core.policy_bundle import check_fit, check_folder, read_bundle, read_passport
-from fulmar_core.robot import Robot
+from fulmar_core.estimators.kinds import check_estimator, default_estimator, estimator_kind
+from fulmar_core.loop.bundle_signature import verify_bundle
+from fulmar_core.loop.controller_settings import POLICY
+from fulmar_core.loop.policy_bundle import check_fit, check_folder, read_bundle, read_passport
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.topics import COMMAND, MOCAP, ODOMETRY, SENSOR_WIRES, TRUTH, VELOCITY_COMMAND
 from fulmar_core.safety.geofence import NO_AREA, check_area_of
 from fulmar_core.safety.watchdog import default_timeout
 from fulmar_core.tasks import Task
-from fulmar_core.topics import COMMAND, MOCAP, ODOMETRY, SENSOR_WIRES, TRUTH, VELOCITY_COMMAND
+from fulmar_core.tasks.goal import Goal, PoseTuple
+from fulmar_core.worlds.scenario import Scenario
 from hardware_drivers.hardware import TOPIC_DRIVERS, load_hardware
 from hardware_drivers.own_driver import check_own_driver
 from hardware_drivers.settings import UNARMED, MavlinkBoat

@@ -46,17 +46,18 @@ from fulmar_bringup.system import (
 )
 from fulmar_bringup.system_rows import own_nodes
 from fulmar_bringup.task_choice import whole_pose
-from fulmar_core.disturbances.scenario import Scenario, load_scenario
-from fulmar_core.episode import draw_episode
-from fulmar_core.errors import ConfigError, UnknownNameError
-from fulmar_core.excitation.profiles import DURATION_S
-from fulmar_core.goal import PLACES, Goal, PoseTuple
-from fulmar_core.goal_files import GoalFile
-from fulmar_core.recording import MODES, Mode, Recording
-from fulmar_core.robot import Robot, load_robot
-from fulmar_core.robot_name import checked_name
+from fulmar_core.config.errors import ConfigError, UnknownNameError
+from fulmar_core.config.recording import MODES, Mode, Recording
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.safety.geofence import check_places, check_starts, farthest_goal, unreachable
+from fulmar_core.simulation.episode import draw_episode
 from fulmar_core.tasks import Task, load_task
+from fulmar_core.tasks.goal import PLACES, Goal, PoseTuple
+from fulmar_core.tasks.goal_files import GoalFile
+from fulmar_core.tasks.torque_profiles import DURATION_S
+from fulmar_core.wires.robot_name import checked_name
+from fulmar_core.worlds.scenario import Scenario, load_scenario
 
 DRAWS = 1000  # of a start and a goal, before an area counts as too small for them
 

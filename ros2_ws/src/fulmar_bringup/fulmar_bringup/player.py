@@ -17,8 +17,8 @@ from rosgraph_msgs.msg import Clock
 
 from fulmar_bags.contents import Bag, Topic
 from fulmar_bags.decode import stamps_ns
-from fulmar_core.errors import BagError, ConfigError, UnknownNameError
-from fulmar_core.topics import CLOCK, ODOMETRY, WIRES
+from fulmar_core.config.errors import BagError, ConfigError, UnknownNameError
+from fulmar_core.robots.topics import CLOCK, ODOMETRY, WIRES
 from fulmar_ros.convert import stamp_of
 from fulmar_ros.qos import publisher_qos
 from fulmar_ros.runtime import ros_node

@@ -19,7 +19,7 @@ import psutil
 
 from fulmar_bringup.console import printable
 from fulmar_bringup.run_plan import NodeSpec, Parameter
-from fulmar_core.process import LAUNCHER_PID
+from fulmar_core.config.process import LAUNCHER_PID
 from fulmar_ros.middleware import environment_of_any_node, middleware_environment
 
 PATIENCE_S = 4.0  # for an orderly end, before it is no longer asked for

@@ -11,10 +11,10 @@ from fulmar_bringup.console import log_line
 from fulmar_bringup.processes import ProcessGroup
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.supervisor import START_TIMEOUT_S, Report, Supervisor
-from fulmar_core.errors import RunFailed
-from fulmar_core.robot import load_robot
-from fulmar_core.topics import ODOMETRY, Wire, command_wire
-from fulmar_core.wire_check import Offer, wire_problems
+from fulmar_core.config.errors import RunFailed
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.robots.topics import ODOMETRY, Wire, command_wire
+from fulmar_core.robots.wire_check import Offer, wire_problems
 from fulmar_ros.recorder_health import COMMANDERS
 from hardware_drivers.adapter_node import message_class
 from hardware_drivers.hardware import TOPIC_DRIVERS, load_hardware

@@ -8,7 +8,7 @@ import time
 from fulmar_bringup.run_plan import PLANT, RunPlan
 from fulmar_bringup.supervisor import Report
 from fulmar_bringup.system_events import SystemEvents
-from fulmar_core.robot import load_robot
+from fulmar_core.robots.robot_file import load_robot
 from fulmar_ros.node_identity import STARTED_NS, differences, setup_of
 
 

@@ -22,10 +22,10 @@ from fulmar_bringup.estop_robots import (
     spaces_with,
     stop_robots,
 )
-from fulmar_core.errors import RunFailed
-from fulmar_core.robot_name import namespace_of
-from fulmar_core.topics import ESTOP_RESET, STATUS, SWAP, WIRES, Wire
-from fulmar_core.wire_check import wire_problems
+from fulmar_core.config.errors import RunFailed
+from fulmar_core.robots.topics import ESTOP_RESET, STATUS, SWAP, WIRES, Wire
+from fulmar_core.robots.wire_check import wire_problems
+from fulmar_core.wires.robot_name import namespace_of
 from fulmar_ros.graph import full_name, offers_of, robot_namespaces, running_robots_text
 from fulmar_ros.operator_subscription import subscribe_every
 from fulmar_ros.qos import publisher_qos

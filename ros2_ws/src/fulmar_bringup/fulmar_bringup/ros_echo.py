@@ -8,7 +8,7 @@ import time
 import numpy as np
 from std_msgs.msg import String
 
-from fulmar_core.topics import METADATA
+from fulmar_core.robots.topics import METADATA
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.runtime import ros_node
 

@@ -31,13 +31,13 @@ from fulmar_bringup.run_plan import NodeSpec, RunPlan
 from fulmar_bringup.supervisor import Report, Supervisor, supervisor
 from fulmar_bringup.system_events import distance_of, mode_of
 from fulmar_bringup.system_rows import system_rows
-from fulmar_core.actuators.refuge import LANDS_S
-from fulmar_core.errors import BAD_USAGE, ConfigError, RunFailed
-from fulmar_core.goal_files import load_goals
-from fulmar_core.robot import load_robot
+from fulmar_core.config.errors import BAD_USAGE, ConfigError, RunFailed
+from fulmar_core.robots.actuators.refuge import LANDS_S
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.robots.topics import SIMULATION_START_NS
 from fulmar_core.safety.estop import HOLDS
 from fulmar_core.safety.watchdog import NO_COMMAND
-from fulmar_core.topics import SIMULATION_START_NS
+from fulmar_core.tasks.goal_files import load_goals
 from fulmar_ros.living_plant import TwinRunError
 from hardware_drivers.hardware import load_hardware
 from hardware_drivers.presence import check_presence

@@ -8,9 +8,9 @@ from typing import Any
 
 from fulmar_bringup.node_loss import ENDS, RESTARTS
 from fulmar_bringup.system import NONE, Guards
-from fulmar_core.estimation.kinds import KINDS
-from fulmar_core.recording import Recording
-from fulmar_core.robot_name import Frames, frames_of, namespace_of
+from fulmar_core.config.recording import Recording
+from fulmar_core.estimators.kinds import KINDS
+from fulmar_core.wires.robot_name import Frames, frames_of, namespace_of
 
 Parameter = bool | int | float | str | list[float] | list[int] | list[str]
 PLANT, CONTROLLER = PARTS = ("plant", "controller")  # values of `RunPlan.only`

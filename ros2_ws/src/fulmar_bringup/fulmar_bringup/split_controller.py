@@ -16,7 +16,7 @@ from fulmar_bringup.standing_system import Ending, Show, described, report_newes
 from fulmar_bringup.supervisor import Supervisor, supervisor
 from fulmar_bringup.system_events import Emit, SystemEvents
 from fulmar_bringup.system_rows import system_rows
-from fulmar_core.errors import ConfigError, RunFailed
+from fulmar_core.config.errors import ConfigError, RunFailed
 from fulmar_ros.node_identity import STARTED_NS
 
 

@@ -29,11 +29,11 @@ from fulmar_bringup.supervisor import Report, Supervisor
 from fulmar_bringup.system import System
 from fulmar_bringup.system_events import Emit, SystemEvents, distance_of, mode_of
 from fulmar_bringup.system_rows import own_nodes
-from fulmar_core.errors import ConfigError, RunFailed, UnknownNameError
-from fulmar_core.goal import PoseTuple
-from fulmar_core.robot import load_robot
+from fulmar_core.config.errors import ConfigError, RunFailed, UnknownNameError
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.robots.topics import SIMULATION_START_NS
 from fulmar_core.tasks import load_task
-from fulmar_core.topics import SIMULATION_START_NS
+from fulmar_core.tasks.goal import PoseTuple
 from policy_server.controllers import controller_entry
 
 Show = Callable[[float, float | None, str], None]  # time [s], distance from the goal [m], mode
@@ -71,7 +71,7 @@ def plan_system(
         seed: Seed.
         start: Where a simulated robot begins; the origin by default.
         rate: Simulated seconds a wall-clock second.
-        recording: A mode of `fulmar_core.recording` instead of the system's own.
+        recording: A mode of `fulmar_core.config.recording` instead of the system's own.
         markers: Whether a node draws for viewers.
         unattended: Whether a service starts it: an e-stop node begins pressed, and nothing is armed.
         only: plant or controller, where the other one runs in another place.

@@ -15,8 +15,8 @@ from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
 
-from fulmar_core.errors import ConfigError, FulmarError
-from fulmar_core.sky.catalogue import FOLDER, catalogue_path
+from fulmar_core.config.errors import ConfigError, FulmarError
+from fulmar_core.robots.sensors.catalogue import FOLDER, catalogue_path
 
 LOCK = Path(__file__).parent / "stars" / "requirements.lock"
 

@@ -19,12 +19,12 @@ from rclpy.node import Node
 from visualization_msgs.msg import MarkerArray
 
 from fulmar_bringup.run_plan import NODES, RunPlan
-from fulmar_core.errors import RunFailed
-from fulmar_core.goal import Goal, goal_at
+from fulmar_core.config.errors import RunFailed
+from fulmar_core.robots.topics import DIAGNOSTICS, GOAL_WIRES, OBSTACLES, STATUS
+from fulmar_core.robots.wire_check import Offer
 from fulmar_core.safety.estop import HOLDS, SILENT
 from fulmar_core.tasks import load_task
-from fulmar_core.topics import DIAGNOSTICS, GOAL_WIRES, OBSTACLES, STATUS
-from fulmar_core.wire_check import Offer
+from fulmar_core.tasks.goal import Goal, goal_at
 from fulmar_ros.goal_messages import TYPES, GoalMessage, goal_message, obstacles_message
 from fulmar_ros.graph import offers_of
 from fulmar_ros.living_plant import refuse_living_plant, refuse_twins, sees_living_plant

@@ -7,17 +7,17 @@ from pathlib import Path
 from typing import Any
 
 from fulmar_bringup.node_loss import ENDS, LOSSES
-from fulmar_core.config import load_config
+from fulmar_core.config.errors import ConfigError, UnknownNameError, did_you_mean
+from fulmar_core.config.paths import config_names, config_path
+from fulmar_core.config.recording import Recording
+from fulmar_core.config.strict_yaml import load_config
 from fulmar_core.controllers.classical import default_gains_note
-from fulmar_core.errors import ConfigError, UnknownNameError, did_you_mean
-from fulmar_core.estimation.kinds import default_estimator, estimator_kind
-from fulmar_core.flight.jsbsim_models import JSBSIM, is_jsbsim, jsbsim_model
-from fulmar_core.paths import config_names, config_path
-from fulmar_core.recording import Recording
-from fulmar_core.robot import load_robot
-from fulmar_core.robot_name import check_robot_name, checked_name
+from fulmar_core.estimators.kinds import default_estimator, estimator_kind
+from fulmar_core.robots.jsbsim_models import JSBSIM, is_jsbsim, jsbsim_model
+from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.safety.geofence import NO_AREA, check_area
 from fulmar_core.tasks import load_task
+from fulmar_core.wires.robot_name import check_robot_name, checked_name
 from hardware_drivers.hardware import hardware_of, hardware_path, load_hardware
 from policy_server.controllers import FALLBACKS, controller_entry, usual_hz
 

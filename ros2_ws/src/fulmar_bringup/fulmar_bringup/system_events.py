@@ -6,9 +6,9 @@ import math
 from collections.abc import Callable
 from typing import Any, Protocol
 
-from fulmar_core.goal_sequence import HOLD_S
 from fulmar_core.safety.estop import HOLDS
 from fulmar_core.safety.watchdog import NO_COMMAND
+from fulmar_core.tasks.goal_sequence import HOLD_S
 
 ARRIVES_S = 0.3  # after a controller reports that it acts, its command has arrived
 Emit = Callable[..., None]  # name of the event, and its fields by keyword

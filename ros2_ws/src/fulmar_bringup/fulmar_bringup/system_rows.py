@@ -23,11 +23,21 @@ from fulmar_bringup.node_table import (
 from fulmar_bringup.operator_rows import markers_spec, run_goals_spec
 from fulmar_bringup.run_plan import CONTROLLER, NodeSpec, RunPlan, node_row
 from fulmar_bringup.system import System
-from fulmar_core.errors import ConfigError, did_you_mean
-from fulmar_core.robot import load_robot
-from fulmar_core.robot_name import namespace_of
+from fulmar_core.config.errors import ConfigError, did_you_mean
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.robots.topics import (
+    ANSWER,
+    CLOCK,
+    EVENTS,
+    EVENTS_2,
+    ODOMETRY,
+    PERIOD,
+    RATE,
+    WIRES,
+    command_wire,
+)
 from fulmar_core.tasks import load_task
-from fulmar_core.topics import ANSWER, CLOCK, EVENTS, EVENTS_2, ODOMETRY, PERIOD, RATE, WIRES, command_wire
+from fulmar_core.wires.robot_name import namespace_of
 from hardware_drivers.hardware import load_hardware
 from policy_server.controllers import controller_entry
 

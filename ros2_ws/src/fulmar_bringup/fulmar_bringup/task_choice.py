@@ -7,15 +7,16 @@ from pathlib import Path
 
 from fulmar_bringup.excitation_plan import torques_note
 from fulmar_bringup.system import default_hardware
-from fulmar_core.errors import ConfigError
-from fulmar_core.excitation.settings import Torques
-from fulmar_core.goal import PoseTuple
-from fulmar_core.goal_files import Poses, Positions, Trajectory, load_goal_file
-from fulmar_core.planar import PlanarState
-from fulmar_core.robot import Robot, load_robot
-from fulmar_core.spatial import SpatialState
-from fulmar_core.state import State
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.states.planar import PlanarState
+from fulmar_core.states.spatial import SpatialState
+from fulmar_core.states.state import State
 from fulmar_core.tasks import load_task
+from fulmar_core.tasks.excitation import Torques
+from fulmar_core.tasks.goal import PoseTuple
+from fulmar_core.tasks.goal_files import Poses, Positions, Trajectory, load_goal_file
 from policy_server.controllers import CONTROLLERS, shipped_policy
 
 POSE, POSITION = "go_to_pose", "go_to_position"

@@ -11,8 +11,8 @@ import numpy as np
 
 from fulmar_bags.contents import Bag
 from fulmar_bags.decode import odometries
-from fulmar_core.errors import BagError, ConfigError, UnknownNameError
-from fulmar_core.state import RigidBodyState
+from fulmar_core.config.errors import BagError, ConfigError, UnknownNameError
+from fulmar_core.states.state import RigidBodyState
 from hardware_drivers.earth_frame import LocalFrame
 from hardware_drivers.hardware import load_hardware
 from hardware_drivers.settings import Geodetic, XPlane

@@ -43,8 +43,8 @@ from fulmar_cli.commands.swap import swap
 from fulmar_cli.commands.teleop import teleop
 from fulmar_cli.commands.train import train
 from fulmar_cli.commands.up import up
-from fulmar_cli.extras import advice_for
-from fulmar_core.errors import (
+from fulmar_cli.installation.extras import advice_for
+from fulmar_core.config.errors import (
     BAD_USAGE,
     DONE,
     FAILED,

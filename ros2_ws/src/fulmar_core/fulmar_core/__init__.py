@@ -1,4 +1,9 @@
-"""The pure core of Fulmar: robots, dynamics, tasks, controllers, safety, topics.
+"""The pure core of Fulmar in twelve rooms, lowest first; a room imports lower ones alone, see `make rooms`.
 
-Knows neither ROS, nor a simulator, nor a learning library.
+config, states, wires, robots, worlds, dynamics, tasks, simulation, estimators, controllers, safety, loop. It knows
+neither ROS, nor a simulator, nor a learning library.
 """
+
+from fulmar_core.config.moved_modules import keep_former_names
+
+keep_former_names()

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_core.errors import ConfigError
-from fulmar_core.flight.modes import Mode, continuous_model, modes_of
-from fulmar_core.flight.trim import Trim, find_trim
-from fulmar_core.robot import Robot
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.dynamics.flight_modes import Mode, continuous_model, modes_of
+from fulmar_core.dynamics.flight_trim import Trim, find_trim
+from fulmar_core.robots.robot import Robot
 
 # Of the cruising speed, and, where there is ground effect, of the span: where trims are looked for [-].
 SPEEDS, HEIGHTS = (0.8, 0.9, 1.0, 1.1, 1.2), (0.2, 0.5, 1.0)

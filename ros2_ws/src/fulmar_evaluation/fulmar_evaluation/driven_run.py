@@ -8,11 +8,12 @@ from pathlib import Path
 import numpy as np
 
 from fulmar_bags.run_record import read_run
-from fulmar_core.errors import ConfigError
-from fulmar_core.identification.drives import Drive, drive_in_space, drive_of
-from fulmar_core.robot import Robot, load_robot
-from fulmar_core.rotation import yaw_of
-from fulmar_core.spatial import SpatialState
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.states.rotation import yaw_of
+from fulmar_core.states.spatial import SpatialState
+from fulmar_evaluation.identification.drives import Drive, drive_in_space, drive_of
 
 
 def driven_run(path: Path, *, load: int = 0) -> tuple[Robot, Drive, tuple[str, ...]]:

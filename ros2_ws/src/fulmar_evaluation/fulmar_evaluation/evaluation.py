@@ -9,17 +9,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fulmar_bringup.run_plan import RunPlan
-from fulmar_core.backend import Backend
 from fulmar_core.controllers.controller import Controller
-from fulmar_core.disturbances.scenario import Scenario, load_scenario
-from fulmar_core.episode import Episode, draw_episodes
-from fulmar_core.flight.jsbsim_models import jsbsim_model
-from fulmar_core.metrics import Trajectories, episode_metrics, successes, summarise
-from fulmar_core.path_task import evaluated_task
-from fulmar_core.robot import Robot, load_robot
-from fulmar_core.rollout import WORLDS, batches, roll_out_in_backends
+from fulmar_core.loop.rollout import WORLDS, batches, roll_out_in_backends
+from fulmar_core.robots.jsbsim_models import jsbsim_model
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.safety.geofence import check_starts
+from fulmar_core.simulation.backend import Backend
+from fulmar_core.simulation.episode import Episode, draw_episodes
+from fulmar_core.simulation.metrics import Trajectories, episode_metrics, successes, summarise
 from fulmar_core.tasks import Task
+from fulmar_core.tasks.path_task import evaluated_task
+from fulmar_core.worlds.scenario import Scenario, load_scenario
 from fulmar_evaluation.waypoint_score import bound_figures, has_bound, waypoint_bound
 
 if TYPE_CHECKING:

@@ -11,11 +11,11 @@ import numpy as np
 from fulmar_bags.event_packets import FIELDS, POINT, points_of
 from fulmar_bags.message_types import type_store
 from fulmar_bags.writer import BagWriter
-from fulmar_core.robot import Robot
-from fulmar_core.robot_name import frames_of, namespace_of
-from fulmar_core.sky.events import Events
-from fulmar_core.sky.star_camera import StarCamera
-from fulmar_core.topics import EVENTS, EVENTS_2
+from fulmar_core.dynamics.sky.events import Events
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.sensors.star_camera import StarCamera
+from fulmar_core.robots.topics import EVENTS, EVENTS_2
+from fulmar_core.wires.robot_name import frames_of, namespace_of
 
 CAMERAS = "event_cameras"  # entry of the bag's record: width, height [px] and field of view [deg] of each
 FRAMES = {"events": "event_camera", "events_2": "event_camera_2"}

@@ -16,15 +16,15 @@ from fulmar_bags.event_files import EventFile, is_event_file, open_event_file
 from fulmar_bags.event_packets import events_of_cloud
 from fulmar_bags.message_reader import stamp_ns
 from fulmar_bags.wire_reader import WireReader
-from fulmar_core.errors import BagError, ConfigError
-from fulmar_core.estimation.kinds import load_estimator
-from fulmar_core.estimation.settings import EventRateSettings
-from fulmar_core.rate_estimation.estimator import EventRateEstimator
-from fulmar_core.robot import Robot
-from fulmar_core.sensors.reading import Reading
-from fulmar_core.sky.events import Events
-from fulmar_core.sky.star_camera import StarCamera
-from fulmar_core.topics import EVENTS, EVENTS_2
+from fulmar_core.config.errors import BagError, ConfigError
+from fulmar_core.dynamics.sky.events import Events
+from fulmar_core.estimators.event_rate.estimator import EventRateEstimator
+from fulmar_core.estimators.kinds import load_estimator
+from fulmar_core.estimators.motion.settings import EventRateSettings
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.sensors.star_camera import StarCamera
+from fulmar_core.robots.topics import EVENTS, EVENTS_2
+from fulmar_core.wires.reading import Reading
 from fulmar_evaluation.event_bag import CAMERAS
 
 WIRES = {"events": EVENTS, "events_2": EVENTS_2}

@@ -12,17 +12,18 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_core.actuators.pushing import WRENCH, Pushing
-from fulmar_core.actuators.rolling import Rolling
+from fulmar_core.config.errors import ConfigError, ImplausibleError
+from fulmar_core.config.plausibility import logger as plausibility
 from fulmar_core.controllers.allocation import check_allocation
 from fulmar_core.dynamics.linear_model import linearise
-from fulmar_core.errors import ConfigError, ImplausibleError
-from fulmar_core.planar import PlanarState
-from fulmar_core.plausibility import logger as plausibility
-from fulmar_core.robot import Robot, load_robot, load_robot_file
-from fulmar_core.spatial import SpatialState
-from fulmar_core.wrench_limits import AXES, WrenchSet, wrench_set_of
+from fulmar_core.robots.actuators.pushing import WRENCH, Pushing
+from fulmar_core.robots.actuators.rolling import Rolling
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.robot_file import load_robot, load_robot_file
+from fulmar_core.states.planar import PlanarState
+from fulmar_core.states.spatial import SpatialState
 from fulmar_evaluation.aircraft_check import AircraftCheck, check_aircraft, problems_of
+from fulmar_evaluation.wrench_limits import AXES, WrenchSet, wrench_set_of
 
 PLAIN = {
     "force_x": "force along x",

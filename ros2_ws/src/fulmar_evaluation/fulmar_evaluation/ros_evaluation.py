@@ -28,16 +28,16 @@ from fulmar_bringup.processes import ProcessGroup, command_line
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.supervisor import START_TIMEOUT_S, Supervisor, supervisor
 from fulmar_bringup.system_rows import system_rows
-from fulmar_core.backend import Sample
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.episode import Episode, draw_episode, episode_steps
-from fulmar_core.errors import LockstepError, RunFailed
-from fulmar_core.goal import Goal
-from fulmar_core.metrics import TargetCounter, Trajectories, TrajectoryLog, join, select
-from fulmar_core.path_task import evaluated_task
-from fulmar_core.process import end_with
-from fulmar_core.robot import load_robot
-from fulmar_core.state import State
+from fulmar_core.config.errors import LockstepError, RunFailed
+from fulmar_core.config.process import end_with
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.simulation.backend import Sample
+from fulmar_core.simulation.episode import Episode, draw_episode, episode_steps
+from fulmar_core.simulation.metrics import TargetCounter, Trajectories, TrajectoryLog, join, select
+from fulmar_core.states.state import State
+from fulmar_core.tasks.goal import Goal
+from fulmar_core.tasks.path_task import evaluated_task
+from fulmar_core.worlds.scenario import load_scenario
 from fulmar_ros.plant_node import PlantNode
 from fulmar_ros.runtime import SWITCH_INTERVAL_S, settle_memory, spinning
 from sim_nodes.sim_node import make_backend

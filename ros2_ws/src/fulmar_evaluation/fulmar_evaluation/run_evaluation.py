@@ -1,6 +1,6 @@
 """A recorded run seen through its task: errors over time, success, use of the actuators.
 
-The rules themselves live in `fulmar_core.metrics`; here a record is only brought into their shape.
+The rules themselves live in `fulmar_core.simulation.metrics`; here a record is only brought into their shape.
 """
 
 from __future__ import annotations
@@ -11,9 +11,11 @@ from typing import Any
 import numpy as np
 
 from fulmar_bags.run_record import Actuation, GivenGoal, Motion, Places, RunRecord
-from fulmar_core.errors import BagError
-from fulmar_core.goal import Goal, stack_goals
-from fulmar_core.metrics import (
+from fulmar_core.config.errors import BagError
+from fulmar_core.loop.mission import LONGEST_AHEAD_NS, SLACK_NS
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.simulation.metrics import (
     TargetCounter,
     Trajectories,
     TrajectoryLog,
@@ -21,10 +23,9 @@ from fulmar_core.metrics import (
     episode_metrics,
     successes,
 )
-from fulmar_core.mission import LONGEST_AHEAD_NS, SLACK_NS
-from fulmar_core.robot import Robot, load_robot
-from fulmar_core.state import State
+from fulmar_core.states.state import State
 from fulmar_core.tasks import Task, load_recorded_task
+from fulmar_core.tasks.goal import Goal, stack_goals
 
 LATE_NS = 1_000_000_000  # in real time a goal comes at most so long after its stamp
 
@@ -33,12 +34,12 @@ LATE_NS = 1_000_000_000  # in real time a goal comes at most so long after its s
 class RunResult:
     """What the task says about a run; times count from its first state.
 
-    As in `fulmar_core.metrics`, a step is the state at its end: the first state itself is none.
+    As in `fulmar_core.simulation.metrics`, a step is the state at its end: the first state itself is none.
     """
 
     robot: Robot
     task: Task
-    targets: np.ndarray  # (k, 3) of the last goal that was given; see `fulmar_core.goal.Goal`
+    targets: np.ndarray  # (k, 3) of the last goal that was given; see `fulmar_core.tasks.goal.Goal`
     time_s: np.ndarray  # (n,) ends of the steps: evenly spaced, simulated time [s]
     samples: np.ndarray  # (n,) index into `record.motion` of each time
     aims: np.ndarray  # (n, 3) target that counted at each time

@@ -11,7 +11,7 @@ from fulmar_bags.run_record import Actuation, Motion, RunRecord, read_run
 from fulmar_bringup.planning import RunRequest
 from fulmar_bringup.readiness import command_input
 from fulmar_bringup.run_executor import Execution, execute
-from fulmar_core.errors import FulmarError
+from fulmar_core.config.errors import FulmarError
 from fulmar_evaluation.run_summary import summarise
 from policy_server.controllers import controller_entry
 

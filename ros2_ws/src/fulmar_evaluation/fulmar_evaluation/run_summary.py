@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from fulmar_bags.run_record import HealthSample, RunRecord
+from fulmar_core.robots.wire_check import BETWEEN, WARNINGS, WIRE_WARNINGS
 from fulmar_core.safety.estop import HOLDS
-from fulmar_core.wire_check import BETWEEN, WARNINGS, WIRE_WARNINGS
 from fulmar_evaluation.run_evaluation import RunResult, evaluate_run
 from policy_server.controllers import EXTERNAL, controller_entry
 

@@ -12,12 +12,12 @@ import numpy as np
 from fulmar_bags.contents import open_bag
 from fulmar_bags.message_reader import reading_of
 from fulmar_bags.wire_reader import WireReader
-from fulmar_core.errors import BagError
-from fulmar_core.estimation.kinds import load_estimator
-from fulmar_core.estimation.settings import InertiaSettings
-from fulmar_core.inertia_estimation.estimator import InertiaEstimator
-from fulmar_core.robot import Robot
-from fulmar_core.sensors.table import SENSORS
+from fulmar_core.config.errors import BagError
+from fulmar_core.estimators.inertia.estimator import InertiaEstimator
+from fulmar_core.estimators.kinds import load_estimator
+from fulmar_core.estimators.motion.settings import InertiaSettings
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.sensors.table import SENSORS
 
 METHODS: tuple[Literal["batch", "rls", "ekf"], ...] = ("batch", "rls", "ekf")
 NAMES = ("xx", "yy", "zz", "xy", "xz", "yz")

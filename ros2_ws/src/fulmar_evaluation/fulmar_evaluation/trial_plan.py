@@ -14,15 +14,14 @@ from fulmar_bringup.plan_checks import checked_rate, chosen_policy
 from fulmar_bringup.progress import step_bar
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.system import check_names
-from fulmar_core.counts import check_episodes
-from fulmar_core.disturbances.scenario import check_delays, load_scenario
-from fulmar_core.episode import episode_steps
-from fulmar_core.errors import ConfigError, UnknownNameError
-from fulmar_core.figures import FIGURES
-from fulmar_core.flight.jsbsim_models import JSBSIM, is_jsbsim
-from fulmar_core.robot import load_robot
-from fulmar_core.rollout import WORLDS
+from fulmar_core.config.errors import ConfigError, UnknownNameError
+from fulmar_core.loop.rollout import WORLDS
+from fulmar_core.robots.jsbsim_models import JSBSIM, is_jsbsim
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.simulation.counts import check_episodes
+from fulmar_core.simulation.episode import episode_steps
 from fulmar_core.tasks import load_task
+from fulmar_core.worlds.scenario import check_delays, load_scenario
 from fulmar_evaluation.evaluation import (
     BATCH_EPISODES,
     BOUNDED_EPISODES,
@@ -31,6 +30,7 @@ from fulmar_evaluation.evaluation import (
     Trial,
     evaluate_trial,
 )
+from fulmar_evaluation.figures import FIGURES
 from policy_server.controllers import controller_entry, usual_hz
 
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fulmar_core.episode import Episode
-from fulmar_core.robot import Robot
+from fulmar_core.robots.robot import Robot
+from fulmar_core.simulation.episode import Episode
 from fulmar_core.tasks import Task
 from fulmar_evaluation.bounds import bound_of, top_speed_bound
 

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from fulmar_core.controller_settings import ControllerSettings
-from fulmar_core.health.applied import AppliedHistory
-from fulmar_core.health.beliefs import BeliefReader, Beliefs, joined
-from fulmar_core.health.fault_monitor import FaultMonitor
-from fulmar_core.health.hypotheses import can_monitor
-from fulmar_core.health.losses import Losses
-from fulmar_core.health.motion_monitor import MotionMonitor
-from fulmar_core.health.thruster_health import Health, can_estimate_health
-from fulmar_core.robot import Robot
+from fulmar_core.estimators.actuator_health.applied import AppliedHistory
+from fulmar_core.estimators.actuator_health.beliefs import BeliefReader, Beliefs, joined
+from fulmar_core.estimators.actuator_health.fault_monitor import FaultMonitor
+from fulmar_core.estimators.actuator_health.hypotheses import can_monitor
+from fulmar_core.estimators.actuator_health.losses import Losses
+from fulmar_core.estimators.actuator_health.motion_monitor import MotionMonitor
+from fulmar_core.estimators.actuator_health.thruster_health import Health, can_estimate_health
+from fulmar_core.loop.controller_settings import ControllerSettings
+from fulmar_core.robots.robot import Robot
 from fulmar_core.safety.input_gate import Measurement
 
 

@@ -6,8 +6,8 @@ from rclpy.node import Node
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
 
-from fulmar_core.backend import AirBearing
-from fulmar_core.topics import AIR_BEARING
+from fulmar_core.robots.topics import AIR_BEARING
+from fulmar_core.simulation.backend import AirBearing
 from fulmar_ros.qos import FLUSH_S, flush, publisher_qos
 
 SERVICE = "air_bearing/enable"

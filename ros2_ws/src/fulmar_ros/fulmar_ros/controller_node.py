@@ -13,20 +13,20 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackRet
 from std_msgs.msg import Bool, String
 from visualization_msgs.msg import MarkerArray
 
-from fulmar_core.control_loop import Step
-from fulmar_core.controller_settings import POLICY, ControllerSettings
+from fulmar_core.config.errors import FAILED, FulmarError, TaskError
 from fulmar_core.controllers.controller import Controller, Inputs
-from fulmar_core.errors import FAILED, FulmarError, TaskError
-from fulmar_core.guarded_loop import GuardedLoop
-from fulmar_core.health.applied import AppliedHistory
-from fulmar_core.health.beliefs import DEAD, Beliefs
-from fulmar_core.robot import load_robot
+from fulmar_core.estimators.actuator_health.applied import AppliedHistory
+from fulmar_core.estimators.actuator_health.beliefs import DEAD, Beliefs
+from fulmar_core.loop.control_loop import Step
+from fulmar_core.loop.controller_settings import POLICY, ControllerSettings
+from fulmar_core.loop.fallback import Standby
+from fulmar_core.loop.guarded_loop import GuardedLoop
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.robots.topics import ODOMETRY
 from fulmar_core.safety.arbiter import Decision, Mode
 from fulmar_core.safety.estop import EstopMonitor
-from fulmar_core.safety.fallback import Standby
 from fulmar_core.safety.input_gate import Measurement
 from fulmar_core.tasks import load_task
-from fulmar_core.topics import ODOMETRY
 from fulmar_ros.actuator_beliefs import ActuatorBeliefs
 from fulmar_ros.controller_status import PERIOD_S, ControllerStatus
 from fulmar_ros.controller_wires import ControllerWires

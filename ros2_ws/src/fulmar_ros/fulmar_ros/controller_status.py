@@ -5,10 +5,10 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 
-from fulmar_core.guarded_loop import GuardedLoop
-from fulmar_core.health.beliefs import Beliefs
+from fulmar_core.estimators.actuator_health.beliefs import Beliefs
+from fulmar_core.loop.guarded_loop import GuardedLoop
+from fulmar_core.robots.wire_check import BETWEEN, WIRE_WARNINGS
 from fulmar_core.safety.arbiter import Decision, Mode
-from fulmar_core.wire_check import BETWEEN, WIRE_WARNINGS
 from fulmar_ros.deadline import Deadlines, Spread
 from fulmar_ros.fallback import PolicySwap
 from fulmar_ros.health import Health

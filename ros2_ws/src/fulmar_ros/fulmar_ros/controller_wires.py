@@ -16,10 +16,9 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, String
 from visualization_msgs.msg import MarkerArray
 
-from fulmar_core.health.thruster_health import can_estimate_health
-from fulmar_core.robot import Robot
-from fulmar_core.tasks import Task
-from fulmar_core.topics import (
+from fulmar_core.estimators.actuator_health.thruster_health import can_estimate_health
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.topics import (
     ACTION,
     ACTUATORS_HEALTH,
     ACTUATORS_STATE,
@@ -37,6 +36,7 @@ from fulmar_core.topics import (
     command_wire,
     goal_wires,
 )
+from fulmar_core.tasks import Task
 from fulmar_ros.convert import TwistWriter, VectorWriter
 from fulmar_ros.goal_messages import TYPES, GoalMessage
 from fulmar_ros.health import Health

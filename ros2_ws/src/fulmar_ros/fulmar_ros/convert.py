@@ -18,10 +18,10 @@ from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 
 from fulmar_bags.message_reader import BODY_FRAME, FRAME, NS, lacks_of, measurement_of, stamp_ns, turned
-from fulmar_core.robot_name import PLAIN, Frames
+from fulmar_core.robots.sensors.odometer import OdometrySpec
 from fulmar_core.safety.input_gate import Measurement
-from fulmar_core.sensors.odometer import OdometrySpec
-from fulmar_core.state import RigidBodyState
+from fulmar_core.states.state import RigidBodyState
+from fulmar_core.wires.robot_name import PLAIN, Frames
 from fulmar_ros.wire_image import LATEST_NS, WireImage, marks
 
 COVARIANCE = 36  # numbers of the covariance of a pose or a twist

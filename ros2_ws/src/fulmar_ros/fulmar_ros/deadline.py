@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from fulmar_core.process import CONTROL_PRIORITY, take_priority, take_priority_with_helpers
+from fulmar_core.config.process import CONTROL_PRIORITY, take_priority, take_priority_with_helpers
 
 KEPT = 20_000  # newest samples that percentiles are taken over
 

@@ -1,6 +1,6 @@
 """The node `estimator`: readings of sensors to one estimate, of whatever kind its file in configs/estimators names.
 
-What each kind takes and publishes is a row of `fulmar_core.estimation.kinds`; how messages become readings, and
+What each kind takes and publishes is a row of `fulmar_core.estimators.kinds`; how messages become readings, and
 estimates messages, is a row of `estimator_wires`.
 """
 
@@ -22,15 +22,15 @@ from rclpy.publisher import Publisher
 from rclpy.subscription import Subscription
 
 from fulmar_bags.message_reader import stamp_ns
-from fulmar_core.errors import shortened
-from fulmar_core.estimation.estimator import LACKS_NOTHING, Estimate
-from fulmar_core.estimation.kinds import estimator_kind, load_estimator, make_estimator
-from fulmar_core.estimation.reading_check import reading_problem
-from fulmar_core.process import CONTROL_PRIORITY, take_priority_with_helpers
-from fulmar_core.robot import load_robot
-from fulmar_core.sensors.reading import Reading
-from fulmar_core.topics import ODOMETRY, Wire
-from fulmar_core.wire_check import BETWEEN, WIRE_WARNINGS
+from fulmar_core.config.errors import shortened
+from fulmar_core.config.process import CONTROL_PRIORITY, take_priority_with_helpers
+from fulmar_core.estimators.kinds import estimator_kind, load_estimator, make_estimator
+from fulmar_core.estimators.motion.estimator import LACKS_NOTHING, Estimate
+from fulmar_core.estimators.motion.reading_check import reading_problem
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.robots.topics import ODOMETRY, Wire
+from fulmar_core.robots.wire_check import BETWEEN, WIRE_WARNINGS
+from fulmar_core.wires.reading import Reading
 from fulmar_ros.deadline import Spread
 from fulmar_ros.estimator_wires import READERS, WRITERS, Read, Write
 from fulmar_ros.frame_wires import odometry_transform

@@ -13,14 +13,23 @@ from std_msgs.msg import Float64MultiArray, MultiArrayDimension, MultiArrayLayou
 
 from fulmar_bags.event_packets import events_of_cloud
 from fulmar_bags.message_reader import reading_of, stamp_ns
-from fulmar_core.errors import shortened
-from fulmar_core.estimation.estimator import Estimate
-from fulmar_core.robot_name import Frames
-from fulmar_core.rotation import rotate_inverse
-from fulmar_core.sensors.kind import SensorKind
-from fulmar_core.sensors.reading import Reading
-from fulmar_core.sensors.table import SENSORS
-from fulmar_core.topics import EVENTS, EVENTS_2, INERTIA, INERTIA_COVARIANCE, MOCAP, ODOMETRY, RATE, Wire
+from fulmar_core.config.errors import shortened
+from fulmar_core.estimators.motion.estimator import Estimate
+from fulmar_core.robots.sensors.kind import SensorKind
+from fulmar_core.robots.sensors.table import SENSORS
+from fulmar_core.robots.topics import (
+    EVENTS,
+    EVENTS_2,
+    INERTIA,
+    INERTIA_COVARIANCE,
+    MOCAP,
+    ODOMETRY,
+    RATE,
+    Wire,
+)
+from fulmar_core.states.rotation import rotate_inverse
+from fulmar_core.wires.reading import Reading
+from fulmar_core.wires.robot_name import Frames
 from fulmar_ros.convert import OdometryWriter, stamp_of
 from fulmar_ros.message_class import message_class
 

@@ -16,10 +16,9 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, String
 from std_srvs.srv import Trigger
 
-from fulmar_core.process import CONTROL_PRIORITY, take_priority_with_helpers
-from fulmar_core.robot import load_robot
-from fulmar_core.safety.estop import REPUBLISH_HZ, EstopButton
-from fulmar_core.topics import (
+from fulmar_core.config.process import CONTROL_PRIORITY, take_priority_with_helpers
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.robots.topics import (
     ESTOP,
     ESTOP_RELEASED,
     ESTOP_RESET,
@@ -28,6 +27,7 @@ from fulmar_core.topics import (
     VELOCITY_COMMAND,
     command_wire,
 )
+from fulmar_core.safety.estop import REPUBLISH_HZ, EstopButton
 from fulmar_ros.health import Health
 from fulmar_ros.operator_subscription import subscribe_every
 from fulmar_ros.parameters import name_of, read_parameters

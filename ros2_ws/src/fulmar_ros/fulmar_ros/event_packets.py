@@ -5,7 +5,7 @@ from __future__ import annotations
 from sensor_msgs.msg import PointCloud2, PointField
 
 from fulmar_bags.event_packets import FIELDS, POINT, points_of
-from fulmar_core.sky.events import Events
+from fulmar_core.dynamics.sky.events import Events
 from fulmar_ros.convert import stamp_of
 
 

@@ -6,13 +6,13 @@ import dataclasses
 import threading
 from collections.abc import Callable
 
-from fulmar_core.controller_settings import ControllerSettings
+from fulmar_core.config.errors import FulmarError
+from fulmar_core.config.process import give_up_priority
 from fulmar_core.controllers.classical import load_classical
 from fulmar_core.controllers.controller import Controller
-from fulmar_core.errors import FulmarError
-from fulmar_core.process import give_up_priority
-from fulmar_core.robot import Robot
-from fulmar_core.safety.fallback import ControllerSwitch, Standby, warm_up
+from fulmar_core.loop.controller_settings import ControllerSettings
+from fulmar_core.loop.fallback import ControllerSwitch, Standby, warm_up
+from fulmar_core.robots.robot import Robot
 from fulmar_core.tasks import Task
 
 MakeController = Callable[[Robot, Task, ControllerSettings], Controller]

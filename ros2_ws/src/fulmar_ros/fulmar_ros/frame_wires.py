@@ -11,11 +11,11 @@ from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 from std_msgs.msg import String
 
-from fulmar_core.robot import Robot
-from fulmar_core.robot_name import Frames
-from fulmar_core.state import RigidBodyState
-from fulmar_core.topics import DESCRIPTION, STATIC_TRANSFORMS, TRANSFORMS, Wire
-from fulmar_core.urdf import body_frames, urdf_of
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.topics import DESCRIPTION, STATIC_TRANSFORMS, TRANSFORMS, Wire
+from fulmar_core.robots.urdf import body_frames, urdf_of
+from fulmar_core.states.state import RigidBodyState
+from fulmar_core.wires.robot_name import Frames
 from fulmar_ros.message_class import message_class
 from fulmar_ros.qos import publisher_qos
 from fulmar_ros.wire_image import WireImage, marks

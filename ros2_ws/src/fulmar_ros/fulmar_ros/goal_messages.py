@@ -10,13 +10,13 @@ from geometry_msgs.msg import PointStamped, PoseArray, PoseStamped, TwistStamped
 from nav_msgs.msg import Path
 from visualization_msgs.msg import Marker, MarkerArray
 
-from fulmar_core.goal import Goal
-from fulmar_core.planar import PlanarState
-from fulmar_core.robot_name import PLAIN, Frames
-from fulmar_core.scene.goal_shapes import obstacle_shapes
-from fulmar_core.state import State
+from fulmar_core.states.planar import PlanarState
+from fulmar_core.states.state import State
+from fulmar_core.tasks.goal import Goal
+from fulmar_core.wires.robot_name import PLAIN, Frames
 from fulmar_ros.convert import stamp_of
 from fulmar_ros.marker_messages import marker_of
+from fulmar_ros.scene.goal_shapes import obstacle_shapes
 
 GoalMessage: TypeAlias = PointStamped | PoseStamped | Path | PoseArray | TwistStamped
 TYPES: dict[str, type] = {

@@ -19,18 +19,18 @@ from rclpy.publisher import Publisher
 
 from fulmar_bags.contents import json_object
 from fulmar_bags.message_reader import measurement_of, stamp_ns
-from fulmar_core.errors import DONE, FAILED
-from fulmar_core.goal import Goal
-from fulmar_core.goal_files import GoalFile, load_goals
-from fulmar_core.goal_sequence import goal_sequence
-from fulmar_core.paths import config_names
-from fulmar_core.robot import load_robot
+from fulmar_core.config.errors import DONE, FAILED
+from fulmar_core.config.paths import config_names
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.robots.topics import GOAL_PATH, GOAL_WIRES, ODOMETRY, STATUS
 from fulmar_core.safety.geofence import OUT_OF_BOUNDS
 from fulmar_core.safety.input_gate import InputGate, Measurement
-from fulmar_core.spatial import SpatialState
-from fulmar_core.state import State
+from fulmar_core.states.spatial import SpatialState
+from fulmar_core.states.state import State
 from fulmar_core.tasks import load_task
-from fulmar_core.topics import GOAL_PATH, GOAL_WIRES, ODOMETRY, STATUS
+from fulmar_core.tasks.goal import Goal
+from fulmar_core.tasks.goal_files import GoalFile, load_goals
+from fulmar_core.tasks.goal_sequence import goal_sequence
 from fulmar_ros.goal_messages import TYPES, GoalMessage, goal_message
 from fulmar_ros.graph import UNNAMED_NODE, running_robots_text
 from fulmar_ros.health import Health

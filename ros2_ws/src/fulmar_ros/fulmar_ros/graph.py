@@ -10,9 +10,9 @@ from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 from rclpy.subscription import Subscription
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
+from fulmar_core.robots.topics import Wire
+from fulmar_core.robots.wire_check import Offer, wire_problems
 from fulmar_core.safety.command_gate import OneWriter
-from fulmar_core.topics import Wire
-from fulmar_core.wire_check import Offer, wire_problems
 
 # Of an endpoint's GUID: they name the process, the others the endpoint in it (RTPS 2.5, 9.3.1)
 PARTICIPANT_BYTES = 12

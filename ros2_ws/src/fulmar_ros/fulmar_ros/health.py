@@ -9,8 +9,8 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 
-from fulmar_core.topics import DIAGNOSTICS
-from fulmar_core.wire_check import BETWEEN, WARNINGS
+from fulmar_core.robots.topics import DIAGNOSTICS
+from fulmar_core.robots.wire_check import BETWEEN, WARNINGS
 from fulmar_ros.convert import stamp_of
 from fulmar_ros.launcher_watch import LauncherWatch
 from fulmar_ros.qos import publisher_qos

@@ -6,7 +6,7 @@ import os
 import time
 from collections.abc import Callable
 
-from fulmar_core.process import LAUNCHER_PID, is_stopped
+from fulmar_core.config.process import LAUNCHER_PID, is_stopped
 
 LOOK_S = 0.5  # between two looks
 STOPPED_S = 1.0  # after which it is reported; a debugger or a suspended computer stops processes for moments

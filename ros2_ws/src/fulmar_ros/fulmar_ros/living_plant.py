@@ -13,8 +13,8 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
-from fulmar_core.errors import ConfigError
-from fulmar_core.topics import ACTUATORS_STATE, DIAGNOSTICS
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.robots.topics import ACTUATORS_STATE, DIAGNOSTICS
 from fulmar_ros.graph import full_name
 from fulmar_ros.operator_subscription import destroy_all, subscribe_every
 

@@ -10,8 +10,8 @@ from rclpy.publisher import Publisher
 from sensor_msgs.msg import JointState
 
 from fulmar_bags.message_reader import stamp_ns
-from fulmar_core.lockstep_period import PLANT, PeriodInbox, counts_of
-from fulmar_core.topics import ANSWER, PERIOD
+from fulmar_core.robots.topics import ANSWER, PERIOD
+from fulmar_core.wires.lockstep_period import PLANT, PeriodInbox, counts_of
 from fulmar_ros.convert import stamp_of
 from fulmar_ros.qos import EVERYTHING, publish_patiently, publisher_qos, subscriber_qos
 from fulmar_ros.wire_image import canonical_bytes

@@ -5,9 +5,9 @@ from __future__ import annotations
 from geometry_msgs.msg import Point
 from visualization_msgs.msg import Marker, MarkerArray
 
-from fulmar_core.robot_name import Frames
-from fulmar_core.scene.scene import Change
-from fulmar_core.scene.shape import Shape
+from fulmar_core.wires.robot_name import Frames
+from fulmar_ros.scene.scene import Change
+from fulmar_ros.scene.shape import Shape
 
 TYPES = {
     "arrow": Marker.ARROW,

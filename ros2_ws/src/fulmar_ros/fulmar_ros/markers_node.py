@@ -17,11 +17,9 @@ from sensor_msgs.msg import JointState
 from visualization_msgs.msg import MarkerArray
 
 from fulmar_bags.message_reader import goal_of, obstacles_of, stamp_ns
-from fulmar_core.robot import load_robot
-from fulmar_core.safety.geofence import NO_AREA, check_area, check_area_of
-from fulmar_core.scene.scene import Scene
-from fulmar_core.tasks import load_task
-from fulmar_core.topics import (
+from fulmar_core.config.yielding import BEHIND
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.robots.topics import (
     ACTUATORS_STATE,
     DIAGNOSTICS,
     MARKERS,
@@ -29,7 +27,8 @@ from fulmar_core.topics import (
     STATUS,
     goal_wires,
 )
-from fulmar_core.yielding import BEHIND
+from fulmar_core.safety.geofence import NO_AREA, check_area, check_area_of
+from fulmar_core.tasks import load_task
 from fulmar_ros.goal_messages import TYPES, GoalMessage
 from fulmar_ros.health import Health
 from fulmar_ros.marker_messages import scene_message
@@ -37,6 +36,7 @@ from fulmar_ros.operator_subscription import LateSubscribers, subscribe_every
 from fulmar_ros.parameters import name_of, own_frames, read_parameters
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.runtime import RequestExit, run_node
+from fulmar_ros.scene.scene import Scene
 
 PERIOD_S = 0.1  # of a look for changes: at most 10 messages a second
 HEALTH_S = 1.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 from typing import Any
 
-from fulmar_core.wire import Wire
+from fulmar_core.wires.wire import Wire
 
 
 def message_class(wire: Wire) -> Any:

@@ -9,8 +9,8 @@ from geometry_msgs.msg import PoseStamped
 from visualization_msgs.msg import MarkerArray
 
 from fulmar_bags.message_reader import goal_of, obstacles_of, stamp_ns, thing_of
-from fulmar_core.guarded_loop import GuardedLoop
-from fulmar_core.robot_name import Frames
+from fulmar_core.loop.guarded_loop import GuardedLoop
+from fulmar_core.wires.robot_name import Frames
 from fulmar_ros.goal_age import GoalAge
 from fulmar_ros.goal_messages import GoalMessage
 

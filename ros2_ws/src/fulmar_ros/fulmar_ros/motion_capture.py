@@ -9,10 +9,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from fulmar_core.process import PLANT_PRIORITY, take_priority
-from fulmar_core.robot import Robot
-from fulmar_core.rotation import multiply
-from fulmar_core.state import RigidBodyState
+from fulmar_core.config.process import PLANT_PRIORITY, take_priority
+from fulmar_core.robots.robot import Robot
+from fulmar_core.states.rotation import multiply
+from fulmar_core.states.state import RigidBodyState
 from fulmar_ros.deadline import Deadlines
 
 

@@ -15,7 +15,7 @@ from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy
 from rclpy.subscription import Subscription
 
-from fulmar_core.topics import Wire
+from fulmar_core.robots.topics import Wire
 from fulmar_ros.qos import AT_ONCE, STREAM_DEPTH, subscriber_qos
 
 # Asks rclpy for message info.

@@ -10,9 +10,9 @@ from rclpy.exceptions import ParameterException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from fulmar_core.errors import ConfigError, did_you_mean
-from fulmar_core.robot import Robot
-from fulmar_core.robot_name import Frames, frames_of
+from fulmar_core.config.errors import ConfigError, did_you_mean
+from fulmar_core.robots.robot import Robot
+from fulmar_core.wires.robot_name import Frames, frames_of
 
 T = TypeVar("T")
 QOS_OVERRIDES = "qos_overrides."  # rclpy declares these with the publisher or subscription that they are for

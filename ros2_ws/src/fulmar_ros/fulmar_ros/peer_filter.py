@@ -19,7 +19,7 @@ from pathlib import Path
 
 import psutil
 
-from fulmar_core.errors import ConfigError
+from fulmar_core.config.errors import ConfigError
 from fulmar_ros.middleware import STATIC_PEERS
 from fulmar_ros.rtps_ports import ports_of_domain
 

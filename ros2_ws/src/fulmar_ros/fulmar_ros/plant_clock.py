@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from rclpy.node import Node
 
-from fulmar_core.topics import CLOCK, SIMULATION_START_NS
+from fulmar_core.robots.topics import CLOCK, SIMULATION_START_NS
 from fulmar_ros.graph import full_name
 from fulmar_ros.living_plant import LOOK_S
 

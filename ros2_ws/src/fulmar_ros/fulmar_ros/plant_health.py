@@ -7,10 +7,10 @@ from collections.abc import Callable, Mapping
 
 from rclpy.lifecycle import LifecycleNode
 
-from fulmar_core.health.feedback_check import ActuatorFeedback
+from fulmar_core.estimators.actuator_health.feedback_check import ActuatorFeedback
+from fulmar_core.robots.wire_check import BETWEEN, WIRE_WARNINGS
 from fulmar_core.safety.actuator_guard import ActuatorGuard
 from fulmar_core.safety.watchdog import NO_COMMAND
-from fulmar_core.wire_check import BETWEEN, WIRE_WARNINGS
 from fulmar_ros.graph import UNNAMED, WireWatch
 from fulmar_ros.health import Health
 from fulmar_ros.plant_clock import SimulatedTime, WallTime

@@ -8,14 +8,14 @@ from collections.abc import Callable
 
 import numpy as np
 
-from fulmar_core.actuators.refuge import DOWN
-from fulmar_core.backend import AirBearing, Backend, Sample
-from fulmar_core.errors import LockstepError
-from fulmar_core.flight.refuge import refuge_of
-from fulmar_core.health.feedback_check import ActuatorFeedback
-from fulmar_core.process import PLANT_PRIORITY, take_priority
-from fulmar_core.robot import Robot
+from fulmar_core.config.errors import LockstepError
+from fulmar_core.config.process import PLANT_PRIORITY, take_priority
+from fulmar_core.controllers.flight_refuge import refuge_of
+from fulmar_core.estimators.actuator_health.feedback_check import ActuatorFeedback
+from fulmar_core.robots.actuators.refuge import DOWN
+from fulmar_core.robots.robot import Robot
 from fulmar_core.safety.actuator_guard import ActuatorGuard
+from fulmar_core.simulation.backend import AirBearing, Backend, Sample
 from fulmar_ros.deadline import Deadlines
 from fulmar_ros.plant_clock import SimulatedTime, WallTime
 from fulmar_ros.plant_wires import PlantWires

@@ -9,19 +9,20 @@ from collections.abc import Callable
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 
-from fulmar_core.actuators.refuge import DOWN, LANDS_S
-from fulmar_core.backend import AirBearing, Backend, Sample
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.episode import Episode
-from fulmar_core.errors import BAD_USAGE, FAILED, ConfigError, FulmarError
-from fulmar_core.flight.refuge import BLIND, refuge_of
-from fulmar_core.health.feedback_check import ActuatorFeedback
-from fulmar_core.robot import Robot, load_robot
+from fulmar_core.config.errors import BAD_USAGE, FAILED, ConfigError, FulmarError
+from fulmar_core.controllers.flight_refuge import BLIND, refuge_of
+from fulmar_core.estimators.actuator_health.feedback_check import ActuatorFeedback
+from fulmar_core.robots.actuators.refuge import DOWN, LANDS_S
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.robots.topics import CLOCK, DIAGNOSTICS
 from fulmar_core.safety.actuator_guard import ActuatorGuard
 from fulmar_core.safety.estop import EstopMonitor
 from fulmar_core.safety.watchdog import Watchdog
+from fulmar_core.simulation.backend import AirBearing, Backend, Sample
+from fulmar_core.simulation.episode import Episode
 from fulmar_core.tasks import load_task
-from fulmar_core.topics import CLOCK, DIAGNOSTICS
+from fulmar_core.worlds.scenario import load_scenario
 from fulmar_ros.air_bearing import AirBearingWires
 from fulmar_ros.lifecycle_requests import refuse_impossible_transitions
 from fulmar_ros.living_plant import BRIEFLY_S, LATE_S, others_in, refuse_living_plant

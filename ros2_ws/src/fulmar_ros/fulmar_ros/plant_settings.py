@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.episode import Episode, draw_episode
-from fulmar_core.errors import ConfigError
-from fulmar_core.flight.trim import flying_at
-from fulmar_core.robot import Robot
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.dynamics.flight_trim import flying_at
+from fulmar_core.robots.robot import Robot
 from fulmar_core.safety.watchdog import checked_timeout, default_timeout
+from fulmar_core.simulation.episode import Episode, draw_episode
 from fulmar_core.tasks import load_task
+from fulmar_core.worlds.scenario import load_scenario
 
 MOST_MOCAP_HZ = 1000.0  # the fastest cameras; a plant could not publish more often in real time [Hz]
 BY_RATE = -1.0  # stands for a value that follows from the control rate

@@ -18,14 +18,9 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, String
 from std_srvs.srv import Trigger
 
-from fulmar_core.backend import Sample
-from fulmar_core.planar import at_rest
-from fulmar_core.process import CONTROL_PRIORITY, take_priority_with_helpers
-from fulmar_core.robot import Robot
-from fulmar_core.safety.actuator_guard import ActuatorGuard
-from fulmar_core.safety.input_gate import BACK_NS
-from fulmar_core.state import RigidBodyState
-from fulmar_core.topics import (
+from fulmar_core.config.process import CONTROL_PRIORITY, take_priority_with_helpers
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.topics import (
     ACTUATORS_STATE,
     CLOCK,
     ESTOP,
@@ -38,6 +33,11 @@ from fulmar_core.topics import (
     command_wire,
     thing_wire,
 )
+from fulmar_core.safety.actuator_guard import ActuatorGuard
+from fulmar_core.simulation.backend import Sample
+from fulmar_core.states.planar import at_rest
+from fulmar_core.states.state import RigidBodyState
+from fulmar_core.wires.reading import BACK_NS
 from fulmar_ros.convert import (
     OdometryWriter,
     PoseWriter,

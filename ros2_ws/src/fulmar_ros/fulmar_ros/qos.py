@@ -25,8 +25,8 @@ from rclpy.duration import Duration
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
-from fulmar_core.errors import LockstepError
-from fulmar_core.topics import ESTOP, ESTOP_RELEASED, Wire
+from fulmar_core.config.errors import LockstepError
+from fulmar_core.robots.topics import ESTOP, ESTOP_RELEASED, Wire
 
 # Subscribed best effort from the start; others as soon as a publisher offers nothing better, which takes a tenth of a
 # second: a stop does not wait for it.

@@ -20,9 +20,9 @@ from fulmar_bags.per_goal import BagPerGoal
 from fulmar_bags.ring import FAULTS, BagRing, fault_finder
 from fulmar_bags.writer import BagWriter, check_free
 from fulmar_bags.writer_thread import RECORDING, BagThread
-from fulmar_core.errors import DONE, FAILED, BagError
-from fulmar_core.provenance import attachments
-from fulmar_core.topics import (
+from fulmar_core.config.errors import DONE, FAILED, BagError
+from fulmar_core.config.provenance import attachments
+from fulmar_core.robots.topics import (
     ACTUATORS_STATE,
     AIR_BEARING,
     COMMAND,

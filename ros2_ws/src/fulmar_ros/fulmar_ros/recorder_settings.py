@@ -9,9 +9,9 @@ from typing import Any
 
 import yaml
 
-from fulmar_core.bounded_file import WEIGHTS_BYTES, read_bounded
-from fulmar_core.errors import BagError, ConfigError
-from fulmar_core.recording import Recording
+from fulmar_core.config.bounded_file import WEIGHTS_BYTES, read_bounded
+from fulmar_core.config.errors import BagError, ConfigError
+from fulmar_core.config.recording import Recording
 
 
 @dataclass(frozen=True)

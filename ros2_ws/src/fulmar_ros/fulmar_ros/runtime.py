@@ -26,9 +26,9 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
-from fulmar_core.errors import BAD_USAGE, DONE, FAILED, FulmarError
-from fulmar_core.process import LAUNCHER_PID, end_with
-from fulmar_core.yielding import take_place
+from fulmar_core.config.errors import BAD_USAGE, DONE, FAILED, FulmarError
+from fulmar_core.config.process import LAUNCHER_PID, end_with
+from fulmar_core.config.yielding import take_place
 from fulmar_ros.middleware import range_for_rclpy, set_up_middleware, static_peers, strangers_can_send
 from fulmar_ros.peer_filter import PeerFilter
 

@@ -11,12 +11,12 @@ from rclpy.subscription import Subscription
 from sensor_msgs.msg import JointState
 
 from fulmar_bags.message_reader import reading_of, stamp_ns
-from fulmar_core.actuators.reaction_wheels import ReactionWheels
-from fulmar_core.control_loop import ControlLoop
-from fulmar_core.inertia_estimation.momentum_balance import is_body
-from fulmar_core.robot import Robot
-from fulmar_core.sensors.table import SENSORS
-from fulmar_core.topics import INERTIA, SENSOR_WIRES
+from fulmar_core.estimators.inertia.momentum_balance import is_body
+from fulmar_core.loop.control_loop import ControlLoop
+from fulmar_core.robots.actuators.reaction_wheels import ReactionWheels
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.sensors.table import SENSORS
+from fulmar_core.robots.topics import INERTIA, SENSOR_WIRES
 from fulmar_ros.operator_subscription import destroy_all, subscribe_every
 from fulmar_ros.qos import subscriber_qos
 

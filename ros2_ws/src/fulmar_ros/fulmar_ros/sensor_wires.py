@@ -9,13 +9,12 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 
-from fulmar_core.robot import Robot
-from fulmar_core.robot_name import PLAIN, Frames
-from fulmar_core.safety.input_gate import BACK_NS
-from fulmar_core.sensors.kind import SensorKind
-from fulmar_core.sensors.reading import Reading
-from fulmar_core.sensors.table import SENSORS
-from fulmar_core.wire import Wire
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.sensors.kind import SensorKind
+from fulmar_core.robots.sensors.table import SENSORS
+from fulmar_core.wires.reading import BACK_NS, Reading
+from fulmar_core.wires.robot_name import PLAIN, Frames
+from fulmar_core.wires.wire import Wire
 from fulmar_ros.convert import OdometryWriter, stamp_of
 from fulmar_ros.frame_wires import OdometryTransform
 from fulmar_ros.message_class import message_class

@@ -25,10 +25,10 @@ from rclpy.task import Future
 from sensor_msgs.msg import JointState, Joy
 from std_srvs.srv import Trigger
 
-from fulmar_core.errors import DONE, ConfigError
-from fulmar_core.robot import load_robot
-from fulmar_core.teleop import NOTHING, Gamepad, JoyLayout, Keyboard, hand_mapping, keys_help, letting_go
-from fulmar_core.topics import GIVE_BACK, JOY, TELEOP
+from fulmar_core.config.errors import DONE, ConfigError
+from fulmar_core.loop.teleop import NOTHING, Gamepad, JoyLayout, Keyboard, hand_mapping, keys_help, letting_go
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.robots.topics import GIVE_BACK, JOY, TELEOP
 from fulmar_ros.convert import VectorWriter
 from fulmar_ros.graph import running_robots_text
 from fulmar_ros.parameters import read_parameters

@@ -11,7 +11,7 @@ from __future__ import annotations
 import importlib
 import sys
 
-from fulmar_core.yielding import in_yielding_thread, yield_session
+from fulmar_core.config.yielding import in_yielding_thread, yield_session
 
 
 def main() -> None:

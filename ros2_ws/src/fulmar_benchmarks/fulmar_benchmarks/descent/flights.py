@@ -8,15 +8,16 @@ from pathlib import Path
 
 import numpy as np
 
-from fulmar_core.attitude import euler_of
-from fulmar_core.disturbances.scenario import Scenario, load_scenario
-from fulmar_core.episode import Episode, draw_episodes
-from fulmar_core.errors import ConfigError
-from fulmar_core.flight.refuge import HOLD_S, SINK
-from fulmar_core.robot import Robot, load_robot
-from fulmar_core.spatial import SpatialState
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.controllers.flight_refuge import HOLD_S, SINK
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.simulation.episode import Episode, draw_episodes
+from fulmar_core.states.attitude import euler_of
+from fulmar_core.states.spatial import SpatialState
 from fulmar_core.tasks import Task, load_task
 from fulmar_core.tasks.follow_reference import FollowReference
+from fulmar_core.worlds.scenario import Scenario, load_scenario
 from policy_server.controllers import Choice, load_controller, usual_hz
 
 TASK = "fly_hold"

@@ -25,12 +25,12 @@ from fulmar_bringup.readiness import while_starting
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.supervisor import Supervisor, supervisor
 from fulmar_bringup.system_rows import system_rows
-from fulmar_core.backend import Sample
-from fulmar_core.episode import Episode
-from fulmar_core.errors import RunFailed
+from fulmar_core.config.errors import RunFailed
+from fulmar_core.robots.topics import SIMULATION_START_NS, TRUTH
 from fulmar_core.safety.input_gate import Measurement
-from fulmar_core.spatial import SpatialState
-from fulmar_core.topics import SIMULATION_START_NS, TRUTH
+from fulmar_core.simulation.backend import Sample
+from fulmar_core.simulation.episode import Episode
+from fulmar_core.states.spatial import SpatialState
 from fulmar_ros.convert import OdometryReader
 from fulmar_ros.plant_node import PlantNode
 from fulmar_ros.qos import subscriber_qos

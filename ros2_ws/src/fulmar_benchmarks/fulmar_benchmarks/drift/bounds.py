@@ -17,13 +17,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fulmar_core.actuators.thrusters import Thrusters
-from fulmar_core.disturbances.world import World, outside_wrench
-from fulmar_core.episode import Episode, episode_steps
-from fulmar_core.errors import ConfigError
-from fulmar_core.holdability import LEAST_MARGIN, hold_margin
-from fulmar_core.planar import at_rest
-from fulmar_core.robot import Robot
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.robots.actuators.thrusters import Thrusters
+from fulmar_core.robots.robot import Robot
+from fulmar_core.simulation.episode import Episode, episode_steps
+from fulmar_core.states.planar import at_rest
+from fulmar_core.worlds.holdability import LEAST_MARGIN, hold_margin
+from fulmar_core.worlds.world import World, outside_wrench
 from fulmar_evaluation.evaluation import Trial
 
 # Directions about the line to the goal that are tried; the strictest counts [rad].

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from fulmar_benchmarks.drift.bounds import physics_of
@@ -19,36 +18,19 @@ from fulmar_benchmarks.drift.conditions import (
     POSE_TASK,
     ROBOT,
 )
-from fulmar_benchmarks.drift.document import document_of
+from fulmar_benchmarks.drift.document import Request, document_of
 from fulmar_benchmarks.drift.unit import DriftUnit
 from fulmar_benchmarks.pairs import Pair, code_hash, hash_of, with_law, with_policy
 from fulmar_benchmarks.results import PairResult
 from fulmar_benchmarks.unit import Unit
 from fulmar_benchmarks.workers import Outcome, evaluate_units
 from fulmar_bringup.run_plan import RunPlan
-from fulmar_core.counts import check_episodes
-from fulmar_core.episode import episode_steps
-from fulmar_core.robot import load_robot
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.simulation.counts import check_episodes
+from fulmar_core.simulation.episode import episode_steps
 from fulmar_core.tasks import load_task
 from fulmar_evaluation.evaluation import Trial
 from policy_server.controllers import policies_directory
-
-
-@dataclass(frozen=True)
-class Request:
-    """What to evaluate."""
-
-    rows: Sequence[str]
-    controllers: Sequence[str]
-    through: str  # batch, mujoco or ros
-    episodes: int  # of each condition; paths have at most their own number
-    seed: int
-    folder: Path  # outcomes are kept below it
-    policy: Path | None = None  # bundle for the pose; the shipped one by default
-    tracking_policy: Path | None = None  # bundle for the paths; the shipped one by default
-    jobs: int = 2
-    fresh: bool = False  # evaluate again what was evaluated before
-    command: str = ""  # for the record
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -11,10 +14,7 @@ from fulmar_benchmarks.drift.conditions import CONDITIONS, PATHS
 from fulmar_benchmarks.drift.targets import FIGURES, TRACKING, band_of, drop_percent, published, requirements
 from fulmar_benchmarks.pairs import Pair
 from fulmar_benchmarks.results import PairResult
-from fulmar_core.provenance import fulmar_version, git_revision
-
-if TYPE_CHECKING:
-    from fulmar_benchmarks.drift.campaign import Request
+from fulmar_core.config.provenance import fulmar_version, git_revision
 
 FORMAT = 1
 Key = tuple[str, str]  # row and controller
@@ -36,6 +36,23 @@ OF_PATHS = {
     "ALV": "ALV_m_s",
     "AAS": "AAS",
 }
+
+
+@dataclass(frozen=True)
+class Request:
+    """What to evaluate."""
+
+    rows: Sequence[str]
+    controllers: Sequence[str]
+    through: str  # batch, mujoco or ros
+    episodes: int  # of each condition; paths have at most their own number
+    seed: int
+    folder: Path  # outcomes are kept below it
+    policy: Path | None = None  # bundle for the pose; the shipped one by default
+    tracking_policy: Path | None = None  # bundle for the paths; the shipped one by default
+    jobs: int = 2
+    fresh: bool = False  # evaluate again what was evaluated before
+    command: str = ""  # for the record
 
 
 def document_of(

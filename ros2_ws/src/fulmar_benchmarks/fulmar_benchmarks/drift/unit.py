@@ -9,8 +9,8 @@ import numpy as np
 from fulmar_benchmarks.drift.conditions import RUN_UP_S
 from fulmar_benchmarks.results import QUANTILES
 from fulmar_benchmarks.unit import KEPT, Extra, Unit
-from fulmar_core.metrics import Trajectories
-from fulmar_core.path_task import FollowPath
+from fulmar_core.simulation.metrics import Trajectories
+from fulmar_core.tasks.path_task import FollowPath
 
 BANDS = ("distance_m", "heading_error_deg", "speed_m_s", "turn_rate_deg_s")  # kept as quantiles over time
 

@@ -7,18 +7,18 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_core.control_loop import ControlLoop
 from fulmar_core.controllers.classical import load_classical
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.episode import draw_episode
-from fulmar_core.estimation.kinds import make_estimator
-from fulmar_core.goal import stack_goals
-from fulmar_core.robot import load_robot
-from fulmar_core.sensors.reading import Reading
-from fulmar_core.sky.catalogue import load_stars
-from fulmar_core.sky.event_sensor import EventSensor
-from fulmar_core.spatial import SpatialState
+from fulmar_core.dynamics.sky.event_sensor import EventSensor
+from fulmar_core.estimators.kinds import make_estimator
+from fulmar_core.loop.control_loop import ControlLoop
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.robots.sensors.catalogue import load_stars
+from fulmar_core.simulation.episode import draw_episode
+from fulmar_core.states.spatial import SpatialState
 from fulmar_core.tasks import load_task
+from fulmar_core.tasks.goal import stack_goals
+from fulmar_core.wires.reading import Reading
+from fulmar_core.worlds.scenario import load_scenario
 
 ROBOT, TASK, SCENARIO, CONTROLLER = "cubesat_wheels", "point", "gyro_dies", "pd"
 SETTLED_S = 60.0  # after which errors count, and the gyroscope is dead
@@ -107,7 +107,7 @@ def _expose(
     sensors: list[EventSensor], rates: Any, before: Any, after: Any, begin_ns: int, step_ns: int
 ) -> None:
     """Let the cameras watch a control step, and give their packets to the estimator."""
-    from fulmar_core.attitude import rotation_error
+    from fulmar_core.states.attitude import rotation_error
 
     rate = np.array(rotation_error(tuple(before.quat_xyzw), tuple(after.quat_xyzw))) / (step_ns / 1e9)
     for sensor, name in zip(sensors, NAMES, strict=False):

@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from fulmar_core.rate_estimation.contrast import RateFit, fit_rate
-from fulmar_core.rate_estimation.local_flow import local_flow, rate_of_flow
-from fulmar_core.rate_estimation.star_tracks import find_tracks
-from fulmar_core.sky.catalogue import load_stars
-from fulmar_core.sky.event_camera import EventSensorSpec
-from fulmar_core.sky.event_sensor import EventSensor
-from fulmar_core.sky.events import Events
-from fulmar_core.sky.star_camera import StarCamera
+from fulmar_core.dynamics.sky.event_sensor import EventSensor
+from fulmar_core.dynamics.sky.events import Events
+from fulmar_core.estimators.event_rate.contrast import RateFit, fit_rate
+from fulmar_core.estimators.event_rate.local_flow import local_flow, rate_of_flow
+from fulmar_core.estimators.event_rate.star_tracks import find_tracks
+from fulmar_core.robots.sensors.catalogue import load_stars
+from fulmar_core.robots.sensors.event_camera import EventSensorSpec
+from fulmar_core.robots.sensors.star_camera import StarCamera
 
 TURNED = (math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5))  # the second camera: by 90° about the first one's x axis
 

@@ -11,12 +11,12 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from fulmar_benchmarks.events.tables import NAMES, lines
-from fulmar_core.rate_estimation.contrast import fit_rate
-from fulmar_core.rate_estimation.star_tracks import find_tracks
-from fulmar_core.sky.catalogue import load_stars
-from fulmar_core.sky.event_camera import EventSensorSpec
-from fulmar_core.sky.event_sensor import EventSensor
-from fulmar_core.sky.star_camera import StarCamera
+from fulmar_core.dynamics.sky.event_sensor import EventSensor
+from fulmar_core.estimators.event_rate.contrast import fit_rate
+from fulmar_core.estimators.event_rate.star_tracks import find_tracks
+from fulmar_core.robots.sensors.catalogue import load_stars
+from fulmar_core.robots.sensors.event_camera import EventSensorSpec
+from fulmar_core.robots.sensors.star_camera import StarCamera
 from fulmar_evaluation.report.page import Part, Plot, cells, headline, table
 from fulmar_evaluation.report.style import house_style, quiet_grid
 from fulmar_evaluation.report.writer import write_benchmark

@@ -11,10 +11,11 @@ import numpy as np
 
 from fulmar_benchmarks.falcon.cells import RANDOM, SCENARIOS, Cell, fly
 from fulmar_benchmarks.workers import mapped
-from fulmar_core.errors import ConfigError, FulmarError
-from fulmar_core.flight.ground_effect import induced_drag_ratio, lift_ratio
-from fulmar_core.flight.trim import Trim, find_trim
-from fulmar_core.robot import Robot, load_robot
+from fulmar_core.config.errors import ConfigError, FulmarError
+from fulmar_core.dynamics.flight_trim import Trim, find_trim
+from fulmar_core.robots.airframe.ground_effect import induced_drag_ratio, lift_ratio
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.robot_file import load_robot
 from policy_server.controllers import shipped_policy
 
 Progress = Callable[[float, float], None]

@@ -13,14 +13,15 @@ import numpy as np
 from fulmar_benchmarks.falcon.published import BESIDE
 from fulmar_core.controllers.classical import FLIGHT_LAWS, gains_of
 from fulmar_core.controllers.controller import Controller
-from fulmar_core.disturbances.parts import Actuation, Air, Sensing
-from fulmar_core.disturbances.scenario import Scenario
-from fulmar_core.flight.turbulence import CLASSES
-from fulmar_core.references.flight_paths import PATHS, Profile
-from fulmar_core.robot import Robot, load_robot
-from fulmar_core.rollout import roll_out_in_batch
+from fulmar_core.loop.rollout import roll_out_in_batch
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.simulation.trajectories import Trajectories
 from fulmar_core.tasks import load_task
-from fulmar_core.trajectories import Trajectories
+from fulmar_core.tasks.references.flight_paths import PATHS, Profile
+from fulmar_core.worlds.parts import Actuation, Air, Sensing
+from fulmar_core.worlds.scenario import Scenario
+from fulmar_core.worlds.turbulence import CLASSES
 from policy_server.controllers import Choice, load_controller, usual_hz
 
 TASKS = ("hold", *PATHS)

@@ -13,8 +13,8 @@ from fulmar_benchmarks.falcon.cells import figures
 from fulmar_bringup.domains import own_domain
 from fulmar_bringup.planning import plan_run
 from fulmar_bringup.run_executor import execute
-from fulmar_core.errors import RunFailed
-from fulmar_core.metrics import join
+from fulmar_core.config.errors import RunFailed
+from fulmar_core.simulation.metrics import join
 from fulmar_evaluation.evaluation import Trial, runs_of
 from fulmar_evaluation.run_evaluation import evaluate_run
 from fulmar_evaluation.run_summary import summarise

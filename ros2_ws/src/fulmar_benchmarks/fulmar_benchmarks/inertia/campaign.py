@@ -11,12 +11,12 @@ import numpy as np
 
 from fulmar_benchmarks.inertia.simulated_runs import LEVELS, SAMPLE_S, WHEEL_STD, Run, measured, simulate
 from fulmar_benchmarks.workers import mapped
-from fulmar_core.actuators.reaction_wheels import ReactionWheels
-from fulmar_core.excitation.profiles import GAINS, OWN, PROFILES
-from fulmar_core.inertia_estimation.batch import batch_fit
-from fulmar_core.inertia_estimation.ekf import EkfSettings, InertiaFilter
-from fulmar_core.inertia_estimation.recursive import RecursiveFit
-from fulmar_core.robot import load_robot
+from fulmar_core.estimators.inertia.batch import batch_fit
+from fulmar_core.estimators.inertia.ekf import EkfSettings, InertiaFilter
+from fulmar_core.estimators.inertia.recursive import RecursiveFit
+from fulmar_core.robots.actuators.reaction_wheels import ReactionWheels
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.tasks.torque_profiles import GAINS, OWN, PROFILES
 
 SATELLITES = tuple(GAINS)
 METHODS = ("ls", "rls", "ekf")

@@ -11,9 +11,9 @@ from matplotlib.figure import Figure
 
 from fulmar_benchmarks.inertia.campaign import METHODS, requirements
 from fulmar_benchmarks.inertia.tables import lines
-from fulmar_core.actuators.reaction_wheels import ReactionWheels
-from fulmar_core.excitation.profiles import PROFILES, gain_of, profile_of
-from fulmar_core.robot import load_robot
+from fulmar_core.robots.actuators.reaction_wheels import ReactionWheels
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.tasks.torque_profiles import PROFILES, gain_of, profile_of
 from fulmar_evaluation.report.page import Part, Plot, headline
 from fulmar_evaluation.report.style import house_style, quiet_grid
 from fulmar_evaluation.report.writer import write_benchmark

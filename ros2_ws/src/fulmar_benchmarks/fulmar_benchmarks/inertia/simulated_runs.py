@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fulmar_core.actuators.reaction_wheels import ReactionWheels
-from fulmar_core.attitude import Vector, cross, plus, turn_back
 from fulmar_core.dynamics.gyrostat import Flywheels, gyrostat_step
-from fulmar_core.dynamics.rigid_body import gravity_gradient_torque
-from fulmar_core.excitation.profiles import gain_of, profile_of
-from fulmar_core.robot import load_robot
-from fulmar_core.spatial import SpatialState
+from fulmar_core.robots.actuators.reaction_wheels import ReactionWheels
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.states.attitude import Vector, cross, plus, turn_back
+from fulmar_core.states.spatial import SpatialState
+from fulmar_core.tasks.torque_profiles import gain_of, profile_of
+from fulmar_core.worlds.spatial_world import gravity_gradient_torque
 
 SAMPLE_S, PHYSICS_S, LASTS_S = 0.1, 0.05, 300.0
 ORBIT_RATE, SOLAR_FORCE, SOLAR_ARM = 1e-3, 1e-6, 0.01  # rad/s, N, m: arXiv 2510.16738
@@ -51,7 +51,7 @@ def simulate(
 
     Args:
         satellite: Name of the robot.
-        profiles: Names of `excitation.profiles.PROFILES`.
+        profiles: Names of `tasks.torque_profiles.PROFILES`.
         change: How its inertia changes, one of `GROWTHS`.
         seed: Of the pseudorandom binary sequence.
     """

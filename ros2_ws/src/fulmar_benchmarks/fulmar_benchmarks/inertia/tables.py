@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from fulmar_benchmarks.inertia.campaign import METHODS, requirements
-from fulmar_core.excitation.profiles import OWN
+from fulmar_core.tasks.torque_profiles import OWN
 
 
 def lines(document: dict[str, Any]) -> list[str]:

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from fulmar_benchmarks.latency.watched_system import REPORT_S, request_at, watched_system
-from fulmar_core.errors import RunFailed
+from fulmar_core.config.errors import RunFailed
 from fulmar_ros.runtime import EXECUTOR
 
 RATES_HZ = (5.0, 10.0, 20.0, 50.0, 100.0, 200.0)

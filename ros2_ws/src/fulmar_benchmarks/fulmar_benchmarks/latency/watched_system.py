@@ -18,10 +18,10 @@ from fulmar_bringup.readiness import CONTROLLER_AND_RECORDER, while_starting
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.supervisor import Supervisor, supervisor
 from fulmar_bringup.system_rows import system_rows
-from fulmar_core.errors import RunFailed
-from fulmar_core.policy_bundle import NETWORK, read_golden, read_passport, write_bundle
-from fulmar_core.robot import load_robot
-from fulmar_core.topics import SIMULATION_START_NS
+from fulmar_core.config.errors import RunFailed
+from fulmar_core.loop.policy_bundle import NETWORK, read_golden, read_passport, write_bundle
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.robots.topics import SIMULATION_START_NS
 from policy_server.controllers import policies_directory
 
 ROBOT, TASK = "floating_platform", "go_to_pose"

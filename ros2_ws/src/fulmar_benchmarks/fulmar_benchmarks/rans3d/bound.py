@@ -14,8 +14,8 @@ import numpy as np
 
 from fulmar_benchmarks.rans3d.unit import SpaceTrial
 from fulmar_benchmarks.workers import one_thread_each
-from fulmar_core.episode import Episode
-from fulmar_core.robot import Robot
+from fulmar_core.robots.robot import Robot
+from fulmar_core.simulation.episode import Episode
 from fulmar_core.tasks import Task
 from fulmar_evaluation.bounds.time_optimal import time_optimal_bound
 

@@ -3,62 +3,34 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any, cast
 
 from fulmar_benchmarks.pairs import Pair, code_hash, hash_of, plan_of, with_law, with_policy
 from fulmar_benchmarks.rans3d.bound import bounds_of
-from fulmar_benchmarks.rans3d.document import Key, document_of
+from fulmar_benchmarks.rans3d.document import Key, Request, document_of
 from fulmar_benchmarks.rans3d.integrator import measure_integrator
 from fulmar_benchmarks.rans3d.pace import measure_pace
 from fulmar_benchmarks.rans3d.targets import (
-    CONTROLLERS,
     DEAD,
     DEAD_CONTROLLERS,
     DEAD_TASK,
     EPISODES,
-    HOUR_S,
     ROBOTS,
-    SCENARIOS,
-    TASKS,
-    WORLDS,
     how_to_make,
 )
 from fulmar_benchmarks.rans3d.unit import SpaceTrial, SpaceUnit
 from fulmar_benchmarks.results import PairResult
 from fulmar_benchmarks.unit import Unit
 from fulmar_benchmarks.workers import Outcome, evaluate_units
-from fulmar_core.counts import check_episodes
-from fulmar_core.episode import episode_steps
-from fulmar_core.robot import load_robot
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.simulation.counts import check_episodes
+from fulmar_core.simulation.episode import episode_steps
 from fulmar_core.tasks import load_task
 from policy_server.controllers import policies_directory
 
-PARTS = ("tasks", "dead", "integrator", "throughput")
 WAY = "mujoco"
-
-
-@dataclass(frozen=True)
-class Request:
-    """What to measure."""
-
-    folder: Path  # outcomes are kept below it
-    episodes: int
-    seed: int
-    parts: Sequence[str] = PARTS
-    robots: Sequence[str] = ROBOTS
-    tasks: Sequence[str] = TASKS
-    controllers: Sequence[str] = CONTROLLERS
-    scenarios: Sequence[str] = SCENARIOS
-    policies: Path | None = None  # folder of bundles; the shipped ones by default
-    jobs: int = 2
-    fresh: bool = False  # evaluate again what was evaluated before
-    tumble_s: float = HOUR_S  # length of the tumble [s]
-    worlds: int = WORLDS  # of the batch whose pace is measured
-    seconds: float = 1.0  # of each measurement of the pace [s]
-    command: str = ""  # for the record
 
 
 @dataclass(frozen=True)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -11,9 +13,11 @@ from fulmar_benchmarks.pairs import Pair
 from fulmar_benchmarks.rans3d.targets import (
     AIMED_RATIO,
     AIMED_STEPS_PER_S,
+    CONTROLLERS,
     DEAD,
     DEAD_CONTROLLERS,
     DEAD_TASK,
+    HOUR_S,
     LEAST_RATIO,
     LEAST_WITH_DEAD,
     MOST_DUTY,
@@ -25,18 +29,19 @@ from fulmar_benchmarks.rans3d.targets import (
     RANDOMISED,
     REQUIRED,
     ROBOTS,
+    SCENARIOS,
+    TASKS,
+    WORLDS,
     published,
 )
 from fulmar_benchmarks.rans3d.unit import HELD
 from fulmar_benchmarks.results import PairResult
 from fulmar_benchmarks.roboran.document import wilson
-from fulmar_core.metrics import summarise
-from fulmar_core.provenance import fulmar_version, git_revision
-
-if TYPE_CHECKING:
-    from fulmar_benchmarks.rans3d.campaign import Request
+from fulmar_core.config.provenance import fulmar_version, git_revision
+from fulmar_core.simulation.metrics import summarise
 
 FORMAT = 1
+PARTS = ("tasks", "dead", "integrator", "throughput")
 Key = tuple[str, str, str, str]  # robot, task, controller, scenario
 Cells = dict[str, dict[str, dict[str, Any]]]  # by task and controller
 # Keys of a cell, by the figures whose means they are.
@@ -49,6 +54,27 @@ MEANS = {
     "duty": "effort",
     "rans_success_rate": "held_rans_tolerance",
 }
+
+
+@dataclass(frozen=True)
+class Request:
+    """What to measure."""
+
+    folder: Path  # outcomes are kept below it
+    episodes: int
+    seed: int
+    parts: Sequence[str] = PARTS
+    robots: Sequence[str] = ROBOTS
+    tasks: Sequence[str] = TASKS
+    controllers: Sequence[str] = CONTROLLERS
+    scenarios: Sequence[str] = SCENARIOS
+    policies: Path | None = None  # folder of bundles; the shipped ones by default
+    jobs: int = 2
+    fresh: bool = False  # evaluate again what was evaluated before
+    tumble_s: float = HOUR_S  # length of the tumble [s]
+    worlds: int = WORLDS  # of the batch whose pace is measured
+    seconds: float = 1.0  # of each measurement of the pace [s]
+    command: str = ""  # for the record
 
 
 def document_of(

@@ -15,7 +15,7 @@ from fulmar_benchmarks.mujoco_pace import INTEGRATORS
 from fulmar_benchmarks.rans3d.mujoco_tumble import MOST_S, mujoco_drift
 from fulmar_benchmarks.workers import begin_worker, counted, ended_with_us, one_thread_each
 from fulmar_core.dynamics.tumble import AXIS, MOMENTS, RATE, Drift, drift_over, measured_order
-from fulmar_core.robot import Robot
+from fulmar_core.robots.robot import Robot
 
 METHOD = "Runge-Kutta for the turn rate, Magnus expansion for the attitude"
 TYPES = {"float64": np.float64, "float32": np.float32}

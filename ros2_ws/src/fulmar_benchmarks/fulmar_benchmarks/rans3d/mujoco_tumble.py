@@ -17,7 +17,7 @@ from fulmar_core.dynamics.tumble import (
     jacobi_rate,
     tumbling,
 )
-from fulmar_core.spatial import SpatialState
+from fulmar_core.states.spatial import SpatialState
 
 MOST_S = 600.0  # Euler's method diverges within an hour at the spacecraft's step, with warnings on stderr [s]
 

@@ -8,9 +8,9 @@ from typing import Any
 
 from fulmar_benchmarks.rans3d.targets import RANDOMISED, ROBOTS
 from fulmar_benchmarks.throughput import Library, measure
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.robot import load_robot
+from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.tasks import load_task
+from fulmar_core.worlds.scenario import load_scenario
 
 TASK = "go_to_pose_3d"
 LIBRARIES = ("numpy", "compiled")

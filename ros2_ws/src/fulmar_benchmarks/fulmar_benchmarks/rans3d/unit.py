@@ -9,13 +9,13 @@ import numpy as np
 
 from fulmar_benchmarks.rans3d.targets import NOMINAL, RANS_ATTITUDE_RAD, RANS_POSITION_M, RANS_STEPS
 from fulmar_benchmarks.unit import Extra, Unit
-from fulmar_core.attitude import angle_between
-from fulmar_core.disturbances.spatial_world import SpatialWorld
-from fulmar_core.episode import Episode
-from fulmar_core.metrics import Trajectories
-from fulmar_core.spatial import SpatialState, quat_of
-from fulmar_core.spatial_holdability import can_hold_in_space
+from fulmar_core.simulation.episode import Episode
+from fulmar_core.simulation.metrics import Trajectories
+from fulmar_core.states.attitude import angle_between
+from fulmar_core.states.spatial import SpatialState, quat_of
 from fulmar_core.tasks import Task
+from fulmar_core.worlds.spatial_holdability import can_hold_in_space
+from fulmar_core.worlds.spatial_world import SpatialWorld
 from fulmar_evaluation.evaluation import Trial
 
 HELD = "can_hold"  # name of the kept array

@@ -13,9 +13,9 @@ from fulmar_benchmarks.results import PairResult
 from fulmar_benchmarks.roboran.document import FORMAT, pair_entry
 from fulmar_benchmarks.unit import Unit
 from fulmar_benchmarks.workers import Outcome, evaluate_units
-from fulmar_core.counts import check_episodes
-from fulmar_core.provenance import fulmar_version, git_revision
-from fulmar_core.robot import load_robot
+from fulmar_core.config.provenance import fulmar_version, git_revision
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.simulation.counts import check_episodes
 from fulmar_core.tasks import load_task
 from fulmar_evaluation.evaluation import BATCH_EPISODES
 from fulmar_evaluation.evaluation import EPISODES as MUJOCO_EPISODES

@@ -29,7 +29,7 @@ class Quantity:
 
     title: str
     unit: str
-    figure: str  # of `fulmar_core.figures`
+    figure: str  # of `fulmar_evaluation.figures`
     thesis: str  # key of an entry's `thesis`; empty: it has none
     digits: int
     factor: float = 1.0  # from our unit to this one

@@ -11,7 +11,7 @@ import numpy as np
 from fulmar_benchmarks.pairs import Pair
 from fulmar_benchmarks.results import PairResult
 from fulmar_benchmarks.roboran.targets import checks_of, main_figure, thesis_row
-from fulmar_core.metrics import summarise
+from fulmar_core.simulation.metrics import summarise
 from fulmar_evaluation.evaluation import share_of_mean
 
 FORMAT = 1

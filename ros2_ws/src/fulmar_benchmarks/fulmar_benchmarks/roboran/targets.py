@@ -11,6 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from fulmar_benchmarks.cells import Check
+from fulmar_benchmarks.unit import CONTROL_HZ
 
 ROBOTS = ("floating_platform", "kingfisher", "turtlebot2")
 TASKS = (
@@ -20,8 +21,6 @@ TASKS = (
     "go_through_positions",
     "go_to_position_with_obstacles",
 )
-CONTROL_HZ = 10.0  # of its environments (facts §2.1)
-GOAL_STEPS = 1000  # horizon of go_through_positions
 
 
 @dataclass(frozen=True)

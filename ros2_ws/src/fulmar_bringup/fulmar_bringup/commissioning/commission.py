@@ -14,6 +14,7 @@ from typing import Any
 import yaml
 
 from fulmar_bringup.commissioning.hardware_file import Wire, actuator_names, wires_of
+from fulmar_bringup.commissioning.match import indistinct, left_over
 from fulmar_bringup.commissioning.procedure import Outcome, click, measure
 from fulmar_bringup.commissioning.session import Session
 from fulmar_bringup.domains import claimed_domain
@@ -22,10 +23,10 @@ from fulmar_bringup.processes import ProcessGroup
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.system import Guards
 from fulmar_bringup.system_rows import system_rows
-from fulmar_core.actuators.thrusters import Thrusters
-from fulmar_core.commissioning.match import indistinct, left_over
-from fulmar_core.errors import ConfigError
-from fulmar_core.robot import Robot, load_robot
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.robots.actuators.thrusters import Thrusters
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.robot_file import load_robot
 from fulmar_ros.runtime import ros_node
 from hardware_drivers.hardware import Hardware, hardware_path, load_hardware
 from hardware_drivers.settings import GpioValves

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
-from fulmar_core.actuators.differential_drive import DifferentialDrive
-from fulmar_core.actuators.thrusters import Thrusters
-from fulmar_core.atomic_write import write_whole
-from fulmar_core.errors import ConfigError
-from fulmar_core.robot import Robot
+from fulmar_core.config.atomic_write import write_whole
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.robots.actuators.differential_drive import DifferentialDrive
+from fulmar_core.robots.actuators.thrusters import Thrusters
+from fulmar_core.robots.robot import Robot
 from hardware_drivers.hardware import Hardware
 from hardware_drivers.settings import GpioValves, OwnDriver, ValveTopic, XPlane
 from hardware_drivers.wiring import SIDES

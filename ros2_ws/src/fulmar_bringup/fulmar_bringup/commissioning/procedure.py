@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from fulmar_bringup.commissioning.hardware_file import Wire, command_of
+from fulmar_bringup.commissioning.match import CLEARLY, Match, match_nozzles, match_sides
+from fulmar_bringup.commissioning.response import Motion, Pulse, Response, Track, responses
 from fulmar_bringup.commissioning.session import Session
-from fulmar_core.actuators.differential_drive import DifferentialDrive
-from fulmar_core.actuators.thrusters import Thrusters
-from fulmar_core.commissioning.match import CLEARLY, Match, match_nozzles, match_sides
-from fulmar_core.commissioning.response import Motion, Pulse, Response, Track, responses
-from fulmar_core.errors import RunFailed
-from fulmar_core.robot import Robot
+from fulmar_core.config.errors import RunFailed
+from fulmar_core.robots.actuators.differential_drive import DifferentialDrive
+from fulmar_core.robots.actuators.thrusters import Thrusters
+from fulmar_core.robots.robot import Robot
 
 CLICK_S, BETWEEN_CLICKS_S = 0.1, 0.9
 # At most 0.3 s at its level. For valves our value: 1 N on 5.32 kg gives 23 mm/s, some 20 standard errors.

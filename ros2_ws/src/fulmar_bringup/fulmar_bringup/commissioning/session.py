@@ -16,12 +16,10 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool
 
 from fulmar_bags.message_reader import stamp_ns
-from fulmar_core.commissioning.response import Pulse, Track
-from fulmar_core.errors import RunFailed
-from fulmar_core.robot import Robot
-from fulmar_core.rotation import yaw_of
-from fulmar_core.safety.estop import HOLDS
-from fulmar_core.topics import (
+from fulmar_bringup.commissioning.response import Pulse, Track
+from fulmar_core.config.errors import RunFailed
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.topics import (
     ACTUATORS_STATE,
     AIR_BEARING,
     DIAGNOSTICS,
@@ -30,6 +28,8 @@ from fulmar_core.topics import (
     VELOCITY_COMMAND,
     command_wire,
 )
+from fulmar_core.safety.estop import HOLDS
+from fulmar_core.states.rotation import yaw_of
 from fulmar_ros.convert import TwistWriter, VectorWriter
 from fulmar_ros.operator_subscription import subscribe_every
 from fulmar_ros.parameters import name_of, own_frames

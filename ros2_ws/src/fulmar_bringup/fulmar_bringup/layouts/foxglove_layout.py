@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from fulmar_bringup.layouts.viewed_robot import ViewedRobot
-from fulmar_core.topics import (
+from fulmar_core.robots.topics import (
     ACTUATORS_STATE,
     BLOCK,
     DESCRIPTION,

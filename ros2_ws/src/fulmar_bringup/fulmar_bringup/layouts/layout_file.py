@@ -9,8 +9,8 @@ from pathlib import Path
 from fulmar_bringup.layouts.foxglove_layout import foxglove_layout
 from fulmar_bringup.layouts.rviz_layout import rviz_layout
 from fulmar_bringup.layouts.viewed_robot import ViewedRobot, viewed_robot
-from fulmar_core.atomic_write import write_whole
-from fulmar_core.errors import ConfigError, UnknownNameError
+from fulmar_core.config.atomic_write import write_whole
+from fulmar_core.config.errors import ConfigError, UnknownNameError
 
 
 @dataclass(frozen=True)

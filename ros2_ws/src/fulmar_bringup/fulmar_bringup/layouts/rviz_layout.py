@@ -7,7 +7,7 @@ from typing import Any
 import yaml
 
 from fulmar_bringup.layouts.viewed_robot import ViewedRobot
-from fulmar_core.topics import (
+from fulmar_core.robots.topics import (
     DESCRIPTION,
     GOAL_PATH,
     GOAL_POINT,

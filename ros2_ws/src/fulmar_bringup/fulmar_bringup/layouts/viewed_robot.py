@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from fulmar_core.robot import Robot, load_robot, load_robot_file
-from fulmar_core.robot_name import Frames, checked_name, frames_of, namespace_of
-from fulmar_core.topics import COMMAND, VELOCITY_COMMAND, Wire, command_wire
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.robot_file import load_robot, load_robot_file
+from fulmar_core.robots.topics import COMMAND, VELOCITY_COMMAND, Wire, command_wire
+from fulmar_core.wires.robot_name import Frames, checked_name, frames_of, namespace_of
 
 
 @dataclass(frozen=True)

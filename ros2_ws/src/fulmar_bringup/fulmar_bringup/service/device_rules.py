@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fulmar_core.written_text import LINE, NAME, check_written
+from fulmar_core.config.written_text import LINE, NAME, check_written
 from hardware_drivers.hardware import Hardware
 from hardware_drivers.settings import GpioValves, Kobuki
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fulmar_bringup.service.unit import MARK, command_of, system_of_unit
-from fulmar_core.errors import ConfigError, FulmarError, UnknownNameError
+from fulmar_core.config.errors import ConfigError, FulmarError, UnknownNameError
 
 UNITS = Path("etc/systemd/system")
 RULES = Path("etc/udev/rules.d")

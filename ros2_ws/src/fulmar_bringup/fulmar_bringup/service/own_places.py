@@ -7,8 +7,8 @@ import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from fulmar_core.own_class import SEPARATOR, search_current_folder
-from fulmar_core.paths import OWN_FOLDERS
+from fulmar_core.config.own_class import SEPARATOR, search_current_folder
+from fulmar_core.config.paths import OWN_FOLDERS
 
 PYTHONPATH = "PYTHONPATH"
 # Variables that hold a path, or several as in PATH.

@@ -6,9 +6,9 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
-from fulmar_core.actuators.refuge import LANDS_S
-from fulmar_core.process import RT_LIMIT
-from fulmar_core.written_text import LINE, NAME, USER, check_written
+from fulmar_core.config.process import RT_LIMIT
+from fulmar_core.config.written_text import LINE, NAME, USER, check_written
+from fulmar_core.robots.actuators.refuge import LANDS_S
 
 MARK = "# Written by `fulmar service install`; `fulmar service remove` removes it."
 # Of the environment of the one who installs: where nodes find each other, and own files.

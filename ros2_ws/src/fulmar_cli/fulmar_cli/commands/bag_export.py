@@ -8,7 +8,7 @@ from typing import Annotated
 from fulmar_bringup.console import print_json, warn, write_line
 from fulmar_cli.commands.arguments import JsonOption, argument, option
 from fulmar_cli.commands.damage import finish, open_and_warn
-from fulmar_core.errors import BagError, ConfigError, UnknownNameError
+from fulmar_core.config.errors import BagError, ConfigError, UnknownNameError
 
 FORMATS = ("csv", "npz", "lerobot")
 

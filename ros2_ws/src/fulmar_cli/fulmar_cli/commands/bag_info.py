@@ -9,7 +9,7 @@ import typer
 
 from fulmar_bringup.console import print_result, write_line
 from fulmar_cli.commands.arguments import BagArgument, JsonOption
-from fulmar_core.errors import DONE, FAILED
+from fulmar_core.config.errors import DONE, FAILED
 
 HEAD = ("topic", "type", "count", "rate [Hz]", "gaps", "longest [s]", "late", "dropped")
 NAMES = 2  # columns of words

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from fulmar_bringup.console import print_json, warn, write_line
 from fulmar_cli.commands.arguments import BagArgument, JsonOption, flag, option
 from fulmar_cli.commands.damage import finish, open_and_warn
-from fulmar_core.errors import ConfigError, UnknownNameError
+from fulmar_core.config.errors import ConfigError, UnknownNameError
 
 if TYPE_CHECKING:
     from fulmar_bags.contents import Bag
@@ -48,7 +48,7 @@ def play(
 
     With X-Plane on another computer: fulmar bag play runs/flight --to xplane --host 192.168.1.20 --rate 0.5
     """
-    from fulmar_cli.extras import require
+    from fulmar_cli.installation.extras import require
 
     _check(to, for_ros=clock or wait is not None, for_xplane=host is not None or port is not None)
     require("rclpy" if to == "ros" else "serial")

@@ -8,7 +8,7 @@ from typing import Annotated
 from fulmar_bringup.console import print_json, write_line
 from fulmar_cli.commands.arguments import BagArgument, JsonOption, OdometryOption, option
 from fulmar_cli.commands.damage import finish, open_and_warn
-from fulmar_cli.extras import require
+from fulmar_cli.installation.extras import require
 
 
 def plot(
@@ -52,7 +52,7 @@ def plot(
 def _has_a_task(bag: Path) -> bool:
     """Whether this is a run that can be evaluated."""
     from fulmar_bags.run_record import read_run
-    from fulmar_core.errors import FulmarError
+    from fulmar_core.config.errors import FulmarError
     from fulmar_evaluation.run_evaluation import evaluate_run
 
     try:

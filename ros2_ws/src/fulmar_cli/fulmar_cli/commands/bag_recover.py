@@ -6,7 +6,7 @@ import typer
 
 from fulmar_bringup.console import print_json, write_line
 from fulmar_cli.commands.arguments import BagArgument, JsonOption
-from fulmar_core.errors import DONE, FAILED, BagError
+from fulmar_core.config.errors import DONE, FAILED, BagError
 
 
 def recover(bag: BagArgument, as_json: JsonOption = False) -> None:

@@ -9,7 +9,7 @@ import typer
 
 from fulmar_bringup.console import log_line, print_json, write_line
 from fulmar_cli.commands.arguments import JsonOption, argument, flag, option
-from fulmar_core.errors import DONE, FAILED, UnknownNameError
+from fulmar_core.config.errors import DONE, FAILED, UnknownNameError
 
 
 def reference(

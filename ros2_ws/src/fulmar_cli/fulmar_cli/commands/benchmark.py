@@ -19,7 +19,7 @@ from fulmar_cli.commands.benchmark_rans3d import rans3d
 from fulmar_cli.commands.benchmark_roboran import roboran
 from fulmar_cli.commands.benchmark_throughput import throughput
 from fulmar_cli.commands.benchmark_training import training
-from fulmar_core.errors import ConfigError
+from fulmar_core.config.errors import ConfigError
 
 # Of our own machinery, by module of `tests/benchmarks`: they come with a checkout, not with an installed Fulmar.
 OF_A_CHECKOUT = {

@@ -13,7 +13,7 @@ from rich.console import Console
 from fulmar_bringup.console import log_line, output, print_result
 from fulmar_bringup.progress import work_bar
 from fulmar_cli.commands.arguments import flag
-from fulmar_core.errors import FAILED
+from fulmar_core.config.errors import FAILED
 
 if TYPE_CHECKING:
     from fulmar_benchmarks.results import PairResult

@@ -19,8 +19,8 @@ from fulmar_cli.commands.arguments import (
     option,
 )
 from fulmar_cli.commands.values import read_names
-from fulmar_core.errors import FAILED, ConfigError
-from fulmar_core.seeds import EVALUATION_SEED
+from fulmar_core.config.errors import FAILED, ConfigError
+from fulmar_core.config.seeds import EVALUATION_SEED
 
 HIGHEST_M = 100.0
 

@@ -22,9 +22,9 @@ from fulmar_cli.commands.benchmark_campaign import (
     run_campaign,
 )
 from fulmar_cli.commands.values import read_names
-from fulmar_cli.extras import require
-from fulmar_core.errors import UnknownNameError
-from fulmar_core.seeds import EVALUATION_SEED
+from fulmar_cli.installation.extras import require
+from fulmar_core.config.errors import UnknownNameError
+from fulmar_core.config.seeds import EVALUATION_SEED
 
 if TYPE_CHECKING:
     from fulmar_benchmarks.results import PairResult
@@ -65,8 +65,9 @@ def drift(
 
     fulmar benchmark drift --rows ideal,torque --controllers lqr --through mujoco
     """
-    from fulmar_benchmarks.drift.campaign import Request, run_drift
+    from fulmar_benchmarks.drift.campaign import run_drift
     from fulmar_benchmarks.drift.conditions import ROWS
+    from fulmar_benchmarks.drift.document import Request
     from fulmar_benchmarks.drift.tables import print_tables
     from fulmar_evaluation.evaluation import WAYS
     from policy_server.controllers import CONTROLLERS

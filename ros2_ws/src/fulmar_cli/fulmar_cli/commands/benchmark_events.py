@@ -12,8 +12,8 @@ from fulmar_bringup.progress import work_bar
 from fulmar_cli.commands.arguments import JobsOption, JsonOption, SeedOption, invoked_command, option
 from fulmar_cli.commands.benchmark_campaign import ReportOption
 from fulmar_cli.commands.values import read_names
-from fulmar_cli.extras import require
-from fulmar_core.seeds import EVALUATION_SEED
+from fulmar_cli.installation.extras import require
+from fulmar_core.config.seeds import EVALUATION_SEED
 
 
 def events(
@@ -49,7 +49,7 @@ def events(
     require("mujoco")
     from fulmar_benchmarks.events.campaign import PARTS, Request, run_events
     from fulmar_benchmarks.events.tables import print_tables
-    from fulmar_core.sky.catalogue import load_stars
+    from fulmar_core.robots.sensors.catalogue import load_stars
 
     load_stars()
     chosen = read_names(parts, "part", PARTS)

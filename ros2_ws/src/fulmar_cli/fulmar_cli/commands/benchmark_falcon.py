@@ -19,8 +19,8 @@ from fulmar_cli.commands.arguments import (
 )
 from fulmar_cli.commands.benchmark_campaign import ReportOption
 from fulmar_cli.commands.values import read_names
-from fulmar_cli.extras import require
-from fulmar_core.seeds import EVALUATION_SEED
+from fulmar_cli.installation.extras import require
+from fulmar_core.config.seeds import EVALUATION_SEED
 
 
 def falcon(

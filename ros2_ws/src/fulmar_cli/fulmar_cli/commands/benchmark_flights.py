@@ -17,8 +17,8 @@ from fulmar_cli.commands.arguments import (
     SeedOption,
     option,
 )
-from fulmar_core.errors import FAILED
-from fulmar_core.seeds import EVALUATION_SEED
+from fulmar_core.config.errors import FAILED
+from fulmar_core.config.seeds import EVALUATION_SEED
 
 
 def flights(
@@ -48,8 +48,8 @@ def flights(
     fulmar benchmark flights --controller lqi --episodes 8 --episode-s 20
     """
     from fulmar_benchmarks.falcon.live import LiveRequest, fly_live, print_live
-    from fulmar_cli.extras import check_plan
-    from fulmar_core.robot import load_robot
+    from fulmar_cli.installation.extras import check_plan
+    from fulmar_core.robots.robot_file import load_robot
     from fulmar_core.tasks import load_task
     from fulmar_evaluation.trial_plan import plan_trial
     from policy_server.controllers import usual_hz

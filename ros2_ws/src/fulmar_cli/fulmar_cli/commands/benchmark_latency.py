@@ -11,7 +11,7 @@ from rich.table import Table
 from fulmar_bringup.console import output, print_result, write_line
 from fulmar_bringup.progress import time_bar, work_bar
 from fulmar_cli.commands.arguments import JsonOption, dated_folder, option
-from fulmar_core.errors import FAILED, ConfigError
+from fulmar_core.config.errors import FAILED, ConfigError
 
 
 def latency(
@@ -35,7 +35,7 @@ def latency(
     fulmar benchmark latency --rates 50 --executors events
     """
     from fulmar_benchmarks.latency.cells import cells_of, measure
-    from fulmar_cli.extras import require
+    from fulmar_cli.installation.extras import require
 
     require("onnxruntime", "mujoco")
     cells = cells_of(_rates(rates), _executors(executors))
@@ -68,7 +68,7 @@ def endurance(
     fulmar benchmark endurance --seconds 600 --rate 4
     """
     from fulmar_benchmarks.latency.endurance import endure
-    from fulmar_cli.extras import require
+    from fulmar_cli.installation.extras import require
 
     require("onnxruntime", "mujoco")
     folder = out or dated_folder("runs/benchmark", "endurance")

@@ -15,8 +15,8 @@ from fulmar_cli.commands.benchmark_campaign import (
     run_campaign,
 )
 from fulmar_cli.commands.values import read_names
-from fulmar_cli.extras import require
-from fulmar_core.seeds import EVALUATION_SEED
+from fulmar_cli.installation.extras import require
+from fulmar_core.config.seeds import EVALUATION_SEED
 
 if TYPE_CHECKING:
     from fulmar_benchmarks.unit import Unit
@@ -64,7 +64,8 @@ def rans3d(
     fulmar benchmark rans3d --robots spacecraft_16 --tasks go_to_pose_3d --parts tasks,integrator
     """
     from fulmar_benchmarks.cells import display_name
-    from fulmar_benchmarks.rans3d.campaign import PARTS, Request, run_rans3d
+    from fulmar_benchmarks.rans3d.campaign import run_rans3d
+    from fulmar_benchmarks.rans3d.document import PARTS, Request
     from fulmar_benchmarks.rans3d.tables import print_tables
     from fulmar_benchmarks.rans3d.targets import CONTROLLERS, ROBOTS, SCENARIOS, TASKS
 

@@ -22,8 +22,8 @@ from fulmar_cli.commands.benchmark_campaign import (
     run_campaign,
 )
 from fulmar_cli.commands.values import read_names
-from fulmar_cli.extras import require
-from fulmar_core.seeds import EVALUATION_SEED
+from fulmar_cli.installation.extras import require
+from fulmar_core.config.seeds import EVALUATION_SEED
 
 
 def roboran(
@@ -68,8 +68,8 @@ def roboran(
     from fulmar_benchmarks.roboran.cells import print_tables
     from fulmar_benchmarks.roboran.targets import ROBOTS, TASKS
     from fulmar_benchmarks.unit import Unit
-    from fulmar_core.disturbances.scenario import load_scenario
-    from fulmar_core.paths import config_names
+    from fulmar_core.config.paths import config_names
+    from fulmar_core.worlds.scenario import load_scenario
     from policy_server.controllers import controller_entry
 
     load_scenario(scenario)

@@ -9,10 +9,10 @@ from fulmar_bringup.console import console, output, print_result
 from fulmar_bringup.progress import step_bar
 from fulmar_cli.commands.arguments import JsonOption, ScenarioOption, option
 from fulmar_cli.commands.values import read_names
-from fulmar_core.errors import ConfigError, UnknownNameError
+from fulmar_core.config.errors import ConfigError, UnknownNameError
 
 if TYPE_CHECKING:
-    from fulmar_core.robot import Robot
+    from fulmar_core.robots.robot import Robot
     from fulmar_core.tasks import Task
 
 DEVICES, LIBRARIES = ("cpu", "cuda"), ("compiled", "numpy", "torch")
@@ -57,9 +57,9 @@ def throughput(
 
     fulmar benchmark throughput --robots kingfisher,turtlebot2 --json
     """
-    from fulmar_cli.extras import require
-    from fulmar_core.disturbances.scenario import load_scenario
-    from fulmar_core.paths import config_names
+    from fulmar_cli.installation.extras import require
+    from fulmar_core.config.paths import config_names
+    from fulmar_core.worlds.scenario import load_scenario
 
     library = library or _fastest(device)
     for kind, name, known in (("device", device, DEVICES), ("library", library, LIBRARIES)):
@@ -100,7 +100,7 @@ def throughput(
 def _pairs(names: Sequence[str], task: str | None, *, named: bool) -> list[tuple[Robot, Task]]:
     """Robots, each with its task; of a given task those that it fits, unless they were `named`."""
     from fulmar_benchmarks.usual_task import usual_task
-    from fulmar_core.robot import load_robot
+    from fulmar_core.robots.robot_file import load_robot
     from fulmar_core.tasks import load_task
 
     robots = [load_robot(name) for name in names]
@@ -131,7 +131,7 @@ def _fastest(device: str) -> str:
 
 def _check_machine(device: str, library: str, worlds: int, cores: int) -> None:
     """Reject counts and a device that the library or this computer does not have."""
-    from fulmar_core.counts import PROCESS_BYTES, WORLD_BYTES, check_count
+    from fulmar_core.simulation.counts import PROCESS_BYTES, WORLD_BYTES, check_count
 
     check_count("--worlds", worlds, bytes_each=WORLD_BYTES)
     check_count("--cores", cores, bytes_each=PROCESS_BYTES)

@@ -9,7 +9,7 @@ import typer
 
 from fulmar_bringup.console import output, print_result, write_line
 from fulmar_cli.commands.arguments import JsonOption, dated_folder, option
-from fulmar_core.errors import FAILED
+from fulmar_core.config.errors import FAILED
 
 
 def training(
@@ -28,7 +28,7 @@ def training(
 
     Success is the mean of the training scenario and the nominal one, on episodes that nobody learns from.
     """
-    from fulmar_core.counts import PROCESS_BYTES, check_count
+    from fulmar_core.simulation.counts import PROCESS_BYTES, check_count
     from training.benchmark import benchmark_jobs, compare
     from training.executors import LocalExecutor
     from training.progress import JobBars

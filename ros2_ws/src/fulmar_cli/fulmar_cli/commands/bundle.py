@@ -18,7 +18,7 @@ FolderArgument = Annotated[Path, argument("DIR", "A policy bundle.")]
 @bundle.command()
 def show(folder: FolderArgument, as_json: JsonOption = False) -> None:
     """Show the passport of a bundle."""
-    from fulmar_core.policy_bundle import read_passport
+    from fulmar_core.loop.policy_bundle import read_passport
 
     passport = asdict(read_passport(folder))
     if as_json:
@@ -46,10 +46,10 @@ def keys(
     public: Annotated[Path, argument("PUBLIC", "File for the public key, for robots.")],
 ) -> None:
     """Make a pair of ed25519 keys: one to sign bundles, one for robots to check them by."""
-    from fulmar_cli.extras import require
+    from fulmar_cli.installation.extras import require
 
     require("cryptography")
-    from fulmar_core.bundle_signature import make_keys
+    from fulmar_core.loop.bundle_signature import make_keys
 
     make_keys(private, public)
     write_line(f"sign with {private}, give {public} to robots")
@@ -61,10 +61,10 @@ def sign(
     key: Annotated[Path, option("FILE", "A private key of `fulmar bundle keys`.")],
 ) -> None:
     """Sign a bundle, whose hashes are checked first."""
-    from fulmar_cli.extras import require
+    from fulmar_cli.installation.extras import require
 
     require("cryptography")
-    from fulmar_core.bundle_signature import sign_bundle
+    from fulmar_core.loop.bundle_signature import sign_bundle
 
     sign_bundle(folder, key)
     write_line(f"{folder}: signed")
@@ -77,11 +77,11 @@ def verify(
     as_json: JsonOption = False,
 ) -> None:
     """Check that a trusted key has signed a bundle, and that nothing was changed since."""
-    from fulmar_cli.extras import require
+    from fulmar_cli.installation.extras import require
 
     require("cryptography")
-    from fulmar_core.bundle_signature import verify_bundle
-    from fulmar_core.policy_bundle import read_bundle
+    from fulmar_core.loop.bundle_signature import verify_bundle
+    from fulmar_core.loop.policy_bundle import read_bundle
 
     found = read_bundle(folder)
     name = verify_bundle(found, trusted)
@@ -95,8 +95,8 @@ def verify(
 def check(folder: FolderArgument, as_json: JsonOption = False) -> None:
     """Load a bundle as the robot would: hashes, robot, task, rate, names, shapes, golden vectors."""
     from fulmar_bringup.plan_checks import checked_rate
-    from fulmar_core.policy_bundle import read_passport
-    from fulmar_core.robot import load_robot
+    from fulmar_core.loop.policy_bundle import read_passport
+    from fulmar_core.robots.robot_file import load_robot
     from fulmar_core.tasks import load_task
     from policy_server.policy import Policy
 

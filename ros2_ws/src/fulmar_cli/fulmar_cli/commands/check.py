@@ -9,7 +9,7 @@ import typer
 
 from fulmar_bringup.console import log_line, print_json, write_line
 from fulmar_cli.commands.arguments import JsonOption, argument, option
-from fulmar_core.errors import FAILED
+from fulmar_core.config.errors import FAILED
 
 if TYPE_CHECKING:
     from fulmar_evaluation.robot_check import RobotCheck
@@ -57,7 +57,7 @@ def robot(
     from fulmar_evaluation.robot_check import check_robot
 
     if plot is not None:
-        from fulmar_cli.extras import require
+        from fulmar_cli.installation.extras import require
 
         require("matplotlib")
     found = check_robot(name, speed=speed, altitude=altitude, height=height)

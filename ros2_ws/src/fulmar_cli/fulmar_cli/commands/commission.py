@@ -9,7 +9,7 @@ import typer
 
 from fulmar_bringup.console import log_line, print_json, write_line
 from fulmar_cli.commands.arguments import ArmOption, JsonOption, SeedOption, argument, flag, option
-from fulmar_core.errors import DONE, FAILED, ConfigError, UnknownNameError
+from fulmar_core.config.errors import DONE, FAILED, ConfigError, UnknownNameError
 
 if TYPE_CHECKING:
     from fulmar_bringup.commissioning.commission import Request
@@ -85,7 +85,7 @@ def _check(request: Request) -> None:
     from fulmar_bringup.commissioning.commission import WIRINGS
     from fulmar_bringup.emulation import check_emulated
     from fulmar_bringup.plan_checks import check_arming
-    from fulmar_cli.extras import require
+    from fulmar_cli.installation.extras import require
     from hardware_drivers.hardware import load_hardware
     from hardware_drivers.own_driver import check_own_driver
     from hardware_drivers.presence import check_presence

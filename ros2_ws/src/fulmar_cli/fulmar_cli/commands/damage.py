@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from fulmar_bringup.console import warn
-from fulmar_core.errors import DONE, FAILED
+from fulmar_core.config.errors import DONE, FAILED
 
 if TYPE_CHECKING:
     from fulmar_bags.contents import Bag

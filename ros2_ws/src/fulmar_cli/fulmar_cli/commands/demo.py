@@ -21,7 +21,7 @@ def demo(
     ] = None,
 ) -> None:
     """Run the floating platform with its policy, then with LQR, over real ROS 2; end with a table and a report."""
-    from fulmar_cli.extras import require
+    from fulmar_cli.installation.extras import require
 
     require("rclpy", "mujoco", "onnxruntime", "mcap", "rosbags", "matplotlib")
     from fulmar_bags.run_record import read_run

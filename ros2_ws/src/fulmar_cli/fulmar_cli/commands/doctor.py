@@ -8,7 +8,7 @@ import typer
 
 from fulmar_bringup.console import output, print_json
 from fulmar_cli.commands.arguments import JsonOption
-from fulmar_core.errors import DONE, FAILED, ConfigError, UnknownNameError
+from fulmar_core.config.errors import DONE, FAILED, ConfigError, UnknownNameError
 
 
 def doctor(

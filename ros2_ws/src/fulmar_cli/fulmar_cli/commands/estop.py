@@ -8,7 +8,7 @@ import typer
 
 from fulmar_bringup.console import console, output, print_json
 from fulmar_cli.commands.arguments import JsonOption, argument, flag
-from fulmar_core.errors import FAILED, RunFailed
+from fulmar_core.config.errors import FAILED, RunFailed
 
 if TYPE_CHECKING:
     from fulmar_bringup.estop_robots import Stopped

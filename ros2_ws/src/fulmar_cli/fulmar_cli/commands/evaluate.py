@@ -17,8 +17,8 @@ from fulmar_cli.commands.arguments import (
     TaskArgument,
     option,
 )
-from fulmar_core.figures import meanings
-from fulmar_core.seeds import EVALUATION_SEED
+from fulmar_core.config.seeds import EVALUATION_SEED
+from fulmar_evaluation.figures import meanings
 
 EPILOG = f"""\b
 What the figures mean. Of all but the first: mean, median and 95th percentile over the episodes.
@@ -73,8 +73,8 @@ def evaluate(
 
     fulmar evaluate turtlebot2 go_through_positions --through batch --steps 1000
     """
-    from fulmar_cli.extras import check_plan
-    from fulmar_core.robot import use_calibration
+    from fulmar_cli.installation.extras import check_plan
+    from fulmar_core.robots.robot_file import use_calibration
     from fulmar_evaluation.trial_plan import plan_trial, print_figures, trial_figures
 
     use_calibration(calibration, robot)

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from fulmar_bringup.console import output
 from fulmar_cli.commands.arguments import argument, flag, option
-from fulmar_core.errors import ConfigError, UnknownNameError
+from fulmar_core.config.errors import ConfigError, UnknownNameError
 
 JSBSIM = "jsbsim"
 
@@ -30,7 +30,7 @@ def export(
         raise ConfigError(
             f"{out} exists already and is not empty; no bundle is overwritten. Give --out another folder, or --force."
         )
-    from fulmar_core.robot import load_robot
+    from fulmar_core.robots.robot_file import load_robot
 
     if to is not None:
         if to != JSBSIM:

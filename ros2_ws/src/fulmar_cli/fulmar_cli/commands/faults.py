@@ -11,7 +11,7 @@ from rich.table import Table
 from fulmar_bringup.console import output, print_json
 from fulmar_bringup.progress import work_bar
 from fulmar_cli.commands.arguments import JsonOption, option
-from fulmar_core.errors import FAILED
+from fulmar_core.config.errors import FAILED
 
 if TYPE_CHECKING:
     from fulmar_evaluation.faults.fault import FaultResult
@@ -43,7 +43,7 @@ def faults(
 
     fulmar faults --robot turtlebot2 --only controller_killed,odometry_silent
     """
-    from fulmar_cli.extras import require
+    from fulmar_cli.installation.extras import require
     from fulmar_evaluation.faults.suite import at_height, faults_of, modules_for, run_faults, times_of
 
     chosen, skipped = faults_of(robot, names_in(only))

@@ -9,12 +9,12 @@ import typer
 from fulmar_cli.commands.arguments import NameOption, argument, flag, option
 from fulmar_cli.commands.list import list_names
 from fulmar_cli.commands.values import read_area, read_goal
-from fulmar_core.errors import ConfigError
-from fulmar_core.robot_name import checked_name
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.wires.robot_name import checked_name
 
 if TYPE_CHECKING:
-    from fulmar_core.goal_files import GoalFile
-    from fulmar_core.robot import Robot
+    from fulmar_core.robots.robot import Robot
+    from fulmar_core.tasks.goal_files import GoalFile
 
 GIVE_UP_S = 5.0  # without odometry or without a subscriber of the goals
 
@@ -86,10 +86,10 @@ def goals(
     from fulmar_bringup.goal_plan import check_file_places, check_pace
     from fulmar_bringup.operator_rows import goals_spec
     from fulmar_bringup.processes import command_line
-    from fulmar_core.goal_files import load_goals
-    from fulmar_core.goal_sequence import goal_sequence
-    from fulmar_core.robot import load_robot
+    from fulmar_core.robots.robot_file import load_robot
     from fulmar_core.safety.geofence import NO_AREA, check_area_of
+    from fulmar_core.tasks.goal_files import load_goals
+    from fulmar_core.tasks.goal_sequence import goal_sequence
 
     the_robot = load_robot(robot)
     inside = read_area(area) or NO_AREA
@@ -117,7 +117,7 @@ def goals(
 def _single(place: tuple[float, ...], robot: Robot) -> GoalFile:
     """The one goal of --pose, which numbers of another kind of robot are not."""
     from fulmar_bringup.task_choice import whole_pose
-    from fulmar_core.goal_files import single_goal
+    from fulmar_core.tasks.goal_files import single_goal
 
     whole_pose(place, robot, "--pose")
     return single_goal(place, robot.state_type)

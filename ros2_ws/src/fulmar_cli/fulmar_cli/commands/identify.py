@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from fulmar_bringup.console import log_line, new_table, output, print_result, warn, write_line
 from fulmar_cli.commands.arguments import JsonOption, argument, option
-from fulmar_core.errors import ConfigError
+from fulmar_core.config.errors import ConfigError
 
 if TYPE_CHECKING:
-    from fulmar_core.identification.identify import Identified
-    from fulmar_core.robot import Robot
+    from fulmar_core.robots.robot import Robot
+    from fulmar_evaluation.identification.identify import Identified
 
 _NUMBER = r"[0-9]*\.?[0-9]+(?:[eE][-+]?[0-9]+)?"
 _QUANTITY = re.compile(rf"(?P<value>{_NUMBER})(?:(?:\+-|±)(?P<error>{_NUMBER}))?(?:\s*(?:kg|N|s|m|kg·m²))?")
@@ -49,11 +49,11 @@ def identify(
     Of a satellite the inertia is estimated from gyroscope and wheels, by three methods; there is no calibration of it.
     """
     from fulmar_cli.commands.identify_satellite import print_satellite
-    from fulmar_core.calibration import save_calibration
-    from fulmar_core.identification.identify import SIGMAS, Weight, calibration_of
-    from fulmar_core.identification.identify import identify as estimate
-    from fulmar_core.identification.model import Known
+    from fulmar_core.robots.calibration import save_calibration
     from fulmar_evaluation.driven_run import driven_run
+    from fulmar_evaluation.identification.identify import SIGMAS, Weight, calibration_of
+    from fulmar_evaluation.identification.identify import identify as estimate
+    from fulmar_evaluation.identification.model import Known
 
     if print_satellite(bags, given=bool(known or ballast or out), as_json=as_json):
         return

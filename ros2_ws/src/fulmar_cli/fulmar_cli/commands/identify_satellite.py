@@ -14,8 +14,8 @@ def print_satellite(bags: list[Path], *, given: bool, as_json: bool) -> bool:
     Raises:
         ConfigError: Options were `given`, of which a satellite has none.
     """
-    from fulmar_core.errors import ConfigError
-    from fulmar_core.robot import load_robot
+    from fulmar_core.config.errors import ConfigError
+    from fulmar_core.robots.robot_file import load_robot
     from fulmar_evaluation.satellite_identification import identify_satellite, robot_of_bag
 
     names = {robot_of_bag(bag) for bag in bags}

@@ -40,7 +40,7 @@ def import_policy(
 
     fulmar run turtlebot2 --task go_to_position --policy policies/imported
     """
-    from fulmar_core.robot import load_robot
+    from fulmar_core.robots.robot_file import load_robot
     from fulmar_core.tasks import load_task
     from policy_server.policy import Policy
     from training.import_policy import as_format

@@ -8,7 +8,7 @@ from typing import Annotated
 
 from fulmar_bringup.console import print_result, write_line
 from fulmar_cli.commands.arguments import JsonOption, NameOption, argument, flag, option
-from fulmar_core.errors import ConfigError
+from fulmar_core.config.errors import ConfigError
 
 STDOUT = "-"
 

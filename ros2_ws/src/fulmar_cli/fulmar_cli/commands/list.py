@@ -9,8 +9,8 @@ import typer
 
 from fulmar_bringup.console import log_line, output, print_json, write_line
 from fulmar_cli.commands.arguments import JsonOption, argument
-from fulmar_core.errors import FAILED, FulmarError, UnknownNameError
-from fulmar_core.paths import config_names
+from fulmar_core.config.errors import FAILED, FulmarError, UnknownNameError
+from fulmar_core.config.paths import config_names
 
 FAMILIES = (
     "robots", "tasks", "controllers", "systems", "policies", "goals", "hardware", "scenarios", "estimators",
@@ -67,12 +67,12 @@ def _show(found: dict[str, dict[str, str]]) -> None:
 def _family(family: str) -> tuple[list[str], Callable[[str], str]]:
     """Names of one family, and what loads one of them and gives its title."""
     from fulmar_bringup.system import load_system
-    from fulmar_core.disturbances.scenario import load_scenario
-    from fulmar_core.estimation.kinds import load_estimator
-    from fulmar_core.goal_files import load_goal_file
-    from fulmar_core.policy_bundle import read_passport
-    from fulmar_core.robot import load_robot
+    from fulmar_core.estimators.kinds import load_estimator
+    from fulmar_core.loop.policy_bundle import read_passport
+    from fulmar_core.robots.robot_file import load_robot
     from fulmar_core.tasks import load_task
+    from fulmar_core.tasks.goal_files import load_goal_file
+    from fulmar_core.worlds.scenario import load_scenario
     from hardware_drivers.hardware import load_hardware
     from policy_server.controllers import CONTROLLERS, policies_directory, shipped_policies
 

@@ -9,7 +9,7 @@ import typer
 
 from fulmar_bringup.console import print_json, write_line
 from fulmar_cli.commands.arguments import JsonOption, argument, flag, option
-from fulmar_core.errors import ConfigError
+from fulmar_core.config.errors import ConfigError
 
 new = typer.Typer(help="Make a robot's file from a few numbers.", no_args_is_help=True, rich_markup_mode=None)
 
@@ -42,7 +42,7 @@ def airframe(
 
     fulmar check robot my_craft.yaml
     """
-    from fulmar_core.config import load_config
+    from fulmar_core.config.strict_yaml import load_config
     from fulmar_evaluation.new_airframe.coefficient_set import coefficient_set
     from fulmar_evaluation.new_airframe.geometry import Geometry
     from fulmar_evaluation.new_airframe.robot_file import write_robot

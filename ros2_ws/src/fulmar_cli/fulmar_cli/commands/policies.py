@@ -9,7 +9,7 @@ import typer
 
 from fulmar_bringup.console import console, log_line, print_json, write_line
 from fulmar_cli.commands.arguments import JsonOption, argument, flag, invoked_command, option
-from fulmar_core.errors import FAILED, ConfigError, did_you_mean
+from fulmar_core.config.errors import FAILED, ConfigError, did_you_mean
 
 
 def policies(
@@ -33,7 +33,7 @@ def policies(
 
     fulmar policies kingfisher_go_to_pose --anew
     """
-    from fulmar_core.provenance import git_revision
+    from fulmar_core.config.provenance import git_revision
     from policy_server.controllers import policies_directory
     from training.executors import LocalExecutor
     from training.policies import expected_s, is_made, load_policy_table, make_policies, policy_job, set_aside

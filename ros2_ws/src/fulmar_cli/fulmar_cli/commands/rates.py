@@ -12,7 +12,7 @@ import typer
 from fulmar_bringup.console import log_line, print_result, write_line
 from fulmar_bringup.progress import work_bar
 from fulmar_cli.commands.arguments import JsonOption, argument, option
-from fulmar_core.errors import FAILED, ConfigError
+from fulmar_core.config.errors import FAILED, ConfigError
 
 if TYPE_CHECKING:
     from fulmar_evaluation.event_rates import Packet, Rates
@@ -51,8 +51,8 @@ def rates(
 
     fulmar rates night.aedat4 --to-bag runs/night
     """
-    from fulmar_cli.extras import require
-    from fulmar_core.robot import load_robot
+    from fulmar_cli.installation.extras import require
+    from fulmar_core.robots.robot_file import load_robot
     from fulmar_evaluation.event_rates import cameras_of, packets_of, rates_of
 
     require(*_modules(sources, plot))

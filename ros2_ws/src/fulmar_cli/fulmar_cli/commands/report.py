@@ -7,7 +7,7 @@ from typing import Annotated
 
 from fulmar_bringup.console import log_line, write_line
 from fulmar_cli.commands.arguments import argument, flag, option
-from fulmar_core.errors import BagError
+from fulmar_core.config.errors import BagError
 
 
 def report(

@@ -116,8 +116,8 @@ def run(
     """
     from fulmar_bringup.planning import plan_run
     from fulmar_bringup.task_choice import task_of_run
-    from fulmar_cli.extras import check_plan
-    from fulmar_core.robot import use_calibration
+    from fulmar_cli.installation.extras import check_plan
+    from fulmar_core.robots.robot_file import use_calibration
 
     use_calibration(calibration, robot)
     place = read_goal(goal, robot=robot)

@@ -57,7 +57,7 @@ def install(
 
     journalctl -fu fulmar-mujoco_lqr
     """
-    from fulmar_cli.service_plan import Wanted, plan_service
+    from fulmar_cli.installation.service_plan import Wanted, plan_service
 
     wanted = Wanted(system, robot, name, task, controller, backend, hardware, policy, recording, user)
     planned = plan_service(wanted, root, dry_run=dry_run)

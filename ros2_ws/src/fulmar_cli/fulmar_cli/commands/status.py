@@ -9,7 +9,7 @@ import typer
 
 from fulmar_bringup.console import console, output, print_json
 from fulmar_cli.commands.arguments import JsonOption, argument, option
-from fulmar_core.errors import DONE, FAILED, UnknownNameError
+from fulmar_core.config.errors import DONE, FAILED, UnknownNameError
 
 if TYPE_CHECKING:
     from fulmar_bringup.domain_status import NodeStatus, RobotStatus

@@ -9,9 +9,9 @@ import typer
 
 from fulmar_bringup.console import print_json, write_line
 from fulmar_cli.commands.arguments import JsonOption, argument
-from fulmar_core.errors import FAILED
-from fulmar_core.paths import config_names
-from fulmar_core.robot_name import checked_name
+from fulmar_core.config.errors import FAILED
+from fulmar_core.config.paths import config_names
+from fulmar_core.wires.robot_name import checked_name
 
 FIND_S, LOAD_S = 5.0, 20.0
 

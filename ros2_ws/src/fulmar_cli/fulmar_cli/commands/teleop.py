@@ -8,8 +8,8 @@ import typer
 
 from fulmar_bringup.console import write_line
 from fulmar_cli.commands.arguments import NameOption, RobotArgument, flag, option
-from fulmar_core.errors import FAILED, RunFailed
-from fulmar_core.robot_name import checked_name, namespace_of
+from fulmar_core.config.errors import FAILED, RunFailed
+from fulmar_core.wires.robot_name import checked_name, namespace_of
 
 
 def teleop(
@@ -38,8 +38,8 @@ def teleop(
     """
     from fulmar_bringup.operator_rows import teleop_spec
     from fulmar_bringup.processes import command_line
-    from fulmar_core.robot import load_robot
-    from fulmar_core.topics import GIVE_BACK
+    from fulmar_core.robots.robot_file import load_robot
+    from fulmar_core.robots.topics import GIVE_BACK
 
     load_robot(robot)  # rejects a wrong name
     name = robot if name is None else checked_name(name)

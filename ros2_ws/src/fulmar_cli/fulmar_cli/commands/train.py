@@ -18,8 +18,8 @@ from fulmar_cli.commands.arguments import (
     invoked_command,
     option,
 )
-from fulmar_cli.extras import require
-from fulmar_core.errors import FAILED, ConfigError
+from fulmar_cli.installation.extras import require
+from fulmar_core.config.errors import FAILED, ConfigError
 
 if TYPE_CHECKING:
     from training.jobs import Job

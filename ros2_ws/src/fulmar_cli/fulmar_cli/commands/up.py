@@ -16,7 +16,7 @@ from fulmar_bringup.progress import live_line
 from fulmar_cli.commands import arguments as cli
 from fulmar_cli.commands.arguments import argument, dated_folder, flag, option
 from fulmar_cli.commands.values import read_pose
-from fulmar_core.errors import DONE, FAILED
+from fulmar_core.config.errors import DONE, FAILED
 
 START_HELP = "Where a simulated robot begins, in space x,y,z[,roll,pitch,yaw]; the origin by default."
 SERVICE_HELP = (
@@ -88,7 +88,7 @@ def up(
     from fulmar_bringup.split_controller import keep_controller_up
     from fulmar_bringup.standing_system import keep_up, plan_system
     from fulmar_bringup.system import varied_system
-    from fulmar_cli.extras import check_plan
+    from fulmar_cli.installation.extras import check_plan
 
     chosen = varied_system(
         system, robot=robot, robot_name=name, task=task, controller=controller, backend=backend, hardware=hardware

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from fulmar_core.errors import ConfigError, UnknownNameError
+from fulmar_core.config.errors import ConfigError, UnknownNameError
 from fulmar_core.safety.geofence import check_area
 
 Area = tuple[float, ...]  # x_min, x_max, y_min, y_max, in space also z_min, z_max [m]
@@ -112,8 +112,8 @@ def _refuse_in_space(text: str, option: str, robot: str) -> None:
     Raises:
         ConfigError: The robot moves in space, or there is none of this name.
     """
-    from fulmar_core.planar import PlanarState
-    from fulmar_core.robot import load_robot  # loads NumPy: only for this message
+    from fulmar_core.robots.robot_file import load_robot
+    from fulmar_core.states.planar import PlanarState
 
     form = load_robot(robot).state_type
     if form is PlanarState:

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from fulmar_cli.diagnosis.check_result import Finding
 from fulmar_cli.diagnosis.installation import check_module
-from fulmar_core.errors import FulmarError
-from fulmar_core.paths import config_names
+from fulmar_core.config.errors import FulmarError
+from fulmar_core.config.paths import config_names
 
 PATTERNS = ("ttyUSB*", "ttyACM*", "ttyAMA*", "ttyTHS*", "gpiochip*")  # adapters, Raspberry Pi, Jetson
 PORTS = "ls -l /dev/serial/by-id /dev/gpiochip*   # and name one of them in the hardware file"

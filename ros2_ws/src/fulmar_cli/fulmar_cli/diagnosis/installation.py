@@ -8,11 +8,11 @@ from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 
 from fulmar_cli.diagnosis.check_result import Finding
-from fulmar_cli.extras import EXTRAS
-from fulmar_cli.installed_as import install_command, repair_command
-from fulmar_core.errors import FulmarError
-from fulmar_core.paths import config_directories, config_names
-from fulmar_core.robot import load_robot
+from fulmar_cli.installation.extras import EXTRAS
+from fulmar_cli.installation.installed_as import install_command, repair_command
+from fulmar_core.config.errors import FulmarError
+from fulmar_core.config.paths import config_directories, config_names
+from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.tasks import load_task
 
 OLDEST_PYTHON, NEWEST_PYTHON = (3, 11), (3, 14)
@@ -74,7 +74,7 @@ def check_configuration() -> Finding:
 def check_policies() -> Finding:
     """Whether every shipped policy loads and fits its robot and its task."""
     try:
-        from fulmar_core.policy_bundle import read_passport
+        from fulmar_core.loop.policy_bundle import read_passport
         from policy_server.controllers import shipped_policies
         from policy_server.policy import Policy
 

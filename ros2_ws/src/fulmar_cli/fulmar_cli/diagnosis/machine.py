@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from fulmar_cli.diagnosis.check_result import Finding
-from fulmar_core.process import PLANT_PRIORITY, RT_LIMIT
+from fulmar_core.config.process import PLANT_PRIORITY, RT_LIMIT
 
 LATE_MS = 2.0  # what a 50 Hz loop may be late at the 99th percentile
 FREE_BYTES = 1_000_000_000

@@ -6,11 +6,11 @@ from typing import Protocol
 
 import numpy as np
 
-from fulmar_core.actuators.pushing import WRENCH, Pushing
 from fulmar_core.controllers.opening_allocation import OpeningAllocation
 from fulmar_core.controllers.thrust_allocation import ThrustAllocation
 from fulmar_core.controllers.valve_allocation import ValveAllocation
-from fulmar_core.rotation import Array
+from fulmar_core.robots.actuators.pushing import WRENCH, Pushing
+from fulmar_core.states.rotation import Array
 
 
 class Allocation(Protocol):

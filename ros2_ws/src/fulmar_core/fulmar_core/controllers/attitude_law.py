@@ -12,12 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_core.actuators.reaction_wheels import ReactionWheels
-from fulmar_core.attitude import logarithm
 from fulmar_core.controllers.controller import Inputs
 from fulmar_core.controllers.law import Law
 from fulmar_core.controllers.space_frame import SpaceFrame, SpaceMotion
 from fulmar_core.controllers.target_motion import TargetMotion
+from fulmar_core.robots.actuators.reaction_wheels import ReactionWheels
+from fulmar_core.states.attitude import logarithm
 
 # Share of a wheel's momentum from which on it is unloaded, and down to which.
 UNLOAD_FROM, UNLOAD_TO = 0.5, 0.1

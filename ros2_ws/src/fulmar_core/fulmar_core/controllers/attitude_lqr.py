@@ -12,7 +12,7 @@ from fulmar_core.controllers.attitude_law import AttitudeGains, AttitudeLaw
 from fulmar_core.controllers.attitude_pd import attitude_bandwidth
 from fulmar_core.controllers.lqr import regulator
 from fulmar_core.controllers.space_frame import SpaceMotion
-from fulmar_core.robot import Robot
+from fulmar_core.robots.robot import Robot
 
 
 @dataclass(frozen=True, kw_only=True)

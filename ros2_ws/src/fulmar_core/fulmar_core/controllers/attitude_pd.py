@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fulmar_core.actuators.reaction_wheels import ReactionWheels
 from fulmar_core.controllers.attitude_law import AttitudeGains, AttitudeLaw
 from fulmar_core.controllers.controller import Inputs
 from fulmar_core.controllers.space_frame import SpaceMotion
-from fulmar_core.robot import Robot
+from fulmar_core.robots.actuators.reaction_wheels import ReactionWheels
+from fulmar_core.robots.robot import Robot
 
 BANDWIDTH = 0.3  # of the closed loop, at most; our value [rad/s]
 PRECISION = math.radians(2.0)  # error at which the full torque is asked for at least [rad]

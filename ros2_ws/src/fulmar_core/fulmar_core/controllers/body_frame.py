@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fulmar_core.controllers.controller import Inputs
-from fulmar_core.goal import offset_to
-from fulmar_core.planar import to_body, wrapped
-from fulmar_core.robot import Robot
+from fulmar_core.robots.robot import Robot
+from fulmar_core.states.planar import to_body, wrapped
 from fulmar_core.tasks import Task
 from fulmar_core.tasks.go_to_position_with_obstacles import GoToPositionWithObstacles
+from fulmar_core.tasks.goal import offset_to
 from fulmar_core.tasks.obstacles import FAR, SIGHT
 from fulmar_core.tasks.shortest_paths import TOUCHING
 

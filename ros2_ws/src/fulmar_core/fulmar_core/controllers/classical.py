@@ -10,9 +10,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from fulmar_core.actuators.families import FAMILIES
-from fulmar_core.actuators.pushing import WRENCH, Pushing
-from fulmar_core.config import load_config
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.config.paths import config_names, config_path
+from fulmar_core.config.strict_yaml import load_config
 from fulmar_core.controllers.allocation import check_allocation
 from fulmar_core.controllers.attitude_lqr import AttitudeLqr, AttitudeLqrWeights, attitude_lqr_weights
 from fulmar_core.controllers.attitude_pd import (
@@ -49,10 +49,10 @@ from fulmar_core.controllers.pure_pursuit import PurePursuit, PurePursuitGains
 from fulmar_core.controllers.space_gains import space_lqr_weights, space_pd_gains
 from fulmar_core.controllers.space_lqr import SpaceLqr, SpaceLqrWeights
 from fulmar_core.controllers.space_pd import SpacePd, SpacePdGains
-from fulmar_core.errors import ConfigError
-from fulmar_core.paths import config_names, config_path
-from fulmar_core.robot import Robot
-from fulmar_core.spatial import SpatialState
+from fulmar_core.robots.actuators.families import FAMILIES
+from fulmar_core.robots.actuators.pushing import WRENCH, Pushing
+from fulmar_core.robots.robot import Robot
+from fulmar_core.states.spatial import SpatialState
 from fulmar_core.tasks import Task
 
 POSITIONS = ("go_to_position", "go_to_position_with_obstacles", "go_through_positions", "race_waypoints")

@@ -7,10 +7,10 @@ from typing import Any, Generic, Protocol
 
 import numpy as np
 
-from fulmar_core.goal import Goal
-from fulmar_core.health.actuator_estimator import ActuatorEstimate
-from fulmar_core.health.filters import HealthSettings
-from fulmar_core.state import S
+from fulmar_core.estimators.actuator_health.actuator_estimator import ActuatorEstimate
+from fulmar_core.estimators.actuator_health.filters import HealthSettings
+from fulmar_core.states.state import S
+from fulmar_core.tasks.goal import Goal
 
 
 @dataclass(frozen=True, slots=True)

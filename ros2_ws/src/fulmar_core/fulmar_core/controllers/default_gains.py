@@ -15,18 +15,18 @@ from typing import TypeVar
 
 import numpy as np
 
-from fulmar_core.actuators.ackermann import GRIP, Ackermann
-from fulmar_core.actuators.differential_drive import DifferentialDrive
-from fulmar_core.actuators.propellers import Propellers
-from fulmar_core.actuators.pushing import Pushing
 from fulmar_core.controllers.line_of_sight import LineOfSightGains
 from fulmar_core.controllers.lqr import LqrWeights
 from fulmar_core.controllers.polar import PolarGains
 from fulmar_core.controllers.pure_pursuit import PurePursuitGains
-from fulmar_core.dynamics.hydrodynamics import GRAVITY
-from fulmar_core.health.filters import HealthSettings
-from fulmar_core.health.thruster_health import can_estimate_health
-from fulmar_core.robot import Robot
+from fulmar_core.estimators.actuator_health.filters import HealthSettings
+from fulmar_core.estimators.actuator_health.thruster_health import can_estimate_health
+from fulmar_core.robots.actuators.ackermann import GRIP, Ackermann
+from fulmar_core.robots.actuators.differential_drive import DifferentialDrive
+from fulmar_core.robots.actuators.propellers import Propellers
+from fulmar_core.robots.actuators.pushing import Pushing
+from fulmar_core.robots.robot import Robot
+from fulmar_core.states.gravity import GRAVITY
 
 Gains = TypeVar("Gains")
 # The LQR asks for full thrust at these errors: half of what the tasks tolerate [m], [rad].

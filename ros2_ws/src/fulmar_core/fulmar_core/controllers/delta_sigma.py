@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from fulmar_core.actuators.pushing import Pushing
 from fulmar_core.controllers.allocation import Allocation
-from fulmar_core.rotation import Array
+from fulmar_core.robots.actuators.pushing import Pushing
+from fulmar_core.states.rotation import Array
 
 
 class DeltaSigma:

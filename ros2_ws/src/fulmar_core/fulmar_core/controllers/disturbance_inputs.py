@@ -9,11 +9,11 @@ from __future__ import annotations
 import numpy as np
 
 from fulmar_core.controllers.controller import Inputs
-from fulmar_core.health.actuator_estimator import ActuatorEstimate
-from fulmar_core.health.filters import HealthSettings
-from fulmar_core.health.thruster_health import can_estimate_health
-from fulmar_core.observation import Observer
-from fulmar_core.robot import Robot
+from fulmar_core.estimators.actuator_health.actuator_estimator import ActuatorEstimate
+from fulmar_core.estimators.actuator_health.filters import HealthSettings
+from fulmar_core.estimators.actuator_health.thruster_health import can_estimate_health
+from fulmar_core.robots.robot import Robot
+from fulmar_core.tasks.observation import Observer
 
 PUSH_TERMS = ("push_x_in_body", "push_y_in_body", "push_torque")  # [N, N, N·m]
 # Networks learn on an estimator that takes no body for held and has no valve tried again.

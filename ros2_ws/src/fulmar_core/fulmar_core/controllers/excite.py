@@ -12,25 +12,24 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from fulmar_core.actuators.actuation import ActuationState
-from fulmar_core.actuators.excitation import Excitation
-from fulmar_core.actuators.families import FAMILIES
-from fulmar_core.attitude import length, minus, plus, scaled
 from fulmar_core.controllers.body_frame import BodyFrame
 from fulmar_core.controllers.controller import Inputs
 from fulmar_core.controllers.excite_wheels import TASKS as TURNING
 from fulmar_core.controllers.excite_wheels import ExciteWheels
 from fulmar_core.controllers.law import Law
+from fulmar_core.dynamics.actuators.actuation import ActuationState
+from fulmar_core.dynamics.dynamics_of import dynamics_of
 from fulmar_core.dynamics.linear_model import calm, nominal_worlds
-from fulmar_core.dynamics_of import dynamics_of
-from fulmar_core.excitation.settings import Torques
-from fulmar_core.identification.model import nominal_world
-from fulmar_core.motion import actuation_of, move
-from fulmar_core.planar import PlanarState
-from fulmar_core.robot import Robot
-from fulmar_core.spatial import SpatialState, position_of
-from fulmar_core.state import State
+from fulmar_core.dynamics.motion import actuation_of, move
+from fulmar_core.robots.actuators.excitation import Excitation
+from fulmar_core.robots.actuators.families import FAMILIES
+from fulmar_core.robots.robot import Robot
+from fulmar_core.states.attitude import length, minus, plus, scaled
+from fulmar_core.states.planar import PlanarState
+from fulmar_core.states.spatial import SpatialState, position_of
+from fulmar_core.states.state import State
 from fulmar_core.tasks import Task
+from fulmar_core.tasks.excitation import Torques
 
 TASKS = {  # kinds with one place to stay around
     PlanarState: ("go_to_position", "go_to_pose"),
@@ -77,7 +76,7 @@ class Excite(Law):
     def bind(self) -> None:
         """See `Law.bind`."""
         self._frame = BodyFrame(self.robot, self.task)
-        self._world: Any = nominal_world(self.robot)
+        self._world: Any = nominal_worlds(self.robot, 1)
 
     def reset(self) -> None:
         """Begin the sequence anew."""

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from fulmar_core.actuators.reaction_wheels import ReactionWheels
 from fulmar_core.controllers.controller import Inputs
 from fulmar_core.controllers.law import Law
-from fulmar_core.excitation.profiles import gain_of, profile_of
-from fulmar_core.excitation.settings import Torques
-from fulmar_core.robot import Robot
+from fulmar_core.robots.actuators.reaction_wheels import ReactionWheels
+from fulmar_core.robots.robot import Robot
 from fulmar_core.tasks import Task
+from fulmar_core.tasks.excitation import Torques
+from fulmar_core.tasks.torque_profiles import gain_of, profile_of
 
 TASKS = ("point",)
 PARTS = 20  # of a control period, over which the mean of a profile is taken

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from fulmar_core.attitude import from_euler, product, rotation_error
 from fulmar_core.controllers.controller import Inputs
 from fulmar_core.controllers.flight_law import FlightLaw
 from fulmar_core.controllers.flight_observer import ObserverNoise
 from fulmar_core.controllers.flight_reference import Aim, SmoothReference
-from fulmar_core.dynamics.hydrodynamics import GRAVITY
-from fulmar_core.flight.schedule import Schedule
-from fulmar_core.spatial import SpatialState
+from fulmar_core.dynamics.flight_schedule import Schedule
+from fulmar_core.states.attitude import from_euler, product, rotation_error
+from fulmar_core.states.gravity import GRAVITY
+from fulmar_core.states.spatial import SpatialState
 from fulmar_core.tasks.follow_reference import FollowReference
 
 

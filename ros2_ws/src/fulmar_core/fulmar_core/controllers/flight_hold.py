@@ -13,16 +13,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fulmar_core.attitude import Quaternion, euler_of, length, scaled, turn, turn_back
 from fulmar_core.controllers.controller import Inputs
 from fulmar_core.controllers.flight_law import FlightLaw
 from fulmar_core.controllers.flight_lqi import FlightWeights
 from fulmar_core.controllers.flight_servos import FlightServos
 from fulmar_core.controllers.lqr import regulator
-from fulmar_core.dynamics.hydrodynamics import GRAVITY
-from fulmar_core.flight.schedule import PLACE, SPEED, TURNED, between, flight_model
-from fulmar_core.flight.trim import Trim, find_trim
-from fulmar_core.spatial import SpatialState, quat_of
+from fulmar_core.dynamics.flight_schedule import PLACE, SPEED, TURNED, between, flight_model
+from fulmar_core.dynamics.flight_trim import Trim, find_trim
+from fulmar_core.states.attitude import Quaternion, euler_of, length, scaled, turn, turn_back
+from fulmar_core.states.gravity import GRAVITY
+from fulmar_core.states.spatial import SpatialState, quat_of
 from fulmar_core.tasks.flight_terms import angle_of_attack, tilt_error, up_in_body
 from fulmar_core.tasks.hold_flight import HoldAirspeed, HoldAttitude
 

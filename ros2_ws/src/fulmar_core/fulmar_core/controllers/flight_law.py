@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_core.actuators.control_surfaces import ControlSurfaces
 from fulmar_core.controllers.controller import Inputs
 from fulmar_core.controllers.flight_observer import FlightObserver, ObserverNoise
 from fulmar_core.controllers.law import Law
-from fulmar_core.flight.atmosphere import SEA_LEVEL
-from fulmar_core.spatial import SpatialState
+from fulmar_core.robots.actuators.control_surfaces import ControlSurfaces
+from fulmar_core.robots.airframe.atmosphere import SEA_LEVEL
+from fulmar_core.states.spatial import SpatialState
 
 
 class FlightLaw(Law):

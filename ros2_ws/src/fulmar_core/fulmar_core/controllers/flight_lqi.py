@@ -17,9 +17,9 @@ from fulmar_core.controllers.flight_observer import ObserverNoise
 from fulmar_core.controllers.flight_reference import Aim
 from fulmar_core.controllers.flight_servos import FlightServos
 from fulmar_core.controllers.lqr import regulator
-from fulmar_core.flight.schedule import FlightModel, Schedule
-from fulmar_core.robot import Robot
-from fulmar_core.spatial import SpatialState
+from fulmar_core.dynamics.flight_schedule import FlightModel, Schedule
+from fulmar_core.robots.robot import Robot
+from fulmar_core.states.spatial import SpatialState
 
 
 @dataclass(frozen=True)

@@ -19,8 +19,8 @@ from fulmar_core.controllers.flight_following import FlightFollowing
 from fulmar_core.controllers.flight_lqi import FlightLqr, FlightWeights, flight_lqr_weights
 from fulmar_core.controllers.flight_observer import ObserverNoise
 from fulmar_core.controllers.flight_rollouts import FlightCost, FlightRollouts
-from fulmar_core.robot import Robot
-from fulmar_core.spatial import SpatialState
+from fulmar_core.robots.robot import Robot
+from fulmar_core.states.spatial import SpatialState
 
 LONGEST_STEP_S = 0.04  # of the flights ahead, which servos and roll are too fast for beyond [s]
 SLOWEST_HZ = 20.0  # of plans

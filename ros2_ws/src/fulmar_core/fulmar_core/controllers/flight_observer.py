@@ -12,15 +12,23 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_core.attitude import euler_of, exponential, minus, normalised, plus, product, rotation_error
 from fulmar_core.controllers.controller import Inputs
 from fulmar_core.controllers.lqr import regulator
-from fulmar_core.flight.dynamics import FlightDynamics
-from fulmar_core.flight.schedule import MOTION, RATE, SPEED, flight_model
-from fulmar_core.flight.trim import find_trim, still_air
-from fulmar_core.motion import actuation_of
-from fulmar_core.robot import Robot
-from fulmar_core.spatial import SpatialState
+from fulmar_core.dynamics.flight_dynamics import FlightDynamics
+from fulmar_core.dynamics.flight_schedule import MOTION, RATE, SPEED, flight_model
+from fulmar_core.dynamics.flight_trim import find_trim, still_air
+from fulmar_core.dynamics.motion import actuation_of
+from fulmar_core.robots.robot import Robot
+from fulmar_core.states.attitude import (
+    euler_of,
+    exponential,
+    minus,
+    normalised,
+    plus,
+    product,
+    rotation_error,
+)
+from fulmar_core.states.spatial import SpatialState
 
 LEAST = (
     1e-4  # standard deviations of sensors below this count as this: a filter that trusts nothing else [SI]

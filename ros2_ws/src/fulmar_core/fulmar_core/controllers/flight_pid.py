@@ -15,8 +15,8 @@ import numpy as np
 from fulmar_core.controllers.controller import Inputs
 from fulmar_core.controllers.flight_following import FlightFollowing
 from fulmar_core.controllers.flight_observer import ObserverNoise
-from fulmar_core.dynamics.hydrodynamics import GRAVITY
-from fulmar_core.flight.schedule import Schedule
+from fulmar_core.dynamics.flight_schedule import Schedule
+from fulmar_core.states.gravity import GRAVITY
 
 PLACE, TURNED, SPEED, RATE, SUMS = (slice(0, 2), slice(2, 5), slice(5, 8), slice(8, 11), slice(11, 14))
 DEPARTURES = 14  # of `cascade`

@@ -14,13 +14,13 @@ from dataclasses import fields, replace
 
 import numpy as np
 
-from fulmar_core.actuators.control_surfaces import ControlSurfaces
 from fulmar_core.controllers.flight_observer import ObserverNoise
 from fulmar_core.controllers.flight_pid import SUMS, FlightPidGains, cascade
-from fulmar_core.flight.modes import continuous_model
-from fulmar_core.flight.schedule import MOTION, flight_model
-from fulmar_core.flight.trim import find_trim
-from fulmar_core.robot import Robot
+from fulmar_core.dynamics.flight_modes import continuous_model
+from fulmar_core.dynamics.flight_schedule import MOTION, flight_model
+from fulmar_core.dynamics.flight_trim import find_trim
+from fulmar_core.robots.actuators.control_surfaces import ControlSurfaces
+from fulmar_core.robots.robot import Robot
 
 SMALL = 1e-6  # departures that the cascade is linearised with
 DAMPED = 0.3  # least damping of oscillations of the craft with its loops [-]

@@ -9,16 +9,16 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_core.actuators.flight_actuation import FlightActuation
-from fulmar_core.attitude import length
 from fulmar_core.controllers.flight_lqi import FlightLqr
 from fulmar_core.controllers.flight_reference import Aim
-from fulmar_core.flight.dynamics import FlightDynamics
-from fulmar_core.flight.trim import still_air
-from fulmar_core.motion import actuation_of
-from fulmar_core.robot import Robot
-from fulmar_core.rotation import Array
-from fulmar_core.spatial import SpatialState
+from fulmar_core.dynamics.actuators.flight_actuation import FlightActuation
+from fulmar_core.dynamics.flight_dynamics import FlightDynamics
+from fulmar_core.dynamics.flight_trim import still_air
+from fulmar_core.dynamics.motion import actuation_of
+from fulmar_core.robots.robot import Robot
+from fulmar_core.states.attitude import length
+from fulmar_core.states.rotation import Array
+from fulmar_core.states.spatial import SpatialState
 from fulmar_core.tasks.flight_terms import angle_of_attack
 
 WORST = 1e12  # of a second of a flight that is no number [-]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fulmar_core.actuators.control_surfaces import ControlSurfaces
+from fulmar_core.robots.actuators.control_surfaces import ControlSurfaces
 
 
 class FlightServos:

@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_core.actuators.control_surfaces import ControlSurfaces
 from fulmar_core.controllers.flight_lqi import FlightLqi, FlightWeights
 from fulmar_core.controllers.lqr import regulator
-from fulmar_core.flight.schedule import PLACE, SPEED, TURNED, FlightModel, Schedule
-from fulmar_core.robot import Robot
+from fulmar_core.dynamics.flight_schedule import PLACE, SPEED, TURNED, FlightModel, Schedule
+from fulmar_core.robots.actuators.control_surfaces import ControlSurfaces
+from fulmar_core.robots.robot import Robot
 
 REPLACED = "rudder"  # the surface that motors apart from each other can replace
 # Of all level flights beside a surface the one is taken where this, the square of rotations, and the square of the

@@ -11,10 +11,10 @@ from typing import Any, ClassVar
 import numpy as np
 
 from fulmar_core.controllers.controller import Inputs
-from fulmar_core.health.filters import HealthSettings
-from fulmar_core.observation import Observer
-from fulmar_core.robot import Robot
+from fulmar_core.estimators.actuator_health.filters import HealthSettings
+from fulmar_core.robots.robot import Robot
 from fulmar_core.tasks import Task
+from fulmar_core.tasks.observation import Observer
 
 
 class Law(ABC):

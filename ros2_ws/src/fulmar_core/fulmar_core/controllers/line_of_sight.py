@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fulmar_core.actuators.propellers import Propellers
 from fulmar_core.controllers.body_frame import Vector
 from fulmar_core.controllers.controller import Inputs
 from fulmar_core.controllers.guidance import (
@@ -24,6 +23,7 @@ from fulmar_core.controllers.guidance import (
 )
 from fulmar_core.controllers.planar_law import PlanarLaw
 from fulmar_core.controllers.propeller_allocation import PropellerAllocation
+from fulmar_core.robots.actuators.propellers import Propellers
 
 
 @dataclass(frozen=True)

@@ -13,15 +13,15 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_core.actuators.pushing import Pushing
 from fulmar_core.controllers.allocation import allocation_of
 from fulmar_core.controllers.body_frame import BodyState, Vector
 from fulmar_core.controllers.controller import Inputs
-from fulmar_core.controllers.force_authority import ForceAuthority
 from fulmar_core.controllers.planar_law import PlanarLaw
 from fulmar_core.dynamics.linear_model import linearise_wrench
-from fulmar_core.health.filters import HealthSettings
-from fulmar_core.planar import at_rest
+from fulmar_core.estimators.actuator_health.filters import HealthSettings
+from fulmar_core.robots.actuators.force_authority import ForceAuthority
+from fulmar_core.robots.actuators.pushing import Pushing
+from fulmar_core.states.planar import at_rest
 
 
 @dataclass(frozen=True)

@@ -38,15 +38,15 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_core.actuators.pushing import PLANAR
-from fulmar_core.actuators.thrusters import Thrusters
 from fulmar_core.controllers.controller import Inputs
 from fulmar_core.controllers.lqr import regulator
 from fulmar_core.controllers.planar_law import PlanarLaw
 from fulmar_core.dynamics.free_body import free_body_step
 from fulmar_core.dynamics.linear_model import nominal_worlds, slopes
-from fulmar_core.planar import PlanarState
-from fulmar_core.rotation import wrap_angle
+from fulmar_core.robots.actuators.pushing import PLANAR
+from fulmar_core.robots.actuators.thrusters import Thrusters
+from fulmar_core.states.planar import PlanarState
+from fulmar_core.states.rotation import wrap_angle
 
 STEP, LEAST_STEP = 0.01, 1e-3  # differences of states, relative and at least; inputs: STEP
 SHORT = np.sqrt(0.5)  # of the negative difference of inputs

@@ -14,12 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_core.actuators.thrusters import Thrusters
 from fulmar_core.controllers.body_frame import BodyState
 from fulmar_core.controllers.controller import Inputs
 from fulmar_core.controllers.lqr import Lqr, LqrWeights
 from fulmar_core.controllers.planar_law import PlanarLaw
 from fulmar_core.controllers.valve_allocation import ValveAllocation
+from fulmar_core.robots.actuators.thrusters import Thrusters
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,8 @@ import itertools
 
 import numpy as np
 
-from fulmar_core.actuators.pushing import Pushing
-from fulmar_core.rotation import Array
+from fulmar_core.robots.actuators.pushing import Pushing
+from fulmar_core.states.rotation import Array
 
 MOST = 4  # corners in a mixture: one more than a wrench has numbers
 ROUNDING = 1e-9  # a part this far below 0 is 0, and costs this near to each other are equal

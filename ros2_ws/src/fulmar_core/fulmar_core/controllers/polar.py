@@ -14,7 +14,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fulmar_core.actuators.differential_drive import DifferentialDrive
 from fulmar_core.controllers.body_frame import Vector
 from fulmar_core.controllers.controller import Inputs
 from fulmar_core.controllers.guidance import (
@@ -24,6 +23,7 @@ from fulmar_core.controllers.guidance import (
     way_to_face,
 )
 from fulmar_core.controllers.planar_law import PlanarLaw
+from fulmar_core.robots.actuators.differential_drive import DifferentialDrive
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fulmar_core.actuators.propellers import Propellers
+from fulmar_core.robots.actuators.propellers import Propellers
 
 
 class PropellerAllocation:

@@ -16,7 +16,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fulmar_core.actuators.ackermann import Ackermann
 from fulmar_core.controllers.body_frame import Vector
 from fulmar_core.controllers.controller import Inputs
 from fulmar_core.controllers.guidance import (
@@ -26,6 +25,7 @@ from fulmar_core.controllers.guidance import (
     way_to_face,
 )
 from fulmar_core.controllers.planar_law import PlanarLaw
+from fulmar_core.robots.actuators.ackermann import Ackermann
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_core.attitude import Quaternion, Vector, conjugate, minus, product, turn, turn_back
 from fulmar_core.controllers.controller import Inputs
-from fulmar_core.spatial import SpatialState, position_of, quat_of
+from fulmar_core.states.attitude import Quaternion, Vector, conjugate, minus, product, turn, turn_back
+from fulmar_core.states.spatial import SpatialState, position_of, quat_of
 from fulmar_core.tasks import Task
 
 

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fulmar_core.actuators.pushing import Pushing
-from fulmar_core.attitude import even_directions
 from fulmar_core.controllers.space_lqr import SpaceLqrWeights
 from fulmar_core.controllers.space_pd import SpacePdGains
-from fulmar_core.robot import Robot
+from fulmar_core.robots.actuators.pushing import Pushing
+from fulmar_core.robots.robot import Robot
+from fulmar_core.states.attitude import even_directions
 
 PRECISION, TURN_PRECISION = 0.05, math.radians(5.0)  # errors at which full thrust is asked for [m], [rad]
 # Of the weakest force or torque, with one line that both share, and without; a push may have its part of the rest.

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fulmar_core.actuators.pushing import Pushing
 from fulmar_core.controllers.allocation import Allocation, allocation_of
 from fulmar_core.controllers.controller import Inputs
 from fulmar_core.controllers.delta_sigma import DeltaSigma
 from fulmar_core.controllers.law import Law
 from fulmar_core.controllers.space_frame import SpaceFrame, SpaceMotion
 from fulmar_core.controllers.target_motion import TargetMotion
+from fulmar_core.robots.actuators.pushing import Pushing
 
 
 @dataclass(frozen=True, kw_only=True)

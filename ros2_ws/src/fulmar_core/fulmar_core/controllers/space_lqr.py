@@ -12,12 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_core.attitude import logarithm
 from fulmar_core.controllers.lqr import regulator
 from fulmar_core.controllers.space_frame import SpaceMotion
 from fulmar_core.controllers.space_law import SpaceGains, SpaceLaw
 from fulmar_core.dynamics.linear_model import linearise_wrench
-from fulmar_core.spatial import SpatialState
+from fulmar_core.states.attitude import logarithm
+from fulmar_core.states.spatial import SpatialState
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fulmar_core.attitude import scaled
 from fulmar_core.controllers.space_frame import SpaceMotion
 from fulmar_core.controllers.space_law import SpaceGains, SpaceLaw
+from fulmar_core.states.attitude import scaled
 
 
 @dataclass(frozen=True, kw_only=True)

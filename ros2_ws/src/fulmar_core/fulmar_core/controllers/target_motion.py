@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fulmar_core.attitude import conjugate, logarithm, product
-from fulmar_core.spatial import quat_of
+from fulmar_core.states.attitude import conjugate, logarithm, product
+from fulmar_core.states.spatial import quat_of
 
 ROUNDING = 1.001  # of targets that move as fast as they may
 

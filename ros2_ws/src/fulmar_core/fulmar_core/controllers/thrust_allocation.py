@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fulmar_core.actuators.pushing import Pushing, wrench_columns
-from fulmar_core.rotation import Array
+from fulmar_core.robots.actuators.pushing import Pushing, wrench_columns
+from fulmar_core.states.rotation import Array
 
 LEAST_COST = (
     1e-6  # of full thrust, as a share of what missing an actuator's wrench costs: one solution, not many [-]

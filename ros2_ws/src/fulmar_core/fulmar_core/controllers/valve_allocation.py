@@ -12,8 +12,8 @@ import math
 
 import numpy as np
 
-from fulmar_core.actuators.pushing import WRENCH, Pushing, wrench_columns
-from fulmar_core.rotation import Array
+from fulmar_core.robots.actuators.pushing import WRENCH, Pushing, wrench_columns
+from fulmar_core.states.rotation import Array
 
 MOST_IN_TABLE = 2**16  # combinations; 16 valves take 0.2 ms a wrench, and more are searched for in less
 MOST_LISTED = 2**12  # for those who weigh every combination in every step

@@ -12,11 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fulmar_core.actuators.thrusters import Thrusters
-from fulmar_core.arrays import array_namespace
 from fulmar_core.controllers.valve_allocation import ValveAllocation
-from fulmar_core.robot import Robot
-from fulmar_core.rotation import Array
+from fulmar_core.robots.actuators.thrusters import Thrusters
+from fulmar_core.robots.robot import Robot
+from fulmar_core.states.arrays import array_namespace
+from fulmar_core.states.rotation import Array
 
 WRENCH = 3  # force ahead, to the left, and torque
 FULL_SHARE = 1.5  # what a share of 1 asks for, in units: beyond one of them only the direction matters [-]

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from fulmar_core.actuators.rolling import Rolling
-from fulmar_core.arrays import array_namespace, clip
-from fulmar_core.dynamics.hydrodynamics import GRAVITY
-from fulmar_core.planar import PlanarState, to_body
-from fulmar_core.robot import Robot
-from fulmar_core.rotation import Array
+from fulmar_core.robots.actuators.rolling import Rolling
+from fulmar_core.robots.robot import Robot
+from fulmar_core.states.arrays import array_namespace, clip
+from fulmar_core.states.gravity import GRAVITY
+from fulmar_core.states.planar import PlanarState, to_body
+from fulmar_core.states.rotation import Array
 
 
 @dataclass(frozen=True)

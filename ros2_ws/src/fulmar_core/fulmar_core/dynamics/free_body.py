@@ -6,11 +6,11 @@ world, where nothing but forces changes it; the body's own frame would need Cori
 
 from __future__ import annotations
 
-from fulmar_core.arrays import array_namespace
-from fulmar_core.disturbances.world import World
-from fulmar_core.dynamics.hydrodynamics import Hydrodynamics
-from fulmar_core.planar import PlanarState
-from fulmar_core.rotation import Array
+from fulmar_core.robots.hydrodynamics import Hydrodynamics
+from fulmar_core.states.arrays import array_namespace
+from fulmar_core.states.planar import PlanarState
+from fulmar_core.states.rotation import Array
+from fulmar_core.worlds.world import World
 
 Wrench = tuple[Array, Array, Array]  # forces along two axes [N] and yaw moment [N·m], shapes (...,)
 

@@ -17,11 +17,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fulmar_core.arrays import sum_of
-from fulmar_core.attitude import Vector, cross, minus, plus, turn
-from fulmar_core.dynamics.rigid_body import Inertia, Tensor, inertia_of, times, turned
-from fulmar_core.rotation import Array
-from fulmar_core.spatial import SpatialState
+from fulmar_core.dynamics.rigid_body import Inertia, inertia_of, turned
+from fulmar_core.states.arrays import sum_of
+from fulmar_core.states.attitude import Tensor, Vector, cross, minus, plus, times, turn
+from fulmar_core.states.rotation import Array
+from fulmar_core.states.spatial import SpatialState
 
 Speeds = tuple[Array, ...]  # one array of shape (...,) for each wheel
 

@@ -13,19 +13,28 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_core.actuators.rolling import Rolling
-from fulmar_core.attitude import Vector, exponential, minus, plus, product, rotation_error, turn, turn_back
-from fulmar_core.counter_rng import Draws
-from fulmar_core.disturbances.scenario import Scenario
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.dynamics.dynamics_of import dynamics_of
 from fulmar_core.dynamics.free_body import free_body_step
+from fulmar_core.dynamics.motion import actuation_of
 from fulmar_core.dynamics.rigid_body import inertia_of, rigid_body_step
-from fulmar_core.dynamics_of import dynamics_of
-from fulmar_core.errors import ConfigError
-from fulmar_core.motion import actuation_of
-from fulmar_core.planar import PlanarState
-from fulmar_core.robot import Robot
-from fulmar_core.spatial import SpatialState
-from fulmar_core.state import State
+from fulmar_core.robots.actuators.rolling import Rolling
+from fulmar_core.robots.robot import Robot
+from fulmar_core.states.attitude import (
+    Vector,
+    exponential,
+    minus,
+    plus,
+    product,
+    rotation_error,
+    turn,
+    turn_back,
+)
+from fulmar_core.states.counter_rng import Draws
+from fulmar_core.states.planar import PlanarState
+from fulmar_core.states.spatial import SpatialState
+from fulmar_core.states.state import State
+from fulmar_core.worlds.scenario import Scenario
 
 DELTA = 1e-4  # of states and inputs, in their own units and in shares of full command
 DEPARTURES = 12  # numbers of a departure in space

@@ -10,7 +10,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from fulmar_core.attitude import (
+from fulmar_core.states.attitude import (
+    Tensor,
     Vector,
     cross,
     dot,
@@ -20,15 +21,11 @@ from fulmar_core.attitude import (
     plus,
     product,
     scaled,
+    times,
     turn,
-    turn_back,
 )
-from fulmar_core.rotation import Array
-from fulmar_core.spatial import SpatialState
-
-Tensor = tuple[
-    Array, ...
-]  # entries xx, yy, zz, xy, xz, yz of a symmetric tensor, or the first three: the rest is zero
+from fulmar_core.states.rotation import Array
+from fulmar_core.states.spatial import SpatialState
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,15 +45,6 @@ def inertia_of(tensor: Tensor) -> Inertia:
     d, e, f = xz * yz - xy * zz, xy * yz - xz * yy, xy * xz - xx * yz
     share = 1.0 / (xx * a + xy * d + xz * e)
     return Inertia(tensor, tuple(share * entry for entry in (a, b, c, d, e, f)))
-
-
-def times(tensor: Tensor, vector: Vector) -> Vector:
-    """Symmetric tensor times vector."""
-    x, y, z = vector
-    if len(tensor) == 3:
-        return tensor[0] * x, tensor[1] * y, tensor[2] * z
-    xx, yy, zz, xy, xz, yz = tensor
-    return xx * x + xy * y + xz * z, xy * x + yy * y + yz * z, xz * x + yz * y + zz * z
 
 
 def turn_acceleration(rate: Vector, torque: Vector, inertia: Inertia) -> Vector:
@@ -176,22 +164,3 @@ def kinetic_energy(state: SpatialState, mass: Array, inertia: Inertia) -> Array:
 def angular_momentum_in_world(state: SpatialState, inertia: Inertia) -> Vector:
     """About the centre of mass [N·m·s]."""
     return turn(state.quat, times(inertia.tensor, state.rate))
-
-
-def gravity_gradient_torque(
-    state: SpatialState, tensor: Tensor, orbit_rate: Array | float, zenith: Vector | None = None
-) -> Vector:
-    """Torque of a planet's gravity, in the body's frame [N·m].
-
-    3 n² e × J e with e the unit vector from the planet (Wertz, Spacecraft Attitude Determination and Control, 1978,
-    eq. 17-34, circular orbit).
-
-    Args:
-        state: Of the centre of mass.
-        tensor: Inertia of the body about the centre of mass [kg·m²].
-        orbit_rate: n = √(μ/r³) [rad/s].
-        zenith: e in the world; along its z by default.
-    """
-    zero = 0.0 * state.x
-    e = turn_back(state.quat, zenith or (zero, zero, zero + 1.0))
-    return scaled(3.0 * orbit_rate**2, cross(e, times(tensor, e)))

@@ -6,12 +6,12 @@ allow. A push from outside only counts along the way the wheels roll, and only w
 
 from __future__ import annotations
 
-from fulmar_core.actuators.rolling import Rolling
-from fulmar_core.arrays import array_namespace, clip
-from fulmar_core.disturbances.world import World
 from fulmar_core.dynamics.free_body import Wrench
-from fulmar_core.planar import PlanarState
-from fulmar_core.rotation import Array
+from fulmar_core.robots.actuators.rolling import Rolling
+from fulmar_core.states.arrays import array_namespace, clip
+from fulmar_core.states.planar import PlanarState
+from fulmar_core.states.rotation import Array
+from fulmar_core.worlds.world import World
 
 
 def rolling_step(
@@ -44,7 +44,7 @@ def rolling_step(
     most = drive.pull / world.mass
     along = (c * outside[0] + s * outside[1]) / world.mass
     speed = speed + dt * clip((wanted - speed) / drive.servo_s, along - most, along + most)
-    yaw_rate = drive.next_yaw_rate(state, speed, target[1] * gain[1], outside[2], world, dt)
+    yaw_rate = drive.next_yaw_rate(state, speed, target[1] * gain[1], outside[2], world.yaw_inertia, dt)
     yaw = state.yaw + dt * yaw_rate
     c, s = xp.cos(yaw), xp.sin(yaw)
     vx, vy = speed * c, speed * s

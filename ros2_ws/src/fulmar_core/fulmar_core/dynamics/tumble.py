@@ -21,7 +21,7 @@ from fulmar_core.dynamics.rigid_body import (
     kinetic_energy,
     rigid_body_step,
 )
-from fulmar_core.spatial import SpatialState
+from fulmar_core.states.spatial import SpatialState
 
 MOMENTS = (1.0, 2.0, 3.0)  # of the body [kg·m²]
 RATE = 0.3  # length of the turn rate at the start [rad/s]

@@ -7,12 +7,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fulmar_core.actuators.family import Actuators
-from fulmar_core.actuators.refuge import Refuge
+from fulmar_core.robots.actuators.family import Actuators
+from fulmar_core.robots.actuators.refuge import Refuge
 from fulmar_core.safety.command_gate import OneWriter, command_problem, name_problem
 from fulmar_core.safety.estop import EstopMonitor
 from fulmar_core.safety.watchdog import Watchdog
-from fulmar_core.state import RigidBodyState
+from fulmar_core.states.state import RigidBodyState
 
 LAST_WORDS_NS = 200_000_000  # so long after a person gave back, safe commands by hand may be under way
 # A wing that follows its last command for as long as a watchdog waits may be in the water by then. Its safe controller

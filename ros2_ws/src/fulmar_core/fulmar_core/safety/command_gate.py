@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fulmar_core.errors import shortened
+from fulmar_core.config.errors import shortened
 
 REJECTIONS_TO_LATCH = 3
 

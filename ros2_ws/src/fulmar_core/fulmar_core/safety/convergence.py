@@ -9,12 +9,12 @@ from dataclasses import replace
 import numpy as np
 
 from fulmar_core.controllers.controller import Inputs
-from fulmar_core.goal import Goal
-from fulmar_core.health.applied import AppliedHistory
-from fulmar_core.robot import Robot
-from fulmar_core.rotation import Array
-from fulmar_core.state import State
+from fulmar_core.estimators.actuator_health.applied import AppliedHistory
+from fulmar_core.robots.robot import Robot
+from fulmar_core.states.rotation import Array
+from fulmar_core.states.state import State
 from fulmar_core.tasks import Task
+from fulmar_core.tasks.goal import Goal
 from fulmar_core.tasks.terms import Errors
 
 SLACK = 2.0  # errors up to so many tolerances are no reason to stop: noise and steady pushes hold robots there [-]

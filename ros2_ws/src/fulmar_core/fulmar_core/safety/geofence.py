@@ -6,10 +6,10 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
-from fulmar_core.errors import ConfigError
+from fulmar_core.config.errors import ConfigError
 
 if TYPE_CHECKING:  # the command line checks areas without loading NumPy
-    from fulmar_core.robot import Robot
+    from fulmar_core.robots.robot import Robot
     from fulmar_core.tasks import Task
 
 NO_AREA = (0.0, 0.0, 0.0, 0.0)  # an area without extent stands for none

@@ -7,15 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fulmar_core.robot import Limits
+from fulmar_core.robots.robot import Limits
+from fulmar_core.robots.sensors.odometer import OdometrySpec
+from fulmar_core.robots.sensors.repetition import FROZEN_AFTER, RepetitionCheck
 from fulmar_core.safety.motion_agreement import MotionAgreement
-from fulmar_core.sensors.odometer import OdometrySpec
-from fulmar_core.sensors.repetition import FROZEN_AFTER, RepetitionCheck
-from fulmar_core.state import RigidBodyState
+from fulmar_core.states.state import RigidBodyState
+from fulmar_core.wires.reading import BACK_NS, FORWARD_NS
 
-BACK_NS = 1_000_000_000  # further back than this is no reordering: whoever measures has begun again
 JUMP_M = 1.0  # beyond what speed explains: a correction of a fix or of a filter is less
-FORWARD_NS = 10_000_000_000  # further ahead than this is no gap: it is another clock, or one wrong stamp
 FROZEN = "odom does not change: its source is stuck"
 CONTRADICTION = (
     "odom contradicts itself: its pose does not move as its twist says. One of them stands or drifts"

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fulmar_core.rotation import multiply
-from fulmar_core.sensors.odometer import Channel, OdometrySpec
-from fulmar_core.state import RigidBodyState
+from fulmar_core.robots.sensors.odometer import Channel, OdometrySpec
+from fulmar_core.states.rotation import multiply
+from fulmar_core.states.state import RigidBodyState
 
 WINDOW_NS = 20_000_000_000  # how far back is compared
 SHORT_NS = 1_000_000_000  # the nearer of two times that are compared

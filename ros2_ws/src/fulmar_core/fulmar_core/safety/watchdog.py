@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fulmar_core.errors import SafetyError
+from fulmar_core.config.errors import SafetyError
 
 SHORTEST_S = 0.2
 LONGEST_S = 0.5

@@ -8,12 +8,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import cast
 
-from fulmar_core.config import load_config
-from fulmar_core.errors import ConfigError
-from fulmar_core.own_class import is_own
-from fulmar_core.paths import config_path
-from fulmar_core.plausibility import check_plausible
-from fulmar_core.plausible_ranges import TASK
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.config.own_class import is_own
+from fulmar_core.config.paths import config_path
+from fulmar_core.config.plausibility import check_plausible
+from fulmar_core.config.plausible_ranges import TASK
+from fulmar_core.config.strict_yaml import load_config
 from fulmar_core.tasks.follow_reference import FollowReference
 from fulmar_core.tasks.go_to_pose import GoToPose
 from fulmar_core.tasks.go_to_pose_3d import GoToPose3d

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 
-from fulmar_core.arrays import array_namespace, clip
-from fulmar_core.attitude import Quaternion, Vector, cross, dot, length, scaled, turn_back
-from fulmar_core.errors import ConfigError
-from fulmar_core.robot import Robot
-from fulmar_core.rotation import Array
-from fulmar_core.spatial import SpatialState
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.robots.robot import Robot
+from fulmar_core.states.arrays import array_namespace, clip
+from fulmar_core.states.attitude import Quaternion, Vector, cross, dot, length, scaled, turn_back
+from fulmar_core.states.rotation import Array
+from fulmar_core.states.spatial import SpatialState
 
 
 def is_lost(state: SpatialState, robot: Robot) -> Array:

@@ -9,16 +9,16 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from fulmar_core.arrays import array_namespace, clip
-from fulmar_core.attitude import euler_of, exponential, length, product, scaled, uniform_direction
-from fulmar_core.counter_rng import Draws
-from fulmar_core.flight.trim import find_trim
-from fulmar_core.goal import Goal, no_obstacles
-from fulmar_core.references.flight_paths import PATHS, through
-from fulmar_core.robot import Robot
-from fulmar_core.rotation import Array
-from fulmar_core.spatial import SpatialState
+from fulmar_core.dynamics.flight_trim import find_trim
+from fulmar_core.robots.robot import Robot
+from fulmar_core.states.arrays import array_namespace, clip
+from fulmar_core.states.attitude import euler_of, exponential, length, product, scaled, uniform_direction
+from fulmar_core.states.counter_rng import Draws
+from fulmar_core.states.rotation import Array
+from fulmar_core.states.spatial import SpatialState
 from fulmar_core.tasks.flight_terms import angle_of_attack, check_above_ground, is_lost
+from fulmar_core.tasks.goal import Goal, no_obstacles
+from fulmar_core.tasks.references.flight_paths import PATHS, through
 from fulmar_core.tasks.task import Task
 from fulmar_core.tasks.terms import Errors, Tolerance, weighted_sum
 
@@ -80,7 +80,7 @@ class FollowReference(Task[SpatialState]):
     start: FlightStart
     tolerance: Tolerance
     reward_weights: FlightReward
-    # "hold", one of `references.flight_paths.PATHS`, or through the waypoints of the file
+    # "hold", one of `tasks.references.flight_paths.PATHS`, or through the waypoints of the file
     reference: Literal["hold", "a", "b", "c", "d", "e", "f", "waypoints"] = "hold"
     height: Range = (1.0, 1.0)  # that `hold` draws from [m]
     spacing_s: float = 0.1  # between two places of the path [s]

@@ -6,12 +6,12 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
-from fulmar_core.arrays import array_namespace, clip
-from fulmar_core.counter_rng import Draws
-from fulmar_core.goal import Goal, goals_at
-from fulmar_core.planar import PlanarState, wrapped
-from fulmar_core.robot import Robot
-from fulmar_core.rotation import Array
+from fulmar_core.robots.robot import Robot
+from fulmar_core.states.arrays import array_namespace, clip
+from fulmar_core.states.counter_rng import Draws
+from fulmar_core.states.planar import PlanarState, wrapped
+from fulmar_core.states.rotation import Array
+from fulmar_core.tasks.goal import Goal, goals_at
 from fulmar_core.tasks.task import Task
 from fulmar_core.tasks.terms import (
     FINE_TERMS,

@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
-from fulmar_core.arrays import array_namespace
-from fulmar_core.counter_rng import Draws
-from fulmar_core.goal import Goal, goals_at
-from fulmar_core.robot import Robot
-from fulmar_core.rotation import Array
-from fulmar_core.spatial import SpatialState
+from fulmar_core.robots.robot import Robot
+from fulmar_core.states.arrays import array_namespace
+from fulmar_core.states.counter_rng import Draws
+from fulmar_core.states.rotation import Array
+from fulmar_core.states.spatial import SpatialState
+from fulmar_core.tasks.goal import Goal, goals_at
 from fulmar_core.tasks.space_terms import (
     ATTITUDE_TERMS,
     FINE_ATTITUDE_TERMS,

@@ -6,13 +6,13 @@ import functools
 from dataclasses import dataclass, replace
 from typing import ClassVar, Literal
 
-from fulmar_core.arrays import array_namespace, clip
-from fulmar_core.counter_rng import Draws
-from fulmar_core.goal import Goal, offset_to
-from fulmar_core.planar import PlanarState, to_body
-from fulmar_core.robot import Robot
-from fulmar_core.rotation import Array
+from fulmar_core.robots.robot import Robot
+from fulmar_core.states.arrays import array_namespace, clip
+from fulmar_core.states.counter_rng import Draws
+from fulmar_core.states.planar import PlanarState, to_body
+from fulmar_core.states.rotation import Array
 from fulmar_core.tasks.go_to_position import GoToPosition, PositionReward
+from fulmar_core.tasks.goal import Goal, offset_to
 from fulmar_core.tasks.obstacles import TOUCH, Obstacles, clearance
 from fulmar_core.tasks.shortest_paths import shortest_way
 from fulmar_core.tasks.task import Task

@@ -9,8 +9,10 @@ from typing import ClassVar, Literal, Self
 
 import numpy as np
 
-from fulmar_core.arrays import array_namespace, clip
-from fulmar_core.attitude import (
+from fulmar_core.dynamics.flight_trim import Trim, find_trim
+from fulmar_core.robots.robot import Robot
+from fulmar_core.states.arrays import array_namespace, clip
+from fulmar_core.states.attitude import (
     euler_of,
     exponential,
     from_euler,
@@ -20,13 +22,11 @@ from fulmar_core.attitude import (
     turn,
     uniform_direction,
 )
-from fulmar_core.counter_rng import Draws
-from fulmar_core.flight.trim import Trim, find_trim
-from fulmar_core.goal import Goal, goals_at
-from fulmar_core.robot import Robot
-from fulmar_core.rotation import Array
-from fulmar_core.spatial import SpatialState, quat_of
+from fulmar_core.states.counter_rng import Draws
+from fulmar_core.states.rotation import Array
+from fulmar_core.states.spatial import SpatialState, quat_of
 from fulmar_core.tasks.flight_terms import angle_of_attack, check_above_ground, is_lost, tilt_error
+from fulmar_core.tasks.goal import Goal, goals_at
 from fulmar_core.tasks.task import Task
 from fulmar_core.tasks.terms import Errors, Tolerance, weighted_sum
 

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from array_api_compat import device
 
-from fulmar_core.arrays import array_namespace, clip
-from fulmar_core.counter_rng import Draws
 from fulmar_core.dynamics.contact import outline_of
-from fulmar_core.planar import PlanarState, to_body
-from fulmar_core.robot import Robot
-from fulmar_core.rotation import Array
+from fulmar_core.robots.robot import Robot
+from fulmar_core.states.arrays import array_namespace, clip
+from fulmar_core.states.counter_rng import Draws
+from fulmar_core.states.planar import PlanarState, to_body
+from fulmar_core.states.rotation import Array
 from fulmar_core.tasks.shortest_paths import survey
 
 CANDIDATES = 8  # places tried for each obstacle; one that fits nowhere is left out

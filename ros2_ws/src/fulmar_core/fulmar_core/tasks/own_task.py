@@ -15,20 +15,20 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_core.arrays import array_namespace
-from fulmar_core.counter_rng import START, Draws
-from fulmar_core.errors import ConfigError, TaskError, did_you_mean
-from fulmar_core.goal import Goal
-from fulmar_core.own_class import construct, load_class, one_line, settings_beside, source_of
-from fulmar_core.planar import PlanarState
-from fulmar_core.robot import Robot
-from fulmar_core.rotation import Array
-from fulmar_core.spatial import SpatialState
-from fulmar_core.state import State
+from fulmar_core.config.errors import ConfigError, TaskError, did_you_mean
+from fulmar_core.config.own_class import construct, load_class, one_line, settings_beside, source_of
+from fulmar_core.dynamics.things import Thing
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.topics import GOAL_WIRES
+from fulmar_core.states.arrays import array_namespace
+from fulmar_core.states.counter_rng import START, Draws
+from fulmar_core.states.planar import PlanarState
+from fulmar_core.states.rotation import Array
+from fulmar_core.states.spatial import SpatialState
+from fulmar_core.states.state import State
+from fulmar_core.tasks.goal import Goal
 from fulmar_core.tasks.task import Task
 from fulmar_core.tasks.terms import Errors, Tolerance
-from fulmar_core.things import Thing
-from fulmar_core.topics import GOAL_WIRES
 
 METHODS = ("draw", "observe", "reward", "errors")
 ATTRIBUTES = ("episode_s", "tolerance", "goal_topic", "observation_names")
@@ -74,9 +74,9 @@ def load_own_task(path: str) -> OwnTask:
         (
             getattr(own, "state_type", PlanarState) in (PlanarState, SpatialState),
             "state_type",
-            "fulmar_core.planar.PlanarState or fulmar_core.spatial.SpatialState",
+            "fulmar_core.states.planar.PlanarState or fulmar_core.states.spatial.SpatialState",
         ),
-        (_are_things(things), "things", "a tuple of fulmar_core.things.Thing, no name twice"),
+        (_are_things(things), "things", "a tuple of fulmar_core.dynamics.things.Thing, no name twice"),
         (isinstance(own.tolerance, Tolerance), "tolerance", "a fulmar_core.tasks.terms.Tolerance"),
         (_are_names(names), "observation_names", "a tuple of names, none of them twice"),
         (

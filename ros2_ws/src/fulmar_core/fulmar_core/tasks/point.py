@@ -6,8 +6,9 @@ import math
 from dataclasses import dataclass, replace
 from typing import ClassVar, Literal
 
-from fulmar_core.arrays import array_namespace
-from fulmar_core.attitude import (
+from fulmar_core.robots.robot import Robot
+from fulmar_core.states.arrays import array_namespace
+from fulmar_core.states.attitude import (
     angle_between,
     exponential,
     length,
@@ -18,11 +19,10 @@ from fulmar_core.attitude import (
     uniform_attitude,
     uniform_direction,
 )
-from fulmar_core.counter_rng import Draws
-from fulmar_core.goal import Goal, goals_at
-from fulmar_core.robot import Robot
-from fulmar_core.rotation import Array
-from fulmar_core.spatial import SpatialState, quat_of
+from fulmar_core.states.counter_rng import Draws
+from fulmar_core.states.rotation import Array
+from fulmar_core.states.spatial import SpatialState, quat_of
+from fulmar_core.tasks.goal import Goal, goals_at
 from fulmar_core.tasks.space_terms import (
     ATTITUDE_TERMS,
     FINE_ATTITUDE_TERMS,
@@ -68,7 +68,7 @@ class Point(Task[SpatialState]):
     """Hold the attitude of a goal on `goal_pose`, whose place does not count.
 
     With an orbit rate the wanted attitude turns about the world's y from the moment when the goal arrives, as the way
-    to the planet does (`disturbances.spatial_world.zenith`): what points to the nadir then goes on pointing there.
+    to the planet does (`worlds.spatial_world.zenith`): what points to the nadir then goes on pointing there.
     """
 
     kind: Literal["point"]

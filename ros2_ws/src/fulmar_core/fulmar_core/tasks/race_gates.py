@@ -7,12 +7,12 @@ from typing import ClassVar, Literal, Self
 
 import numpy as np
 
-from fulmar_core.arrays import array_namespace
-from fulmar_core.counter_rng import Draws
-from fulmar_core.goal import Goal
-from fulmar_core.planar import PlanarState, to_body
-from fulmar_core.robot import Robot
-from fulmar_core.rotation import Array
+from fulmar_core.robots.robot import Robot
+from fulmar_core.states.arrays import array_namespace
+from fulmar_core.states.counter_rng import Draws
+from fulmar_core.states.planar import PlanarState, to_body
+from fulmar_core.states.rotation import Array
+from fulmar_core.tasks.goal import Goal
 from fulmar_core.tasks.terms import Errors, pose_errors
 from fulmar_core.tasks.waypoint_courses import RaceTrack
 from fulmar_core.tasks.waypoint_tasks import WaypointReward, WaypointTask, bearing_of, newly_done, path_terms

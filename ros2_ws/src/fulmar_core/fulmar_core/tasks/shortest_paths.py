@@ -13,8 +13,8 @@ import math
 
 import numpy as np
 
-from fulmar_core.arrays import array_namespace, clip
-from fulmar_core.rotation import Array
+from fulmar_core.states.arrays import array_namespace, clip
+from fulmar_core.states.rotation import Array
 
 CORNERS = 8  # of the polygons around discs from which ways are measured
 BLOCKED = 10.0  # metres of detour that are worth not to cross a disc [m]

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from fulmar_core.arrays import array_namespace, clip
-from fulmar_core.attitude import (
+from fulmar_core.states.arrays import array_namespace, clip
+from fulmar_core.states.attitude import (
     Vector,
     angle_between,
     conjugate,
@@ -19,9 +19,9 @@ from fulmar_core.attitude import (
     uniform_attitude,
     uniform_direction,
 )
-from fulmar_core.counter_rng import Draws
-from fulmar_core.rotation import Array
-from fulmar_core.spatial import SpatialState, position_of, quat_of
+from fulmar_core.states.counter_rng import Draws
+from fulmar_core.states.rotation import Array
+from fulmar_core.states.spatial import SpatialState, position_of, quat_of
 from fulmar_core.tasks.terms import Errors, Start
 
 AXES = ("x", "y", "z")

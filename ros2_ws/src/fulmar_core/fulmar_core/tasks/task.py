@@ -5,16 +5,16 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING, ClassVar, Generic, Self
 
-from fulmar_core.counter_rng import Draws
-from fulmar_core.errors import ConfigError
-from fulmar_core.goal import Goal, goal_at
-from fulmar_core.paths import config_names
-from fulmar_core.planar import PlanarState
-from fulmar_core.robot import Robot
-from fulmar_core.rotation import Array
-from fulmar_core.state import S, State
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.config.paths import config_names
+from fulmar_core.dynamics.things import Thing
+from fulmar_core.robots.robot import Robot
+from fulmar_core.states.counter_rng import Draws
+from fulmar_core.states.planar import PlanarState
+from fulmar_core.states.rotation import Array
+from fulmar_core.states.state import S, State
+from fulmar_core.tasks.goal import Goal, goal_at
 from fulmar_core.tasks.terms import Errors, Tolerance
-from fulmar_core.things import Thing
 
 
 class Task(ABC, Generic[S]):
@@ -49,7 +49,7 @@ class Task(ABC, Generic[S]):
 
         @property
         def goal_topic(self) -> str:
-            """One of `fulmar_core.topics.GOAL_WIRES`."""
+            """One of `fulmar_core.robots.topics.GOAL_WIRES`."""
 
         @property
         def observation_names(self) -> tuple[str, ...]:

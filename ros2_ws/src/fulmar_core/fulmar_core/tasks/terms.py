@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fulmar_core.arrays import array_namespace, clip
-from fulmar_core.counter_rng import Draws
-from fulmar_core.goal import offset_to
-from fulmar_core.planar import PlanarState, at_rest, to_body, wrapped
-from fulmar_core.rotation import Array
+from fulmar_core.states.arrays import array_namespace, clip
+from fulmar_core.states.counter_rng import Draws
+from fulmar_core.states.planar import PlanarState, at_rest, to_body, wrapped
+from fulmar_core.states.rotation import Array
+from fulmar_core.tasks.goal import offset_to
 
 Range = tuple[float, float]
 

@@ -8,12 +8,12 @@ from typing import Any, ClassVar, Literal
 
 from array_api_compat import device
 
-from fulmar_core.arrays import array_namespace, clip
-from fulmar_core.counter_rng import Draws
-from fulmar_core.goal import Goal, no_obstacles
-from fulmar_core.planar import PlanarState, at_rest
-from fulmar_core.robot import Robot
-from fulmar_core.rotation import Array
+from fulmar_core.robots.robot import Robot
+from fulmar_core.states.arrays import array_namespace, clip
+from fulmar_core.states.counter_rng import Draws
+from fulmar_core.states.planar import PlanarState, at_rest
+from fulmar_core.states.rotation import Array
+from fulmar_core.tasks.goal import Goal, no_obstacles
 from fulmar_core.tasks.task import Task
 from fulmar_core.tasks.terms import MOTION_TERMS, Errors, Tolerance, motion_terms
 

@@ -6,13 +6,13 @@ import math
 from dataclasses import dataclass, replace
 from typing import ClassVar, Literal
 
-from fulmar_core.arrays import array_namespace, clip
-from fulmar_core.attitude import Vector, length, minus, scaled, uniform_attitude, uniform_direction
-from fulmar_core.counter_rng import Draws
-from fulmar_core.goal import Goal, no_obstacles
-from fulmar_core.robot import Robot
-from fulmar_core.rotation import Array
-from fulmar_core.spatial import SpatialState
+from fulmar_core.robots.robot import Robot
+from fulmar_core.states.arrays import array_namespace, clip
+from fulmar_core.states.attitude import Vector, length, minus, scaled, uniform_attitude, uniform_direction
+from fulmar_core.states.counter_rng import Draws
+from fulmar_core.states.rotation import Array
+from fulmar_core.states.spatial import SpatialState
+from fulmar_core.tasks.goal import Goal, no_obstacles
 from fulmar_core.tasks.space_terms import AXES, MOTION_TERMS, motion_terms
 from fulmar_core.tasks.task import Task
 from fulmar_core.tasks.terms import Errors, Tolerance

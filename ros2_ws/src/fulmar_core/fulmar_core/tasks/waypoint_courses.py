@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fulmar_core.counter_rng import Draws
-from fulmar_core.references.race_track import draw_corners
+from fulmar_core.states.counter_rng import Draws
+from fulmar_core.tasks.references.race_track import draw_corners
 
 CANDIDATES = 12  # places tried for each waypoint, then their mirror images; all fail for 2 in 100,000
 

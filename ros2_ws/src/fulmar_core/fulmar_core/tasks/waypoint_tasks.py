@@ -9,12 +9,12 @@ from typing import ClassVar, Literal, Self
 
 import numpy as np
 
-from fulmar_core.arrays import array_namespace, clip
-from fulmar_core.counter_rng import Draws
-from fulmar_core.goal import Goal, no_obstacles
-from fulmar_core.planar import PlanarState, at_rest, to_body, wrapped
-from fulmar_core.robot import Robot
-from fulmar_core.rotation import Array
+from fulmar_core.robots.robot import Robot
+from fulmar_core.states.arrays import array_namespace, clip
+from fulmar_core.states.counter_rng import Draws
+from fulmar_core.states.planar import PlanarState, at_rest, to_body, wrapped
+from fulmar_core.states.rotation import Array
+from fulmar_core.tasks.goal import Goal, no_obstacles
 from fulmar_core.tasks.task import Task
 from fulmar_core.tasks.terms import (
     MOTION_TERMS,

@@ -8,13 +8,13 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from fulmar_core.arrays import array_namespace, clip
-from fulmar_core.attitude import length, scaled, uniform_attitude, uniform_direction
-from fulmar_core.counter_rng import Draws
-from fulmar_core.goal import Goal, no_obstacles
-from fulmar_core.robot import Robot
-from fulmar_core.rotation import Array
-from fulmar_core.spatial import SpatialState
+from fulmar_core.robots.robot import Robot
+from fulmar_core.states.arrays import array_namespace, clip
+from fulmar_core.states.attitude import length, scaled, uniform_attitude, uniform_direction
+from fulmar_core.states.counter_rng import Draws
+from fulmar_core.states.rotation import Array
+from fulmar_core.states.spatial import SpatialState
+from fulmar_core.tasks.goal import Goal, no_obstacles
 from fulmar_core.tasks.space_terms import (
     ATTITUDE_TERMS,
     AXES,

@@ -6,12 +6,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fulmar_core.actuators.ackermann import Ackermann
-from fulmar_core.actuators.differential_drive import DifferentialDrive
-from fulmar_core.actuators.propellers import Propellers
-from fulmar_core.actuators.response import Response
-from fulmar_core.dynamics.hydrodynamics import GRAVITY
-from fulmar_core.robot import Robot
+from fulmar_core.robots.actuators.ackermann import Ackermann
+from fulmar_core.robots.actuators.differential_drive import DifferentialDrive
+from fulmar_core.robots.actuators.propellers import Propellers
+from fulmar_core.robots.actuators.response import Response
+from fulmar_core.robots.robot import Robot
+from fulmar_core.states.gravity import GRAVITY
 from fulmar_evaluation.bounds.surge import Surge
 
 # Where curved edges are cut into corners: of the fastest turn, and astern of the fastest on the spot.

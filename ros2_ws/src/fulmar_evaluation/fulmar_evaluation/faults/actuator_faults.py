@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from fulmar_core.actuators.thrusters import Thrusters
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.disturbances.stuck import candidates_of
-from fulmar_core.episode import draw_episode
-from fulmar_core.errors import ConfigError
-from fulmar_core.robot import Robot
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.robots.actuators.thrusters import Thrusters
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.topics import SIMULATION_START_NS
+from fulmar_core.simulation.episode import draw_episode
 from fulmar_core.tasks import load_task
-from fulmar_core.topics import SIMULATION_START_NS
+from fulmar_core.worlds.scenario import load_scenario
+from fulmar_core.worlds.stuck import candidates_of
 from fulmar_evaluation.faults.endurance import DistanceWatch, endured
 from fulmar_evaluation.faults.fault import Fault, Outcome
 from fulmar_evaluation.faults.fault_environment import FaultEnvironment

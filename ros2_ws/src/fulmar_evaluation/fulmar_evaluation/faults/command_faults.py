@@ -11,8 +11,8 @@ import rclpy
 from geometry_msgs.msg import TwistStamped
 from sensor_msgs.msg import JointState
 
-from fulmar_core.robot import Robot
-from fulmar_core.topics import VELOCITY_COMMAND, command_wire
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.topics import VELOCITY_COMMAND, command_wire
 from fulmar_evaluation.faults.fault import STAYS_S, Fault, Outcome, stopped, went_on
 from fulmar_evaluation.faults.fault_environment import COMMANDS, FaultEnvironment, delayed
 from fulmar_evaluation.faults.live_system import LiveSystem

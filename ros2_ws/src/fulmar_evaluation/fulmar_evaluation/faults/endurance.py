@@ -9,9 +9,9 @@ from collections.abc import Callable
 
 from nav_msgs.msg import Odometry
 
-from fulmar_core.spatial import SpatialState
-from fulmar_core.topics import TRUTH
-from fulmar_core.wire_check import BETWEEN, WARNINGS
+from fulmar_core.robots.topics import TRUTH
+from fulmar_core.robots.wire_check import BETWEEN, WARNINGS
+from fulmar_core.states.spatial import SpatialState
 from fulmar_evaluation.faults.fault import STAYS_S, Outcome
 from fulmar_evaluation.faults.fault_environment import goal_of
 from fulmar_evaluation.faults.live_system import LiveSystem

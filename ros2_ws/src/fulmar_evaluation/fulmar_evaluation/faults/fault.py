@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from fulmar_core.robot import Robot
+from fulmar_core.robots.robot import Robot
 from fulmar_evaluation.faults.fault_environment import USUAL, FaultEnvironment
 from fulmar_evaluation.faults.flight_watch import FLIES_S
 from fulmar_evaluation.faults.launched import RUN

@@ -17,15 +17,12 @@ from rclpy.node import Node
 from sensor_msgs.msg import Imu, JointState
 
 from fulmar_bringup.planning import RunRequest, plan_run
-from fulmar_core.estimation.kinds import default_estimator
-from fulmar_core.flight.trim import find_trim
-from fulmar_core.planar import PlanarState
-from fulmar_core.process import CONTROL_PRIORITY, take_priority_with_helpers
-from fulmar_core.robot import Robot, load_robot
-from fulmar_core.spatial import SpatialState
-from fulmar_core.state import State
-from fulmar_core.tasks import Task, load_task
-from fulmar_core.topics import (
+from fulmar_core.config.process import CONTROL_PRIORITY, take_priority_with_helpers
+from fulmar_core.dynamics.flight_trim import find_trim
+from fulmar_core.estimators.kinds import default_estimator
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.robots.topics import (
     COMMAND,
     GOAL_POINT,
     GOAL_POSE,
@@ -36,6 +33,10 @@ from fulmar_core.topics import (
     VELOCITY_COMMAND,
     Wire,
 )
+from fulmar_core.states.planar import PlanarState
+from fulmar_core.states.spatial import SpatialState
+from fulmar_core.states.state import State
+from fulmar_core.tasks import Task, load_task
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 from policy_server.controllers import shipped_policy
 

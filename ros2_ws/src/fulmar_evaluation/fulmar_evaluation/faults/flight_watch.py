@@ -9,10 +9,10 @@ import time
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
 
-from fulmar_core.attitude import euler_of
-from fulmar_core.robot_name import Frames
-from fulmar_core.spatial import SpatialState
-from fulmar_core.topics import TRUTH
+from fulmar_core.robots.topics import TRUTH
+from fulmar_core.states.attitude import euler_of
+from fulmar_core.states.spatial import SpatialState
+from fulmar_core.wires.robot_name import Frames
 from fulmar_ros.convert import OdometryReader
 from fulmar_ros.qos import subscriber_qos
 

@@ -9,10 +9,10 @@ import time
 from nav_msgs.msg import Odometry
 from std_msgs.msg import Bool
 
-from fulmar_core.disturbances.scenario import load_scenario
-from fulmar_core.robot import Robot
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.topics import AIR_BEARING, TRUTH
 from fulmar_core.safety.arbiter import BEARING_OFF
-from fulmar_core.topics import AIR_BEARING, TRUTH
+from fulmar_core.worlds.scenario import load_scenario
 from fulmar_evaluation.faults.fault import Fault, Outcome
 from fulmar_evaluation.faults.fault_environment import FaultEnvironment, goal_of
 from fulmar_evaluation.faults.live_system import LiveSystem

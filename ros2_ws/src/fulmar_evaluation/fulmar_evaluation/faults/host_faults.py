@@ -10,7 +10,7 @@ import psutil
 import rclpy
 from rcl_interfaces.srv import GetParameters
 
-from fulmar_core.robot import Robot
+from fulmar_core.robots.robot import Robot
 from fulmar_evaluation.faults import stepped_clock, two_hosts
 from fulmar_evaluation.faults.endurance import complaint, resting
 from fulmar_evaluation.faults.fault import STAYS_S, WORDS_S, Fault, Outcome, went_on

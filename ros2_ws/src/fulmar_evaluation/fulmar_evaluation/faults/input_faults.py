@@ -12,8 +12,8 @@ from typing import Any
 from nav_msgs.msg import Odometry
 
 from fulmar_bags.message_reader import stamp_ns
-from fulmar_core.robot import Robot
-from fulmar_core.sensors.repetition import FROZEN_AFTER
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.sensors.repetition import FROZEN_AFTER
 from fulmar_evaluation.faults.fault import STAYS_S, Fault, Outcome, stopped
 from fulmar_evaluation.faults.fault_environment import RELAYED, Injection, delayed, lost
 from fulmar_evaluation.faults.live_system import LiveSystem

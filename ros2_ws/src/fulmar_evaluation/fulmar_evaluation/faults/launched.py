@@ -21,10 +21,10 @@ from fulmar_bringup.planning import RunRequest
 from fulmar_bringup.run_executor import execute
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.standing_system import keep_up
-from fulmar_core.config import load_config
-from fulmar_core.errors import FAILED, FulmarError
-from fulmar_core.goal import goal_at
-from fulmar_core.process import end_with
+from fulmar_core.config.errors import FAILED, FulmarError
+from fulmar_core.config.process import end_with
+from fulmar_core.config.strict_yaml import load_config
+from fulmar_core.tasks.goal import goal_at
 
 LAUNCHERS = RUN, UP = ("run", "up")
 ENDS = "stopped"  # the last event

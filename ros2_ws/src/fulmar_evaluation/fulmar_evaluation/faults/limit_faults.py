@@ -14,13 +14,13 @@ import rclpy
 from nav_msgs.msg import Odometry
 
 from fulmar_bags.message_reader import stamp_ns
-from fulmar_core.errors import RunFailed
-from fulmar_core.goal import goal_at
-from fulmar_core.robot import Robot
-from fulmar_core.rotation import rotate, rotate_inverse
+from fulmar_core.config.errors import RunFailed
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.topics import GOAL_POSE, GOAL_WIRES, SIMULATION_START_NS
 from fulmar_core.safety.geofence import is_inside
-from fulmar_core.spatial import SpatialState
-from fulmar_core.topics import GOAL_POSE, GOAL_WIRES, SIMULATION_START_NS
+from fulmar_core.states.rotation import rotate, rotate_inverse
+from fulmar_core.states.spatial import SpatialState
+from fulmar_core.tasks.goal import goal_at
 from fulmar_evaluation.faults.fault import STAYS_S, WORDS_S, Fault, Outcome, stopped, went_on
 from fulmar_evaluation.faults.fault_environment import (
     RELAYED,

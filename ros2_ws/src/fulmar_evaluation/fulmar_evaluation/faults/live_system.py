@@ -17,12 +17,10 @@ from fulmar_bringup.operator_rows import teleop_spec
 from fulmar_bringup.planning import RunRequest
 from fulmar_bringup.processes import ProcessGroup
 from fulmar_bringup.run_plan import RunPlan
-from fulmar_core.controller_settings import MOST_COPIES
-from fulmar_core.errors import RunFailed
-from fulmar_core.robot import load_robot
-from fulmar_core.safety.watchdog import default_timeout
-from fulmar_core.tasks import load_task
-from fulmar_core.topics import (
+from fulmar_core.config.errors import RunFailed
+from fulmar_core.loop.controller_settings import MOST_COPIES
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.robots.topics import (
     ACTUATORS_STATE,
     DEVICE_STATE,
     GOAL_WIRES,
@@ -31,6 +29,8 @@ from fulmar_core.topics import (
     Wire,
     command_wire,
 )
+from fulmar_core.safety.watchdog import default_timeout
+from fulmar_core.tasks import load_task
 from fulmar_evaluation.faults.fault_environment import (
     FROM_PLANT,
     USUAL,

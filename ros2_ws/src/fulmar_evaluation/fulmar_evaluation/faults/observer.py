@@ -18,9 +18,9 @@ from sensor_msgs.msg import JointState
 from fulmar_bags.contents import open_bag
 from fulmar_bags.decode import stamps_ns
 from fulmar_bags.message_reader import stamp_ns
-from fulmar_core.errors import BagError
-from fulmar_core.robot import Robot
-from fulmar_core.topics import ACTUATORS_STATE, DIAGNOSTICS, STATUS, Wire, command_wire
+from fulmar_core.config.errors import BagError
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.topics import ACTUATORS_STATE, DIAGNOSTICS, STATUS, Wire, command_wire
 from fulmar_ros.qos import subscriber_qos
 
 DEPTH = 100  # messages that may wait while this process does something else

@@ -11,9 +11,9 @@ import rclpy
 from sensor_msgs.msg import Joy
 from std_msgs.msg import Bool
 
-from fulmar_core.errors import RunFailed
-from fulmar_core.teleop import JoyLayout
-from fulmar_core.topics import ESTOP, JOY
+from fulmar_core.config.errors import RunFailed
+from fulmar_core.loop.teleop import JoyLayout
+from fulmar_core.robots.topics import ESTOP, JOY
 from fulmar_evaluation.faults.fault import Fault, Outcome, stopped
 from fulmar_evaluation.faults.fault_environment import FaultEnvironment
 from fulmar_evaluation.faults.live_system import LiveSystem

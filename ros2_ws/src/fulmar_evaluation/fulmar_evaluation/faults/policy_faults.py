@@ -10,10 +10,10 @@ from pathlib import Path
 import rclpy
 from std_msgs.msg import String
 
-from fulmar_core.errors import RunFailed
-from fulmar_core.policy_bundle import NETWORK, Passport, read_golden, read_passport, write_bundle
-from fulmar_core.robot import Robot
-from fulmar_core.topics import SWAP
+from fulmar_core.config.errors import RunFailed
+from fulmar_core.loop.policy_bundle import NETWORK, Passport, read_golden, read_passport, write_bundle
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.topics import SWAP
 from fulmar_evaluation.faults.fault import STAYS_S, Fault, Outcome, went_on
 from fulmar_evaluation.faults.fault_environment import FaultEnvironment, task_of
 from fulmar_evaluation.faults.live_system import LiveSystem

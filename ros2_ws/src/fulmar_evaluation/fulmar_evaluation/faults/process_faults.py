@@ -9,9 +9,9 @@ from collections.abc import Callable
 
 import psutil
 
-from fulmar_core.estimation.kinds import default_estimator, load_estimator
+from fulmar_core.estimators.kinds import default_estimator, load_estimator
+from fulmar_core.robots.topics import MOCAP
 from fulmar_core.safety.estop import TIMEOUT_NS
-from fulmar_core.topics import MOCAP
 from fulmar_evaluation.faults.fault import STAYS_S, WORDS_S, Fault, Outcome, stopped, went_on
 from fulmar_evaluation.faults.fault_environment import FaultEnvironment, lost
 from fulmar_evaluation.faults.launched import LAUNCHERS

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import time
 
-from fulmar_core.robot import Robot
-from fulmar_core.topics import IMU
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.topics import IMU
 from fulmar_evaluation.faults.fault import Fault, Outcome, went_on
 from fulmar_evaluation.faults.fault_environment import FaultEnvironment, lost
 from fulmar_evaluation.faults.live_system import LiveSystem

@@ -14,9 +14,9 @@ import rclpy
 from nav_msgs.msg import Odometry
 
 from fulmar_bags.message_reader import stamp_ns
-from fulmar_core.robot import Robot
-from fulmar_core.sensors.repetition import FEWEST
-from fulmar_core.topics import MOCAP, ODOMETRY
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.sensors.repetition import FEWEST
+from fulmar_core.robots.topics import MOCAP, ODOMETRY
 from fulmar_evaluation.faults.command_faults import DISCOVERY_S
 from fulmar_evaluation.faults.endurance import DistanceWatch, complaint, endured
 from fulmar_evaluation.faults.fault import Fault, Outcome, stopped

@@ -9,7 +9,7 @@ import subprocess
 from dataclasses import dataclass
 from pathlib import Path
 
-from fulmar_core.errors import RunFailed
+from fulmar_core.config.errors import RunFailed
 
 SOURCE = Path(__file__).with_name("stepped_clock.c")
 COMPILERS = ("cc", "gcc", "clang")

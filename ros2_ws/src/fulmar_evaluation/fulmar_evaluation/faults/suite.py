@@ -11,8 +11,8 @@ from pathlib import Path
 
 from fulmar_bringup.domains import environment, reserved_domains
 from fulmar_bringup.system import Guards, default_hardware, modules_of
-from fulmar_core.errors import ConfigError, FulmarError, UnknownNameError
-from fulmar_core.robot import load_robot
+from fulmar_core.config.errors import ConfigError, FulmarError, UnknownNameError
+from fulmar_core.robots.robot_file import load_robot
 from fulmar_evaluation.faults.actuator_faults import ACTUATOR_FAULTS
 from fulmar_evaluation.faults.command_faults import CABLE_FAULTS, COMMAND_FAULTS
 from fulmar_evaluation.faults.fault import Fault, FaultResult, Outcome

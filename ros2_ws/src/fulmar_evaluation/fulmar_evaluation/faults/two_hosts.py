@@ -23,8 +23,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from fulmar_core.errors import RunFailed
-from fulmar_core.process import PLANT_PRIORITY, take_priority
+from fulmar_core.config.errors import RunFailed
+from fulmar_core.config.process import PLANT_PRIORITY, take_priority
 from fulmar_ros.middleware import DISCOVERY_RANGE
 
 TUN = Path("/dev/net/tun")

@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_core.dynamics.hydrodynamics import GRAVITY
-from fulmar_core.errors import ConfigError
-from fulmar_core.flight.atmosphere import SEA_LEVEL
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.robots.airframe.atmosphere import SEA_LEVEL
+from fulmar_core.states.gravity import GRAVITY
 from fulmar_evaluation.new_airframe.geometry import Geometry
 
 SCRIPT = Path(__file__).with_name("vortex_lattice.py")

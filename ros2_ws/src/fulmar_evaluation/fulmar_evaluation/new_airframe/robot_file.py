@@ -9,10 +9,10 @@ from typing import Any
 
 import yaml
 
-from fulmar_core.atomic_write import write_whole
-from fulmar_core.errors import ConfigError
-from fulmar_core.paths import config_path
-from fulmar_core.robot import load_robot, load_robot_file
+from fulmar_core.config.atomic_write import write_whole
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.config.paths import config_path
+from fulmar_core.robots.robot_file import load_robot, load_robot_file
 from fulmar_evaluation.new_airframe.coefficient_set import Terms
 from fulmar_evaluation.new_airframe.geometry import Geometry
 

@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 from fulmar_bags.contents import Bag
 from fulmar_bags.decode import TWIST, Odometries, Vectors, joint_vectors, odometries, twist_vectors
 from fulmar_bags.figures import describe
-from fulmar_core.topics import SENSOR_WIRES
+from fulmar_core.robots.topics import SENSOR_WIRES
 from fulmar_evaluation.report.page import Part, Plot, cells, html_page, table
 from fulmar_evaluation.report.space_plot import SIDES
 from fulmar_evaluation.report.style import CONTROLLER_COLOURS, legend, quiet_grid

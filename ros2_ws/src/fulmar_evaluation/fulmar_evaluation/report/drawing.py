@@ -14,7 +14,7 @@ from matplotlib.patches import Circle, Polygon
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
-from fulmar_core.robot import Body
+from fulmar_core.robots.robot import Body
 from fulmar_core.tasks.terms import Tolerance
 from fulmar_evaluation.report.style import DASHED, FAINT, INK, PAPER
 

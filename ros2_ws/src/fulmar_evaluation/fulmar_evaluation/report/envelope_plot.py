@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from fulmar_core.robot import Robot
+from fulmar_core.robots.robot import Robot
 from fulmar_evaluation.aircraft_check import envelope
 from fulmar_evaluation.report.drawing import columns
 from fulmar_evaluation.report.style import PAPER, house_style

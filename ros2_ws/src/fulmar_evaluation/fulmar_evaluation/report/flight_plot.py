@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from fulmar_core.actuators.control_surfaces import ControlSurfaces, is_throttle
+from fulmar_core.robots.actuators.control_surfaces import ControlSurfaces, is_throttle
 from fulmar_core.tasks.follow_reference import FollowReference
 from fulmar_evaluation.report.run_view import View, evaluated
 from fulmar_evaluation.report.style import BODY_AXES, CONTROLLER_COLOURS, DASHED, INK, legend, quiet_grid

@@ -11,8 +11,8 @@ import numpy as np
 from matplotlib.figure import Figure, SubFigure
 
 from fulmar_bags.run_record import RunRecord
-from fulmar_core.errors import ConfigError
-from fulmar_core.spatial import SpatialState
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.states.spatial import SpatialState
 from fulmar_evaluation.report.control_plot import actuators_height, draw_actuators, draw_latency, draw_use
 from fulmar_evaluation.report.error_plot import counting, draw_progress, strips
 from fulmar_evaluation.report.flight_plot import (

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from fulmar_bags.run_record import RunRecord
-from fulmar_core.spatial import SpatialState
+from fulmar_core.states.spatial import SpatialState
 from fulmar_evaluation.report.style import colours
 from fulmar_evaluation.run_evaluation import RunResult, evaluate_run
 from fulmar_evaluation.run_summary import latencies_ms, summarise

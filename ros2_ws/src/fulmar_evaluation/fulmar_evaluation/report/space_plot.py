@@ -11,7 +11,7 @@ from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
 
-from fulmar_core.rotation import rotate
+from fulmar_core.states.rotation import rotate
 from fulmar_evaluation.report.drawing import colour_lines, spaced
 from fulmar_evaluation.report.run_view import View, evaluated
 from fulmar_evaluation.report.style import BODY_AXES, DASHED, FAINT, INK, PAPER, quiet_grid

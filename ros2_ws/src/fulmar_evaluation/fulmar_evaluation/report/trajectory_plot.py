@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle
 
-from fulmar_core.rotation import yaw_of
+from fulmar_core.states.rotation import yaw_of
 from fulmar_evaluation.report.drawing import draw_body, draw_discs, draw_goal, spaced
 from fulmar_evaluation.report.run_view import View, evaluated
 from fulmar_evaluation.report.style import DASHED, FAINT, INK, PAPER, quiet_grid

@@ -9,8 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from fulmar_core.robot import Robot
-from fulmar_core.wrench_limits import AXES, WrenchSet
+from fulmar_core.robots.robot import Robot
 from fulmar_evaluation.report.drawing import columns
 from fulmar_evaluation.report.style import (
     CONTROLLER_COLOURS,
@@ -21,6 +20,7 @@ from fulmar_evaluation.report.style import (
     PAPER,
     house_style,
 )
+from fulmar_evaluation.wrench_limits import AXES, WrenchSet
 
 FILL = CONTROLLER_COLOURS["policy"]
 UNSHARED = OTHER_COLOURS[0]

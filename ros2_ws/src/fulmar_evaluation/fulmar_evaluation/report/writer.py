@@ -9,7 +9,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from fulmar_bags.mcap_records import files_of
-from fulmar_core.errors import ConfigError
+from fulmar_core.config.errors import ConfigError
 from fulmar_evaluation.report.page import BENCHMARK_STYLE, Part, Plot, html_page
 from fulmar_evaluation.report.style import as_png, house_style
 

@@ -28,8 +28,8 @@ from fulmar_bringup.processes import ProcessGroup
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.system import Guards
 from fulmar_bringup.system_rows import system_rows
-from fulmar_core.errors import BagError, RunFailed
-from fulmar_core.topics import (
+from fulmar_core.config.errors import BagError, RunFailed
+from fulmar_core.robots.topics import (
     ACTION,
     ACTUATORS_STATE,
     AIR_BEARING,

@@ -14,10 +14,9 @@ from fulmar_bags.contents import Bag, Topic, open_bag
 from fulmar_bags.control_steps import control_steps_of
 from fulmar_bags.decode import stamps_ns
 from fulmar_bringup.domains import own_domain
-from fulmar_core.errors import RunFailed
-from fulmar_core.robot import load_robot
-from fulmar_core.tasks import Task, load_task
-from fulmar_core.topics import (
+from fulmar_core.config.errors import RunFailed
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.robots.topics import (
     ACTION,
     COMMAND,
     GOAL_WIRES,
@@ -28,6 +27,7 @@ from fulmar_core.topics import (
     SENSOR_WIRES,
     VELOCITY_COMMAND,
 )
+from fulmar_core.tasks import Task, load_task
 from fulmar_evaluation.rerun.replay_controllers import answers_of
 from fulmar_evaluation.rerun.rerun_result import compare_answers
 

@@ -14,17 +14,17 @@ import numpy as np
 from fulmar_bags.control_steps import ControlSteps
 from fulmar_bags.recorded_estop import RecordedEstop
 from fulmar_bags.wire_reader import ABSENT
-from fulmar_core.control_loop import unknown_inputs
+from fulmar_core.config.errors import BagError, FulmarError, RunFailed, TaskError
 from fulmar_core.controllers.controller import Controller, Inputs
 from fulmar_core.controllers.law import Law
-from fulmar_core.errors import BagError, FulmarError, RunFailed, TaskError
-from fulmar_core.guarded_loop import GuardedLoop
-from fulmar_core.health.applied import AppliedHistory
-from fulmar_core.observation import Observer
-from fulmar_core.rotation import rotate
-from fulmar_core.safety.fallback import ControllerSwitch, Standby, warm_up
+from fulmar_core.estimators.actuator_health.applied import AppliedHistory
+from fulmar_core.loop.control_loop import unknown_inputs
+from fulmar_core.loop.fallback import ControllerSwitch, Standby, warm_up
+from fulmar_core.loop.guarded_loop import GuardedLoop
 from fulmar_core.safety.input_gate import InputGate, Measurement
-from fulmar_core.state import RigidBodyState
+from fulmar_core.states.rotation import rotate
+from fulmar_core.states.state import RigidBodyState
+from fulmar_core.tasks.observation import Observer
 
 FROM = ("observations", "odometry")
 NEVER_S = 1e9  # input timeout of a record, which has no steady clock [s]

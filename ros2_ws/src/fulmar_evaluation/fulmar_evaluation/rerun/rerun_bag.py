@@ -12,9 +12,9 @@ from fulmar_bags.comparison import as_json, first_difference
 from fulmar_bags.contents import Bag
 from fulmar_bags.control_steps import ControlSteps, control_steps_of, policy_folder
 from fulmar_bags.figures import controllers_of
-from fulmar_core.errors import ConfigError, UnknownNameError
-from fulmar_core.goal import PoseTuple
-from fulmar_core.own_class import is_own
+from fulmar_core.config.errors import ConfigError, UnknownNameError
+from fulmar_core.config.own_class import is_own
+from fulmar_core.tasks.goal import PoseTuple
 from fulmar_evaluation.rerun.embedded_configs import calibrated_as, knowing_what_it_carries
 from fulmar_evaluation.rerun.replay_controllers import answers_of
 from fulmar_evaluation.rerun.rerun import FROM

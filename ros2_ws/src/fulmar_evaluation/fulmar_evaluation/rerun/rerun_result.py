@@ -13,7 +13,7 @@ import numpy as np
 
 from fulmar_bags.comparison import Field, compare
 from fulmar_bags.control_steps import ControlSteps
-from fulmar_core.errors import ConfigError
+from fulmar_core.config.errors import ConfigError
 from fulmar_evaluation.rerun.rerun import Answers
 
 FIELDS = ("decision", "observation", "action", "command")

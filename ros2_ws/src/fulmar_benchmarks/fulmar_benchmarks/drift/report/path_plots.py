@@ -10,9 +10,9 @@ from matplotlib.figure import Figure
 
 from fulmar_benchmarks.drift.conditions import ROBOT, RUN_UP_S
 from fulmar_benchmarks.drift.report.plots import LIMITS, View, controllers_key
-from fulmar_core.goal_files import FollowedPath, load_goals
-from fulmar_core.planar import wrapped
-from fulmar_core.robot import load_robot
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.states.planar import wrapped
+from fulmar_core.tasks.goal_files import FollowedPath, load_goals
 from fulmar_evaluation.report.drawing import ANGLES, LENGTHS, WIDTH, columns, draw_body, limit_line, log_scale
 from fulmar_evaluation.report.style import DASHED, FAINT, INK, PAPER, quiet_grid
 

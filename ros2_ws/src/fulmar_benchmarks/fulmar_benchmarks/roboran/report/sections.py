@@ -27,8 +27,8 @@ from fulmar_benchmarks.roboran.report.time_plots import (
     draw_velocities,
 )
 from fulmar_benchmarks.roboran.report.view import View, views
-from fulmar_core.figures import FIGURES, SUCCESS
-from fulmar_core.metrics import counts_targets
+from fulmar_core.simulation.metrics import counts_targets
+from fulmar_evaluation.figures import FIGURES, SUCCESS
 from fulmar_evaluation.report.page import Part, Plot, cells, faint, headline, origin, table
 from fulmar_evaluation.report.style import house_style
 from fulmar_evaluation.report.writer import write_benchmark

@@ -11,8 +11,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from fulmar_benchmarks.roboran.report.view import View, panels
-from fulmar_benchmarks.roboran.targets import CONTROL_HZ, GOAL_STEPS, LEAST, thesis_row
-from fulmar_core.planar import to_body, wrapped
+from fulmar_benchmarks.roboran.targets import LEAST, thesis_row
+from fulmar_benchmarks.unit import CONTROL_HZ, GOAL_STEPS
+from fulmar_core.states.planar import to_body, wrapped
 from fulmar_evaluation.report.drawing import LENGTHS, bands, limit_line, log_scale, ring
 from fulmar_evaluation.report.style import DASHED, FAINT, INK, quiet_grid
 

@@ -13,7 +13,8 @@ from matplotlib.figure import Figure
 from fulmar_benchmarks.results import PairResult
 from fulmar_benchmarks.roboran.campaign import CampaignResult
 from fulmar_benchmarks.roboran.cells import head
-from fulmar_core.robot import Robot, load_robot
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.tasks import Task, load_task
 from fulmar_evaluation.report.drawing import columns
 from fulmar_evaluation.report.style import INK, OTHER_COLOURS

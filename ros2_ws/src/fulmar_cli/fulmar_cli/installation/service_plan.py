@@ -1,0 +1,230 @@
+"""What `fulmar service install` writes: checked before anything is."""
+
+from __future__ import annotations
+
+import grp
+import os
+import pwd
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+from fulmar_bringup.console import warn
+from fulmar_bringup.service.device_rules import device_groups, device_rules
+from fulmar_bringup.service.installation import (
+    Files,
+    systemctl,
+    systemd_runs,
+    texts_of,
+    write_files,
+)
+from fulmar_bringup.service.own_places import module_path, whole_paths
+from fulmar_bringup.service.unit import Service, known_groups, unit_text
+from fulmar_bringup.standing_system import plan_system
+from fulmar_bringup.system import System, varied_system
+from fulmar_cli.installation.extras import check_plan
+from fulmar_core.config.errors import ConfigError, FulmarError
+from fulmar_core.config.own_class import is_own
+from fulmar_core.config.written_text import NAME, USER, check_lines, check_written
+from fulmar_core.robots.robot_file import load_robot
+from hardware_drivers.hardware import load_hardware
+from hardware_drivers.presence import check_presence
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """Arguments of `fulmar service install`."""
+
+    system: str
+    robot: str | None
+    name: str | None
+    task: str | None
+    controller: str | None
+    backend: str | None
+    hardware: str | None
+    policy: Path | None
+    recording: str
+    user: str | None
+
+
+@dataclass(frozen=True)
+class PlannedService:
+    """A service with its files, which are not written yet."""
+
+    files: Files
+    texts: dict[Path, str]  # content of each file
+
+    def write(self) -> tuple[list[Path], bool]:
+        """Write the files, and start the service where systemd runs; returns the files, and whether it was started."""
+        written = write_files(self.files, self.texts)
+        if not systemd_runs(self.files.root):
+            return written, False
+        if self.files.rules in self.texts and shutil.which("udevadm"):
+            for step in (("control", "--reload"), ("trigger",)):
+                subprocess.run(["udevadm", *step], check=False)
+        systemctl("daemon-reload")
+        systemctl("restart", self.files.unit.name)
+        return written, True
+
+
+def plan_service(wanted: Wanted, root: Path, *, dry_run: bool) -> PlannedService:
+    """Check a service, and make its texts.
+
+    Args:
+        wanted: What is asked for.
+        root: Folder that stands for /.
+        dry_run: Whether nothing is to be written, which needs no right to.
+
+    Raises:
+        ConfigError: A name or a file is wrong, an extra is missing, the user is root or unknown, or a text does not fit
+            into a unit or a rule.
+    """
+    check_written("SYSTEM", wanted.system, NAME)
+    check_lines(
+        {
+            "--robot": wanted.robot, "--name": wanted.name, "--task": wanted.task, "--backend": wanted.backend,
+            "--controller": wanted.controller, "--hardware": wanted.hardware, "--recording": wanted.recording,
+            "--policy": str(wanted.policy) if wanted.policy else None,
+        }.items()
+    )  # fmt: skip
+    hardware = wanted.hardware
+    if hardware is not None and hardware.endswith(".yaml"):
+        hardware = str(Path(hardware).absolute())  # the service has another working folder
+    chosen = varied_system(
+        wanted.system,
+        robot=wanted.robot,
+        robot_name=wanted.name,
+        task=wanted.task,
+        controller=wanted.controller,
+        backend=wanted.backend,
+        hardware=hardware,
+    )
+    _check_places(chosen)
+    policy = wanted.policy.absolute() if wanted.policy else None
+    request = plan_system(
+        chosen, record=Path("runs/planned"), command="", policy=policy, hardware=hardware,
+        recording=wanted.recording, unattended=True,
+    )  # fmt: skip
+    check_plan(request.plan)
+    if root == Path("/") and not dry_run and os.geteuid() != 0:
+        raise ConfigError(
+            f"only root may write below /etc: sudo {_program()} {' '.join(sys.argv[1:])}   # or --root DIR"
+        )
+    rules: tuple[str, ...] = ()
+    groups: tuple[str, ...] = ()
+    own = [name for name in (chosen.controller, chosen.task) if is_own(name)]
+    own += [node.module for node in chosen.nodes]
+    if request.plan.hardware:
+        file = load_hardware(request.plan.hardware)
+        own += [file.driver.kind] if is_own(file.driver.kind) else []
+        rules, groups = device_rules(file), device_groups(file)
+        if root == Path("/"):
+            _warn_of_absence(request.plan.hardware)
+    user = _user(wanted.user, root)
+    if root == Path("/") and not dry_run:
+        _check_program(str(_program()), user)
+    known = known_groups(groups, (group.gr_name for group in grp.getgrall()))
+    for group in set(groups) - set(known):
+        warn(
+            [
+                f"the group '{group}' of the rules does not exist: sudo groupadd --system {group}, then install again"
+            ]
+        )
+    service = Service(
+        f"{wanted.system}-{wanted.name}" if wanted.name else wanted.system,
+        wanted.system,
+        (str(_program()), "up", wanted.system, "--service", *_options(wanted, hardware, policy)),
+        user,
+        known,
+        whole_paths(os.environ) | module_path(own, os.environ),
+        lands=load_robot(chosen.robot).flies,
+    )
+    files = Files(root, service.name)
+    return PlannedService(files, texts_of(files, unit_text(service, os.environ), rules))
+
+
+def _options(wanted: Wanted, hardware: str | None, policy: Path | None) -> list[str]:
+    given = {
+        "robot": wanted.robot, "name": wanted.name, "task": wanted.task, "controller": wanted.controller,
+        "backend": wanted.backend, "hardware": hardware, "policy": policy, "recording": wanted.recording,
+    }  # fmt: skip
+    return [word for key, value in given.items() if value is not None for word in (f"--{key}", str(value))]
+
+
+def _program() -> Path:
+    """The command in use: the script beside this interpreter."""
+    beside = Path(sys.executable).with_name("fulmar")
+    found = beside if beside.exists() else shutil.which("fulmar")
+    if found is None:
+        raise ConfigError("the command 'fulmar' was not found beside this Python or on PATH.")
+    return Path(found).absolute()
+
+
+def _check_places(system: System) -> None:
+    """Refuse a path in a system file that the service, which runs in a folder of its own, does not find."""
+    keys = system.guards.trusted_keys
+    if keys is not None and not Path(keys).is_absolute():
+        raise ConfigError(
+            f"trusted_keys = '{keys}' of the system file is relative, and a service runs in a folder of its own: write "
+            f"{Path(keys).absolute()}."
+        )
+
+
+def _user(name: str | None, root: Path) -> str:
+    """Who runs the service: never root, whose files and devices a mistake would reach."""
+    chosen = name or os.environ.get("SUDO_USER") or pwd.getpwuid(os.geteuid()).pw_name
+    check_written("--user" if name else "SUDO_USER", chosen, USER)
+    if chosen == "root" or chosen in _names_of_root(root):
+        raise ConfigError("a service does not run as root: name who runs it by --user NAME.")
+    if root == Path("/"):
+        try:
+            pwd.getpwnam(chosen)
+        except KeyError:
+            raise ConfigError(
+                f"there is no user '{chosen}' here. Make one: sudo useradd --create-home {chosen}"
+            ) from None
+    return chosen
+
+
+def _names_of_root(root: Path) -> set[str]:
+    """Every name with the id of root, here or in an image."""
+    try:
+        lines = (root / "etc/passwd").read_text(errors="replace").splitlines()
+    except OSError:  # an image without users yet
+        return set()
+    entries = [line.split(":") for line in lines]
+    return {entry[0] for entry in entries if len(entry) > 2 and entry[2] == "0"}
+
+
+def _check_program(program: str, user: str) -> None:
+    """Refuse a program that the user of the service may not run, such as one in the home of root.
+
+    Raises:
+        ConfigError: With what the attempt said.
+    """
+    about = pwd.getpwnam(user)
+    try:
+        done = subprocess.run(
+            [program, "--version"],
+            user=about.pw_uid,
+            group=about.pw_gid,
+            cwd="/",
+            capture_output=True,
+            check=False,
+        )
+        words = done.stderr.decode(errors="replace").strip().splitlines()[-1:] if done.returncode else []
+    except OSError as error:
+        words = [str(error)]
+    if words:
+        raise ConfigError(
+            f"'{user}' cannot run {program} ({words[0]}). Install Fulmar where that user may read it."
+        )
+
+
+def _warn_of_absence(hardware: str) -> None:
+    try:
+        check_presence(load_hardware(hardware).driver)
+    except FulmarError as error:
+        warn([f"{error} The service is installed all the same, and tries again when it starts."])

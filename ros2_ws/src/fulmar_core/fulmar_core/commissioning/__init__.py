@@ -1,1 +1,0 @@
-"""Which actuator each wire of a robot drives, identified from the motion that short pulses cause."""

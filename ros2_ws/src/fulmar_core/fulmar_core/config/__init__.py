@@ -1,0 +1,1 @@
+"""Configuration: strict YAML, paths, errors, plausible values, own classes, provenance, and files written whole."""

@@ -1,0 +1,90 @@
+"""Check of configuration values against `plausible_ranges`: refuse mistakes of unit, warn of the unusual."""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+from typing import Any
+
+from fulmar_core.config.errors import ImplausibleError
+from fulmar_core.config.plausible_ranges import UNITS, Plausible, Range
+from fulmar_core.config.strict_yaml import line_of
+
+LEAST_SHARE = 0.02  # of the largest usual value: where anything from 0 on is usual, less is no likely unit
+logger = logging.getLogger(__name__)
+# A program shows warnings once; nodes that load the same file again stay silent.
+logger.addHandler(logging.NullHandler())
+
+
+def check_plausible(config: Any, table: Sequence[Plausible], path: Path) -> None:
+    """Reject values that no robot, task or scenario has; log a warning for those that few have.
+
+    Raises:
+        ImplausibleError: A value lies outside of what is possible; the message starts with `file:line`.
+    """
+    for row in table:
+        for keys, found in _values(config, row.key.split(".")):
+            value = math.hypot(*found[:2]) if row.distance else float(found)
+            if value == 0.0 and not row.zero:
+                continue
+            scale = row.scale(config) if row.scale else 1.0
+            inside, usual = _times(row.possible, scale), _times(row.usual, scale)
+            if _lies_in(value, usual):
+                continue
+            where = f"{path}:{line_of(path, keys)}: '{'.'.join(keys)}' = {_number(found, value)} {row.unit}"
+            allowed = f"{_text(usual)} {row.unit} ({row.why})"
+            if not _lies_in(value, inside):
+                raise ImplausibleError(
+                    f"{where} is not plausible. Usual is {allowed}, accepted is {_text(inside)} {row.unit}."
+                    f"{_other_unit(value, row.unit, usual)}"
+                )
+            logger.warning(
+                "%s is unusual; usual is %s.%s", where, allowed, _other_unit(value, row.unit, usual)
+            )
+
+
+def _values(
+    config: Any, keys: Sequence[str], before: tuple[str, ...] = ()
+) -> Iterator[tuple[tuple[str, ...], Any]]:
+    """Values at a dotted path with their own keys; none where the file has no such part."""
+    if not keys:
+        if config is not None:
+            yield before, config
+        return
+    key, rest = keys[0], keys[1:]
+    if isinstance(config, tuple):
+        chosen = range(len(config)) if key == "*" else [int(key)]
+        for index in chosen:
+            yield from _values(config[index], rest, (*before, str(index)))
+    elif is_dataclass(config) and key in {field.name for field in fields(config)}:
+        yield from _values(getattr(config, key), rest, (*before, key))
+
+
+def _times(span: Range, scale: float) -> Range:
+    return span[0] * scale, span[1] * scale
+
+
+def _lies_in(value: float, span: Range) -> bool:
+    """Whether a value lies in a range, rounding left aside."""
+    slack = 1e-9 * max(abs(span[0]), abs(span[1]))
+    return span[0] - slack <= value <= span[1] + slack
+
+
+def _text(span: Range) -> str:
+    return f"{span[0]:.4g} to {span[1]:.4g}"
+
+
+def _number(found: Any, value: float) -> str:
+    return f"{list(found)}, {value:.4g}" if isinstance(found, tuple) else f"{value:g}"
+
+
+def _other_unit(value: float, unit: str, usual: Range) -> str:
+    """The unit in which a value would be usual, as a question; empty where there is none."""
+    for other, factor in UNITS.get(unit, ()):
+        least = usual[0] or LEAST_SHARE * usual[1]
+        if least <= value * factor <= usual[1]:
+            return f" Is it in {other}? {value:g} {other} are {value * factor:.4g} {unit}, and the key is in {unit}."
+    return ""

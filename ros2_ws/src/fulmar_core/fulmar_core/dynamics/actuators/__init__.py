@@ -1,0 +1,1 @@
+"""Actuation: what of an actuator changes while an episode runs."""

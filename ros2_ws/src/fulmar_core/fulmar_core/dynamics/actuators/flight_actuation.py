@@ -1,0 +1,102 @@
+"""What servos, motors and gusts of a batch of aircraft remember."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from array_api_compat import device
+
+from fulmar_core.dynamics.actuators.actuation import ActuationState
+from fulmar_core.robots.actuators.control_surfaces import ControlSurfaces
+from fulmar_core.robots.actuators.parts import MovingParts
+from fulmar_core.states.arrays import array_namespace, clip
+from fulmar_core.states.rotation import Array
+from fulmar_core.worlds.turbulence import FILTERS, Gust, gust_step
+
+
+class FlightActuation(ActuationState):
+    """Servos of second order and motors with a lag; `applied` has deflections [rad] and thrust levels.
+
+    The air is part of it: gusts are the one thing around a body that remembers.
+
+    Attributes:
+        servo_rates: How fast each surface moves, shape (surfaces, worlds) [rad/s].
+        gusts: Memory of the turbulence, shape (FILTERS, worlds).
+        gust_steps: Steps that the turbulence of each world has made, shape (worlds,).
+    """
+
+    MUTABLE = (*ActuationState.MUTABLE, "servo_rates", "gusts", "gust_steps")
+
+    def __init__(
+        self, actuators: ControlSurfaces, safe: Array, *, delay_ticks: int, parts: MovingParts | None
+    ) -> None:
+        """Begin in the safe state, in still air; arguments as of `ActuationState`."""
+        super().__init__(
+            actuators.response,
+            binary=False,
+            scale=actuators.scale,
+            safe=safe,
+            opens_late=False,
+            delay_ticks=delay_ticks,
+            parts=parts,
+        )
+        self._actuators, self._count = actuators, actuators.positions
+        xp, worlds = array_namespace(safe), safe.shape[1]
+        self._kwargs = {"dtype": safe.dtype, "device": device(safe)}
+        self.servo_rates: Array = 0.0 * safe[: self._count]
+        self.gusts: Array = xp.zeros((FILTERS, worlds), **self._kwargs)
+        self.gust_steps: Array = xp.zeros((worlds,), dtype=xp.int64, device=device(safe))
+        self._most = xp.asarray(actuators.scale[: self._count, None], **self._kwargs)
+        fastest = np.where(np.isfinite(actuators.rates), actuators.rates, 1e6)
+        self._fastest = xp.asarray(fastest[:, None], **self._kwargs)
+        self._servo: dict[float, np.ndarray] = {}
+
+    def reset(self, which: Array, safe: Array) -> None:
+        """Bring some worlds back to the safe state; arguments as of `ActuationState.reset`."""
+        super().reset(which, safe)
+        xp = array_namespace(safe)
+        for name in ("servo_rates", "gust_steps"):
+            values = xp.asarray(getattr(self, name), copy=True)
+            values[..., which] = 0
+            setattr(self, name, values)
+
+    def hold(self, command: Array) -> None:
+        """Let every actuator stand where a command asks for, at rest, shape (n, worlds)."""
+        super().hold(command)
+        self.servo_rates = 0.0 * command[: self._count]
+
+    def advance(self, dt: float, *, latest_s: float) -> Array:
+        """Let servos and motors follow for a time step; see `ActuationState.advance`.
+
+        Returns:
+            Deflections and thrust levels in the middle of the step, shape (n, worlds).
+        """
+        target = self._target(dt, latest_s=latest_s)
+        xp, count = array_namespace(target), self._count
+        if dt not in self._servo:
+            self._servo[dt] = self._actuators.servo_matrix(dt)
+        matrix = self._servo[dt]
+        before, off = self.applied, self.applied[:count] - target[:count]
+        place = target[:count] + float(matrix[0, 0]) * off + float(matrix[0, 1]) * self.servo_rates
+        rate = float(matrix[1, 0]) * off + float(matrix[1, 1]) * self.servo_rates
+        rate = clip(rate, -self._fastest, self._fastest)
+        place = clip(place, before[:count] - dt * self._fastest, before[:count] + dt * self._fastest)
+        stopped = clip(place, -self._most, self._most)
+        self.servo_rates = xp.where(stopped == place, rate, xp.zeros_like(rate))
+        levels = []
+        for i, motor in enumerate(self._actuators.motors, start=count):
+            keep = math.exp(-dt / motor.lag_s) if motor.lag_s > 0.0 else 0.0
+            levels.append(target[i] + keep * (before[i] - target[i]))
+        self.applied = xp.concat((stopped, xp.stack(levels))) if levels else stopped
+        return 0.5 * (before + self.applied)
+
+    def blow(
+        self, keys: Array, wind: Array, *, airspeed: Array, height: Array, span: float, dt: float
+    ) -> Gust:
+        """Let the air move past for a time step; arguments and result as of `turbulence.gust_step`."""
+        self.gusts, gust = gust_step(
+            self.gusts, keys, self.gust_steps, airspeed=airspeed, height=height, wind=wind, span=span, dt=dt
+        )
+        self.gust_steps = self.gust_steps + 1
+        return gust

@@ -1,0 +1,347 @@
+"""How robots of one kind are disturbed, move and are measured in a batch; one class for each state type.
+
+Simulators that integrate bodies themselves take disturbances and odometry from here, on a batch of one.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any, Generic, TypeVar
+
+from fulmar_core.dynamics.actuators.actuation import ActuationState
+from fulmar_core.dynamics.actuators.wheel_actuation import WheelActuation
+from fulmar_core.dynamics.free_body import Wrench
+from fulmar_core.dynamics.gyrostat import Flywheels, gyrostat_step
+from fulmar_core.dynamics.motion import move
+from fulmar_core.dynamics.rigid_body import inertia_of, rigid_body_step, shifted
+from fulmar_core.dynamics.things import Poses, Thing, push_things
+from fulmar_core.robots.actuators.pushing import Pushing
+from fulmar_core.robots.actuators.reaction_wheels import ReactionWheels
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.sensors.odometer import Odometer
+from fulmar_core.robots.sensors.spatial_odometer import SpatialOdometer
+from fulmar_core.states.arrays import array_namespace
+from fulmar_core.states.attitude import Vector, cross, minus, plus, scaled, turn_back
+from fulmar_core.states.counter_rng import Draws
+from fulmar_core.states.planar import PlanarState
+from fulmar_core.states.rotation import Array, from_yaw, multiply
+from fulmar_core.states.spatial import SpatialState
+from fulmar_core.states.state import RigidBodyState, S
+from fulmar_core.worlds.scenario import Scenario, draw_world
+from fulmar_core.worlds.spatial_world import (
+    SpatialWorld,
+    draw_spatial_world,
+    grown,
+    magnetic_field,
+    orbit_torque,
+    push_in_world,
+    solar_torque,
+)
+from fulmar_core.worlds.world import Drawn, World, outside_wrench, push_is_constant
+
+W = TypeVar("W", bound=Drawn)
+
+
+class Dynamics(ABC, Generic[W, S]):
+    """Worlds, motion and odometry of one robot, for many worlds at once; free of side effects.
+
+    Attributes:
+        state_type: Form of the states.
+        odometer: Class of the odometry.
+    """
+
+    state_type: type[S]
+    odometer: Callable[..., Odometer[S]]
+
+    def __init__(self, robot: Robot) -> None:
+        self.robot = robot
+
+    @abstractmethod
+    def draw_world(self, scenario: Scenario, draws: Draws) -> W:
+        """Draw worlds of a scenario, one for each row of the draws, as NumPy float64."""
+
+    @abstractmethod
+    def blurs(self, world: W) -> bool:
+        """Whether measured velocities err beyond the robot's own sensors in any world, of NumPy arrays."""
+
+    @abstractmethod
+    def outside(self, state: S, world: W, time_s: Array, control_dt: float) -> Any:
+        """Push of the surroundings, held over a control step, in the form that `move` takes.
+
+        Args:
+            state: Where the body is, shapes (worlds,).
+            world: What surrounds it.
+            time_s: Time in each episode [s].
+            control_dt: Length of a kick [s].
+        """
+
+    @abstractmethod
+    def push_is_constant(self, world: W) -> bool:
+        """Whether every world is pushed in the same way wherever its body is, at any time; of NumPy arrays."""
+
+    @abstractmethod
+    def is_off_centre(self, world: W) -> bool:
+        """Whether the centre of mass is beside the body's origin in any world, of NumPy arrays."""
+
+    @abstractmethod
+    def move(
+        self,
+        state: S,
+        actuation: ActuationState,
+        world: W,
+        outside: Any,
+        *,
+        substeps: int,
+        latest_s: float,
+        off_centre: bool,
+    ) -> S:
+        """Move under a push that stays the same; the actuators have their command already.
+
+        Args:
+            state: Of the body's origin, shapes (worlds,).
+            actuation: What the actuators do.
+            world: Bodies and surroundings.
+            outside: As of `outside`.
+            substeps: Integration steps.
+            latest_s: As of `longest_delay` [s].
+            off_centre: As of `is_off_centre`.
+
+        Returns:
+            State after `substeps` physics steps.
+        """
+
+    @abstractmethod
+    def reported(self, measured: S, truth: RigidBodyState) -> RigidBodyState:
+        """Odometry of one body, without a batch axis: what is measured, and of the rest the truth."""
+
+    def push_things(self, things: Sequence[Thing], poses: Poses, before: S, after: S) -> tuple[Poses, S]:
+        """Move the things of a task; arguments and result as of `things.push_things`. By default they stay."""
+        return poses, after
+
+
+class PlanarDynamics(Dynamics[World, PlanarState]):
+    """Bodies on air, water or wheels that move in the plane."""
+
+    state_type = PlanarState
+    odometer = Odometer
+
+    def draw_world(self, scenario: Scenario, draws: Draws) -> World:
+        """See `Dynamics.draw_world`."""
+        return draw_world(self.robot, scenario, draws)
+
+    def blurs(self, world: World) -> bool:
+        """See `Dynamics.blurs`."""
+        return bool(world.velocity_noise.any() or world.yaw_rate_noise.any())
+
+    def outside(self, state: PlanarState, world: World, time_s: Array, control_dt: float) -> Wrench:
+        """Force along the world's x and y [N], and yaw moment [N·m]; see `Dynamics.outside`."""
+        return outside_wrench(state, world, time_s, control_dt)
+
+    def push_is_constant(self, world: World) -> bool:
+        """See `Dynamics.push_is_constant`."""
+        return push_is_constant(world)
+
+    def is_off_centre(self, world: World) -> bool:
+        """See `Dynamics.is_off_centre`."""
+        return bool(world.com_x.any() or world.com_y.any())
+
+    def move(
+        self,
+        state: PlanarState,
+        actuation: ActuationState,
+        world: World,
+        outside: Wrench,
+        *,
+        substeps: int,
+        latest_s: float,
+        off_centre: bool,
+    ) -> PlanarState:
+        """See `Dynamics.move`."""
+        return move(
+            self.robot,
+            state,
+            actuation,
+            world,
+            outside,
+            substeps=substeps,
+            latest_s=latest_s,
+            off_centre=off_centre,
+        )
+
+    def reported(self, measured: PlanarState, truth: RigidBodyState) -> RigidBodyState:
+        """A planar measurement with the true height, roll and pitch."""
+        true = PlanarState.from_rigid(truth)
+        flat, above = measured.to_rigid(), truth.position_in_world[2]
+        flat.position_in_world[2], flat.velocity_in_world[2] = above, truth.velocity_in_world[2]
+        flat.angular_velocity_in_body[:2] = truth.angular_velocity_in_body[:2]
+        turned = multiply(from_yaw(measured.yaw - true.yaw), truth.quat_xyzw)
+        return RigidBodyState(
+            flat.position_in_world, turned, flat.velocity_in_world, flat.angular_velocity_in_body
+        )
+
+    def push_things(
+        self, things: Sequence[Thing], poses: Poses, before: PlanarState, after: PlanarState
+    ) -> tuple[Poses, PlanarState]:
+        """See `Dynamics.push_things`."""
+        return push_things(things, poses, before, after, self.robot)
+
+
+class SpatialDynamics(Dynamics[SpatialWorld, SpatialState]):
+    """Rigid bodies that float free."""
+
+    state_type = SpatialState
+    odometer = SpatialOdometer
+
+    def __init__(self, robot: Robot, *, orbits: bool = True) -> None:
+        """Prepare; `orbits`: some world may have the gravity gradient of an orbit."""
+        super().__init__(robot)
+        self._orbits = orbits
+        self._full = any(robot.body.tensor[3:])  # whether the inertia has more than its diagonal
+
+    def draw_world(self, scenario: Scenario, draws: Draws) -> SpatialWorld:
+        """See `Dynamics.draw_world`."""
+        return draw_spatial_world(self.robot, scenario, draws)
+
+    def blurs(self, world: SpatialWorld) -> bool:
+        """See `Dynamics.blurs`."""
+        return bool(world.velocity_noise.any() or world.rate_noise.any())
+
+    def outside(
+        self, state: SpatialState, world: SpatialWorld, time_s: Array, control_dt: float
+    ) -> tuple[Array, ...]:
+        """Force along the world's axes [N], and torque about the body's [N·m]; see `Dynamics.outside`.
+
+        The torque is that of an orbit, and left out where no world has one; the constant one of a world is not in it.
+        """
+        force = push_in_world(world, time_s, control_dt)
+        return (*force, *orbit_torque(state, world, time_s)) if self._orbits else force
+
+    def push_is_constant(self, world: SpatialWorld) -> bool:
+        """See `Dynamics.push_is_constant`."""
+        return not (world.kick.any() or world.orbit_rate.any())
+
+    def is_off_centre(self, world: SpatialWorld) -> bool:
+        """See `Dynamics.is_off_centre`."""
+        return bool(world.com.any())
+
+    def move(
+        self,
+        state: SpatialState,
+        actuation: ActuationState,
+        world: SpatialWorld,
+        outside: tuple[Array, ...],
+        *,
+        substeps: int,
+        latest_s: float,
+        off_centre: bool,
+    ) -> SpatialState:
+        """See `Dynamics.move`."""
+        dt, actuators = self.robot.timing.physics_dt, self.robot.actuators
+        assert isinstance(actuators, Pushing)  # as of `dynamics_of`
+        inertia = inertia_of(tuple(world.inertia)[: 6 if self._full else 3])
+        com: Vector = (world.com[0], world.com[1], world.com[2])
+        if off_centre:
+            state = shifted(state, com)
+        push: Vector = (outside[0], outside[1], outside[2])
+        steady: Vector = (world.torque[0], world.torque[1], world.torque[2])
+        if len(outside) > 3:
+            steady = plus(steady, (outside[3], outside[4], outside[5]))
+        doing, force, torque = None, push, push
+        for _ in range(substeps):
+            applied = actuation.advance(dt, latest_s=latest_s)
+            if applied is not doing:
+                doing = applied
+                force, torque = actuators.spatial_wrench(applied, actuation.gain)
+                if off_centre:
+                    torque = minus(torque, cross(com, force))
+                torque = plus(torque, steady)
+            state = rigid_body_step(state, force, torque, push, world.mass, inertia, dt)
+        return shifted(state, scaled(-1.0, com)) if off_centre else state
+
+    def reported(self, measured: SpatialState, truth: RigidBodyState) -> RigidBodyState:
+        """See `Dynamics.reported`."""
+        return measured.to_rigid()
+
+
+class GyrostatDynamics(SpatialDynamics):
+    """Satellites that reaction wheels turn, whose inertia may change, under sunlight and in a magnetic field."""
+
+    def __init__(self, robot: Robot) -> None:
+        """Prepare; every world may have an orbit."""
+        super().__init__(robot)
+        assert isinstance(robot.actuators, ReactionWheels)  # as of `dynamics_of`
+        self._wheels = robot.actuators
+        self._flywheels = Flywheels(self._wheels.axes, self._wheels.spin_inertia)
+        unloading = self._wheels.unloading
+        self._magnetic = unloading is not None and unloading.kind == "magnetic"
+
+    def outside(
+        self, state: SpatialState, world: SpatialWorld, time_s: Array, control_dt: float
+    ) -> tuple[Array, ...]:
+        """Ten numbers, held over a control step; see `Dynamics.outside`.
+
+        Force along the world's axes [N], torque about the body's [N·m] with the constant one, direction of the magnetic
+        field in the world, and factor on the inertia.
+        """
+        growth = grown(world, time_s)
+        steady: Vector = (world.torque[0], world.torque[1], world.torque[2])
+        torque = plus(
+            plus(steady, solar_torque(state, world)), scaled(growth, orbit_torque(state, world, time_s))
+        )
+        force = push_in_world(world, time_s, control_dt)
+        return (*force, *torque, *magnetic_field(world.orbit_rate, time_s), growth)
+
+    def push_is_constant(self, world: SpatialWorld) -> bool:
+        """See `Dynamics.push_is_constant`."""
+        return False
+
+    def move(
+        self,
+        state: SpatialState,
+        actuation: ActuationState,
+        world: SpatialWorld,
+        outside: tuple[Array, ...],
+        *,
+        substeps: int,
+        latest_s: float,
+        off_centre: bool,
+    ) -> SpatialState:
+        """See `Dynamics.move`; of `outside` what is left out is nothing."""
+        assert isinstance(actuation, WheelActuation)  # as of `actuation_of`
+        dt, wheels = self.robot.timing.physics_dt, self._wheels
+        force: Vector = (outside[0], outside[1], outside[2])
+        tensor = tuple(world.inertia)[: 6 if self._full else 3]
+        steady, field = scaled(0.0, force), None
+        if len(outside) > 3:
+            steady, growth = (outside[3], outside[4], outside[5]), outside[9]
+            tensor = tuple(growth * entry for entry in tensor)
+            field = (outside[6], outside[7], outside[8]) if self._magnetic else None
+        for _ in range(substeps):
+            applied = actuation.advance(dt, latest_s=latest_s) * actuation.gain
+            motors = wheels.motor_torque(applied[: wheels.count], actuation.speeds, dt)
+            torque, here = steady, None if field is None else turn_back(state.quat, field)
+            unloading = wheels.unloading_torque(applied, here)
+            state, speeds = gyrostat_step(
+                state,
+                tuple(actuation.speeds),
+                torque if unloading is None else plus(torque, unloading),
+                force,
+                partial(_on_wheels, wheels, tuple(motors)),
+                self._flywheels,
+                world.mass,
+                tensor,
+                dt,
+            )
+            actuation.speeds = array_namespace(applied).stack(speeds)
+        return state
+
+
+def _on_wheels(
+    wheels: ReactionWheels, motors: tuple[Array, ...], speeds: tuple[Array, ...]
+) -> tuple[Array, ...]:
+    """Torque on each wheel: of its motor and of its bearing [N·m]."""
+    if not wheels.has_friction:
+        return motors
+    return tuple(motor + wheels.friction_torque(speed) for motor, speed in zip(motors, speeds, strict=True))

@@ -1,0 +1,1 @@
+"""Events that moving stars cause in a camera."""

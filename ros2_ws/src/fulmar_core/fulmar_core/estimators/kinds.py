@@ -1,0 +1,256 @@
+"""The table of estimators: what each takes and publishes, its settings, and how it is made. Knows no ROS."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, TypeVar
+
+from fulmar_core.config.errors import ConfigError, did_you_mean
+from fulmar_core.config.paths import config_path
+from fulmar_core.config.strict_yaml import line_of, load_config
+from fulmar_core.estimators.motion.estimator import Estimator
+from fulmar_core.estimators.motion.settings import (
+    AttitudeSettings,
+    EstimatorSettings,
+    EventRateSettings,
+    InertiaSettings,
+    MotionSettings,
+    PlanarMotionSettings,
+    SpatialMotionSettings,
+)
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.sensors.repetition import without_noise
+from fulmar_core.robots.topics import (
+    EVENTS,
+    EVENTS_2,
+    IMU,
+    INERTIA,
+    INERTIA_COVARIANCE,
+    INERTIA_STATUS,
+    MOCAP,
+    ODOMETRY,
+    RATE,
+    RATE_STATUS,
+    SENSOR_WIRES,
+    Wire,
+)
+from fulmar_core.states.planar import PlanarState
+from fulmar_core.states.spatial import SpatialState
+from fulmar_core.states.state import State
+
+Motion = TypeVar("Motion", bound=MotionSettings)
+
+FAR_ABOVE = 2.0  # times the noise of the settings: their poses would be outliers
+DEFAULT_KIND = "planar_motion"  # of a file that names none
+# Files of configs/estimators that make odometry of motion capture and inertial readings.
+DEFAULT_FILES: Mapping[type[State], str] = {PlanarState: "mocap_imu", SpatialState: "mocap_imu_3d"}
+
+
+@dataclass(frozen=True)
+class EstimatorKind:
+    """One row: everything that nodes, plans and scripts need to know of a kind of estimator."""
+
+    settings: type[EstimatorSettings]  # keys of its files
+    make: Callable[[Any, Robot], Estimator]  # from such settings
+    takes: Mapping[str, Wire]  # readings without which it is of no use, by name
+    publishes: tuple[Wire, ...]  # each from the same estimate
+    takes_if_there: Mapping[str, Wire] = field(default_factory=dict)  # readings that improve the estimate
+    needs: tuple[str, ...] = ()  # modules of extras
+    form: type[State] = PlanarState  # state type of the robots whose motion it estimates
+    turns_only: bool = False  # of robots that reaction wheels turn, whose place it does not estimate
+    every_s: float = 0.0  # time between two estimates that are published, at least [s]
+    status: Wire | None = None  # where its `status()` is published
+    node: str = "estimator"  # name of the node that runs it
+
+    @property
+    def readings(self) -> dict[str, Wire]:
+        """All that it takes, by name."""
+        return {**self.takes, **self.takes_if_there}
+
+
+def _fitted(settings: Motion, robot: Robot) -> Motion:
+    """Settings whose poses have the noise and the delay of a robot's file, where those are above theirs."""
+    odometry = robot.sensors.odometry
+    turn = "heading_std" if isinstance(settings, PlanarMotionSettings) else "attitude_std"
+    theirs = {"position_std": odometry.position.std, turn: odometry.heading.std}
+    more = {name: std for name, std in theirs.items() if std > FAR_ABOVE * getattr(settings, name)}
+    if odometry.delay_s > settings.latency_s:
+        more["latency_s"] = odometry.delay_s
+    return replace(settings, **more) if more else settings  # type: ignore[arg-type]
+
+
+def _planar_motion(settings: PlanarMotionSettings, robot: Robot) -> Estimator:
+    from fulmar_core.estimators.motion.frozen import noise_of
+    from fulmar_core.estimators.motion.planar_motion import PlanarMotionEstimator
+
+    return PlanarMotionEstimator(
+        _fitted(settings, robot),
+        robot.limits,
+        gyroscope_range=robot.sensors.imu.gyroscope_range,
+        noise=noise_of(robot.sensors),
+    )
+
+
+def _spatial_motion(settings: SpatialMotionSettings, robot: Robot) -> Estimator:
+    from fulmar_core.estimators.motion.frozen import noise_of
+    from fulmar_core.estimators.motion.spatial_motion import SpatialMotionEstimator
+
+    return SpatialMotionEstimator(
+        _fitted(settings, robot),
+        robot.limits,
+        gyroscope_range=robot.sensors.imu.gyroscope_range,
+        noise=noise_of(robot.sensors),
+    )
+
+
+def _attitude(settings: AttitudeSettings, robot: Robot) -> Estimator:
+    from fulmar_core.estimators.motion.attitude import AttitudeEstimator
+
+    return AttitudeEstimator(settings, robot)
+
+
+def _inertia(settings: InertiaSettings, robot: Robot) -> Estimator:
+    from fulmar_core.estimators.inertia.estimator import InertiaEstimator
+
+    return InertiaEstimator(settings, robot)
+
+
+def _event_rate(settings: EventRateSettings, robot: Robot) -> Estimator:
+    from fulmar_core.estimators.event_rate.estimator import EventRateEstimator
+
+    return EventRateEstimator(settings, tuple(each.camera for each in robot.event_cameras))
+
+
+KINDS: dict[str, EstimatorKind] = {
+    "planar_motion": EstimatorKind(
+        PlanarMotionSettings,
+        _planar_motion,
+        takes={"mocap": MOCAP, "imu": IMU},
+        publishes=(ODOMETRY,),
+        takes_if_there={"star_tracker": SENSOR_WIRES["star_tracker"]},
+        needs=("filterpy",),
+    ),
+    "spatial_motion": EstimatorKind(
+        SpatialMotionSettings,
+        _spatial_motion,
+        takes={"mocap": MOCAP, "imu": IMU},
+        publishes=(ODOMETRY,),
+        takes_if_there={"star_tracker": SENSOR_WIRES["star_tracker"]},
+        form=SpatialState,
+        needs=("filterpy",),
+    ),
+    "attitude": EstimatorKind(
+        AttitudeSettings,
+        _attitude,
+        takes={"star_tracker": SENSOR_WIRES["star_tracker"]},
+        publishes=(ODOMETRY,),
+        takes_if_there={"imu": IMU, "wheels": SENSOR_WIRES["wheels"], "rate": RATE},
+        form=SpatialState,
+        turns_only=True,
+    ),
+    "inertia": EstimatorKind(
+        InertiaSettings,
+        _inertia,
+        takes={"imu": IMU, "wheels": SENSOR_WIRES["wheels"]},
+        publishes=(INERTIA, INERTIA_COVARIANCE),
+        form=SpatialState,
+        turns_only=True,
+        every_s=1.0,
+        status=INERTIA_STATUS,
+        node="inertia_estimator",
+    ),
+    "event_rate": EstimatorKind(
+        EventRateSettings,
+        _event_rate,
+        takes={"events": EVENTS},
+        publishes=(RATE,),
+        takes_if_there={"events_2": EVENTS_2},
+        form=SpatialState,
+        turns_only=True,
+        status=RATE_STATUS,
+        node="rate_estimator",
+    ),
+}
+
+
+def default_estimator(robot: Robot) -> str:
+    """Name of the file of a robot that names no estimator, by what moves it and its state type."""
+    if robot.actuators.turns_only:
+        return "attitude"
+    return DEFAULT_FILES[robot.state_type]
+
+
+def estimator_path(name: str) -> Path:
+    """Path of `configs/estimators/<name>.yaml`, or the file itself where the name ends in `.yaml`."""
+    return Path(name) if name.endswith(".yaml") else config_path("estimators", name)
+
+
+def estimator_kind(name: str) -> EstimatorKind:
+    """The row of an estimator's file; `name` as of `load_estimator`.
+
+    Raises:
+        ConfigError: No such file or kind, or the file is not YAML.
+    """
+    path = estimator_path(name)
+    kind = load_config(dict[str, Any], path).get("kind", DEFAULT_KIND)
+    if kind not in KINDS:
+        raise ConfigError(
+            f"{path}:{line_of(path, ['kind'])}: unknown kind of estimator '{kind}'. "
+            f"Known: {', '.join(KINDS)}.{did_you_mean(str(kind), KINDS)}"
+        )
+    return KINDS[kind]
+
+
+def load_estimator(name: str) -> EstimatorSettings:
+    """Read `configs/estimators/<name>.yaml`, or the file itself where the name ends in `.yaml`.
+
+    Raises:
+        ConfigError: Unknown name or kind, or a mistake in the file.
+    """
+    return load_config(estimator_kind(name).settings, estimator_path(name))
+
+
+def check_estimator(name: str, robot: Robot) -> None:
+    """Refuse a file that cannot be read, and an estimator that does not estimate how a robot moves.
+
+    Raises:
+        ConfigError: As of `load_estimator`, or the robot is of the other space.
+    """
+    load_estimator(name)
+    kind = estimator_kind(name)
+    form = kind.form
+    if kind.turns_only is not robot.actuators.turns_only:
+        what = "the attitude of a satellite" if kind.turns_only else "the place of a robot that moves"
+        raise ConfigError(
+            f"estimator '{name}' is of {what}, and '{robot.name}' has {robot.actuators.kind}. "
+            f"Use '{default_estimator(robot)}' of configs/estimators, or leave it out."
+        )
+    if kind.takes.get("events") and not robot.event_cameras:
+        raise ConfigError(
+            f"estimator '{name}' takes the events of a camera, and '{robot.name}' has none: add 'event_cameras' to its "
+            "file."
+        )
+    if robot.state_type is not form:
+        raise ConfigError(
+            f"estimator '{name}' is of motion in {form.WORLD}, and robot '{robot.name}' moves in "
+            f"{robot.state_type.WORLD}. Use '{default_estimator(robot)}' of configs/estimators, or leave it out."
+        )
+
+
+def make_estimator(name: str, robot: Robot, *, exact_sensors: bool = False) -> Estimator:
+    """A new estimator of a robot with the settings of a file.
+
+    Args:
+        name: See `load_estimator`.
+        robot: The robot; its file says which sensors have noise, so that a value that they repeat is no measurement.
+        exact_sensors: Whether none has any, as in a simulation without noise.
+
+    Raises:
+        ConfigError: See `check_estimator`.
+    """
+    check_estimator(name, robot)
+    if exact_sensors:
+        robot = replace(robot, sensors=without_noise(robot.sensors))
+    return estimator_kind(name).make(load_estimator(name), robot)

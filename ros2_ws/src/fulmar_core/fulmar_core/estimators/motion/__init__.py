@@ -1,0 +1,1 @@
+"""Estimators of pose, velocity and attitude from the readings of sensors."""

@@ -1,0 +1,246 @@
+"""Motion in space as a multiplicative extended Kalman filter: poses and attitudes correct what an inertial unit drives.
+
+The errors of position, velocity, attitude and of the unit's biases are filtered by filterpy; the attitude itself is a
+unit quaternion that errors multiply. Solà, "Quaternion kinematics for the error-state Kalman filter", arXiv 1711.02508:
+the model is that of section 5 with the attitude's error in the body's frame; corrections are those of section 6.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from filterpy.kalman import ExtendedKalmanFilter
+
+from fulmar_core.estimators.motion import filter as events
+from fulmar_core.estimators.motion.filter import Filter, Placed
+from fulmar_core.estimators.motion.settings import SpatialMotionSettings
+from fulmar_core.robots.sensors.imu import ImuSample
+from fulmar_core.states.attitude import exponential, normalised, product, rotation_error
+from fulmar_core.states.rotation import rotate
+
+ERRORS = 15
+PLACE, VELOCITY, TURN, FORCE_BIAS, RATE_BIAS = (slice(i, i + 3) for i in range(0, ERRORS, 3))
+SPREAD_AT_START = (1.0, 1.0, 1.0, 0.05, 1.0)  # m, m/s, rad, m/s², rad/s without an inertial reading
+RATE_BIAS_STD = 0.02  # of a gyroscope whose readings begin [rad/s]
+_POSE_ROWS = np.eye(ERRORS)[[0, 1, 2, 6, 7, 8]]
+_TURN_ROWS = np.eye(ERRORS)[TURN]
+
+
+@dataclass(frozen=True, slots=True)
+class Belief:
+    """What is believed beside the covariance."""
+
+    position: np.ndarray  # (3,) [m]
+    velocity: np.ndarray  # (3,) in the world [m/s]
+    quat_xyzw: np.ndarray  # (4,)
+    force_bias: np.ndarray  # (3,) of the accelerometer [m/s²]
+    rate_bias: np.ndarray  # (3,) of the gyroscope [rad/s]
+    rate: np.ndarray  # (3,) turn rate in the body [rad/s]
+    measured: (
+        bool  # whether it comes from an inertial reading; else poses and attitudes correct it as they turn
+    )
+
+
+class SpatialFilter(ExtendedKalmanFilter, Filter):  # type: ignore[misc]
+    """Position, velocity, attitude and biases; `x` holds their errors, which are zero between corrections.
+
+    A turn rate that comes from no inertial reading is off by the negative of the error in the place of the gyroscope's
+    bias, as one that does.
+
+    Events: a pose, shape (7,); an `ImuSample`; an attitude with its covariance about the body's axes, shapes (4,) and
+    (3, 3) [rad²].
+    """
+
+    def __init__(self, settings: SpatialMotionSettings, pose: np.ndarray) -> None:
+        """Begin at rest at a pose, knowing little else."""
+        super().__init__(dim_x=ERRORS, dim_z=6)
+        self._settings = settings
+        zero = np.zeros(3)
+        self.belief = Belief(pose[:3], zero, _unit(pose[3:]), zero, zero, zero, measured=False)
+        self.x = np.zeros(ERRORS)
+        spread = np.repeat(SPREAD_AT_START, 3)
+        spread[PLACE], spread[TURN] = settings.position_std, settings.attitude_std
+        self.P = np.diag(spread**2)
+        self._pose_noise = np.diag(np.repeat((settings.position_std**2, settings.attitude_std**2), 3))
+
+    def move_on(self, seconds: float, inertial: ImuSample | None) -> None:
+        """Predict by a reading of the inertial unit; see `Filter.move_on`."""
+        if seconds <= 0.0:
+            return
+        has_rate = inertial is not None and inertial.has_rate
+        has_force = inertial is not None and inertial.has_force
+        if has_rate:
+            self._begin_to_measure()
+        t, s, now = seconds, self._settings, self.belief
+        rate, force, noise = now.rate, np.zeros(3), s.manoeuvre
+        if inertial is not None and has_rate:
+            rate = inertial.angular_velocity - now.rate_bias
+        if inertial is not None and has_force:
+            force, noise = inertial.specific_force - now.force_bias, s.acceleration_noise
+        axes = rotate(now.quat_xyzw, np.eye(3)).T  # body to world
+        push = axes @ force
+        turned = exponential(tuple(t * rate))
+        F = np.eye(ERRORS)
+        F[PLACE, VELOCITY] = t * np.eye(3)
+        if has_force:
+            lever = -axes @ _skew(force)
+            F[PLACE, TURN], F[VELOCITY, TURN] = 0.5 * t * t * lever, t * lever
+            F[PLACE, FORCE_BIAS], F[VELOCITY, FORCE_BIAS] = -0.5 * t * t * axes, -t * axes
+        F[TURN, RATE_BIAS] = -t * np.eye(3)
+        F[TURN, TURN] = rotate(np.asarray(turned), np.eye(3))  # of the inverse rotation: rows are turned axes
+        self.F, self.Q = F, self._noise(t, noise, measured=has_rate)
+        self.belief = Belief(
+            now.position + t * now.velocity + 0.5 * t * t * push,
+            now.velocity + t * push,
+            np.asarray(normalised(product(tuple(now.quat_xyzw), turned))),
+            now.force_bias,
+            now.rate_bias,
+            rate,
+            measured=has_rate,
+        )
+        self.predict()
+
+    def predict_x(self, u: Any = 0) -> None:
+        """Errors stay zero: the belief itself has moved."""
+
+    def correct(self, kind: int, value: Any) -> None:
+        """Correct by an event; an inertial reading has moved the filter to its time already."""
+        if kind == events.IMU and not value.has_rate:
+            return
+        if kind == events.IMU:
+            self._begin_to_measure()
+        now = self.belief
+        if kind == events.IMU:
+            self.belief = Belief(
+                now.position,
+                now.velocity,
+                now.quat_xyzw,
+                now.force_bias,
+                now.rate_bias,
+                value.angular_velocity - now.rate_bias,
+                measured=True,
+            )
+            return
+        residual, rows, noise = self._residual(kind, value)
+        self.update(residual, lambda _x: rows, lambda x: rows @ x, R=noise)
+        self._inject()
+
+    def distance2(self, kind: int, value: Any) -> float:
+        """See `Filter.distance2`."""
+        residual, rows, noise = self._residual(kind, value)
+        return float(residual @ np.linalg.solve(rows @ self.P @ rows.T + noise, residual))
+
+    def snapshot(self) -> tuple[Belief, np.ndarray]:
+        """Belief and covariance."""
+        return self.belief, self.P  # both are replaced, and changed neither in place
+
+    def restore(self, snapshot: tuple[Belief, np.ndarray]) -> None:
+        """Go back."""
+        self.belief, self.P = snapshot
+
+    def speed_std(self) -> float:
+        """See `Filter.speed_std`."""
+        return math.sqrt(float(np.diag(self.P)[VELOCITY].max()))
+
+    def rate_std(self) -> float:
+        """See `Filter.rate_std`."""
+        return math.sqrt(float(np.diag(self.P)[RATE_BIAS].max()))
+
+    def placed(self) -> Placed:
+        """See `Filter.placed`."""
+        return self.belief.position, self.belief.quat_xyzw
+
+    def biases(self) -> tuple[float, float]:
+        """See `Filter.biases`."""
+        return float(np.linalg.norm(self.belief.force_bias)), float(np.linalg.norm(self.belief.rate_bias))
+
+    def keep_biases(self, other: SpatialFilter) -> None:
+        """See `Filter.keep_biases`; the turn rate, too, which has the error of the gyroscope's bias."""
+        theirs, P, biases = other.belief, self.P.copy(), slice(FORCE_BIAS.start, RATE_BIAS.stop)
+        P[biases, biases] = other.P[biases, biases]
+        self.belief = replace(
+            self.belief,
+            force_bias=theirs.force_bias,
+            rate_bias=theirs.rate_bias,
+            rate=theirs.rate,
+            measured=theirs.measured,
+        )
+        self.P = P
+
+    def velocity(self) -> np.ndarray:
+        """See `Filter.velocity`."""
+        return self.belief.velocity
+
+    def turn_rate(self) -> float:
+        """See `Filter.turn_rate`."""
+        return float(np.linalg.norm(self.belief.rate))
+
+    def separation(self, other: SpatialFilter) -> tuple[np.ndarray, np.ndarray]:
+        """See `Filter.separation`."""
+        a, b = self.belief, other.belief
+        turn = rotation_error(tuple(b.quat_xyzw), tuple(a.quat_xyzw))
+        return np.concatenate((a.position - b.position, a.velocity - b.velocity, turn)), other.P[:9, :9]
+
+    def _residual(self, kind: int, value: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Measured less expected, the rows of the errors that it shows, and its noise."""
+        if kind == events.POSE:
+            turn = rotation_error(tuple(self.belief.quat_xyzw), tuple(_unit(value[3:])))
+            return np.concatenate((value[:3] - self.belief.position, turn)), _POSE_ROWS, self._pose_noise
+        quat, noise = value
+        return np.asarray(rotation_error(tuple(self.belief.quat_xyzw), tuple(_unit(quat)))), _TURN_ROWS, noise
+
+    def _inject(self) -> None:
+        """Move the errors that were found into the belief (Solà eq. 282 to 286)."""
+        error, now = self.x, self.belief
+        turned = product(tuple(now.quat_xyzw), exponential(tuple(error[TURN])))
+        self.belief = Belief(
+            now.position + error[PLACE],
+            now.velocity + error[VELOCITY],
+            np.asarray(normalised(turned)),
+            now.force_bias + error[FORCE_BIAS],
+            now.rate_bias + error[RATE_BIAS] if now.measured else now.rate_bias,
+            now.rate - error[RATE_BIAS],
+            now.measured,
+        )
+        G = np.eye(ERRORS)
+        G[TURN, TURN] -= _skew(0.5 * error[TURN])
+        self.P = G @ self.P @ G.T
+        self.x = np.zeros(ERRORS)
+
+    def _begin_to_measure(self) -> None:
+        """Know of a turn rate only the bias of its gyroscope from now on, where none was measured before."""
+        if self.belief.measured:
+            return
+        P = self.P.copy()
+        P[RATE_BIAS], P[:, RATE_BIAS] = 0.0, 0.0
+        P[RATE_BIAS, RATE_BIAS] = RATE_BIAS_STD**2 * np.eye(3)
+        self.belief, self.P = replace(self.belief, measured=True), P
+
+    def _noise(self, t: float, acceleration: float, *, measured: bool) -> np.ndarray:
+        """What noise adds to the covariance in a time [s]; `measured`: by an inertial reading."""
+        Q, one, s = np.zeros((ERRORS, ERRORS)), np.eye(3), self._settings
+        q = acceleration**2
+        Q[PLACE, PLACE], Q[VELOCITY, VELOCITY] = q * t**3 / 3.0 * one, q * t * one
+        Q[PLACE, VELOCITY] = Q[VELOCITY, PLACE] = q * t * t / 2.0 * one
+        Q[FORCE_BIAS, FORCE_BIAS] = s.accelerometer_drift**2 * t * one
+        if measured:
+            Q[TURN, TURN] = s.gyroscope_noise**2 * t * one
+            Q[RATE_BIAS, RATE_BIAS] = s.gyroscope_drift**2 * t * one
+        else:
+            spin = s.spin**2
+            Q[TURN, TURN], Q[RATE_BIAS, RATE_BIAS] = spin * t**3 / 3.0 * one, spin * t * one
+            Q[TURN, RATE_BIAS] = Q[RATE_BIAS, TURN] = -spin * t * t / 2.0 * one
+        return Q
+
+
+def _unit(quat: np.ndarray) -> np.ndarray:
+    return np.asarray(quat / np.linalg.norm(quat))
+
+
+def _skew(v: np.ndarray) -> np.ndarray:
+    """Matrix of the vector product with v."""
+    x, y, z = v
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])

@@ -1,0 +1,66 @@
+"""Motion in space, from poses, inertial readings and star tracker attitudes in any order of arrival.
+
+Readings: `mocap` is a pose in the world, shape (7,): position [m], quaternion x, y, z, w. `imu` is an `ImuSample` in
+the body's frame, without gravity. `star_tracker` is the attitude of the body in the world, a quaternion x, y, z, w; its
+covariance is about the body's axes, shape (3, 3) [rad²]. The estimate is a `RigidBodyState`; its covariance, shape
+(12, 12), is about position and rotation in the world [m, rad], then velocity in the world [m/s] and turn rate in the
+body [rad/s].
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fulmar_core.estimators.motion.filter import Placed
+from fulmar_core.estimators.motion.history import HistoryEstimator
+from fulmar_core.estimators.motion.settings import SpatialMotionSettings
+from fulmar_core.estimators.motion.spatial_filter import PLACE, RATE_BIAS, TURN, VELOCITY, SpatialFilter
+from fulmar_core.robots.sensors.imu import ImuSample
+from fulmar_core.states.rotation import rotate
+from fulmar_core.states.state import RigidBodyState
+from fulmar_core.wires.reading import Reading
+
+
+class SpatialMotionEstimator(HistoryEstimator[SpatialMotionSettings]):
+    """Multiplicative extended Kalman filter with a history; see `Estimator`."""
+
+    _filter: SpatialFilter | None
+
+    def _pose(self, reading: Reading) -> np.ndarray:
+        return np.array(reading.value, dtype=float)
+
+    def _inertial(self, reading: Reading) -> ImuSample:
+        sample: ImuSample = reading.value
+        return sample
+
+    def _attitude(self, reading: Reading) -> tuple[np.ndarray, np.ndarray]:
+        """Quaternion, and covariance about the body's axes, shape (3, 3) [rad²]."""
+        noise = reading.covariance
+        return np.array(reading.value), self._settings.star_tracker_std**2 * np.eye(
+            3
+        ) if noise is None else noise
+
+    def _turn_rate(self, reading: Reading) -> float:
+        return float(np.linalg.norm(reading.value.angular_velocity))
+
+    def _new_filter(self, pose: np.ndarray) -> SpatialFilter:
+        return SpatialFilter(self._settings, pose)
+
+    def _placed(self, pose: np.ndarray) -> Placed:
+        return pose[:3], pose[3:] / np.linalg.norm(pose[3:])
+
+    def _value(self) -> tuple[RigidBodyState, np.ndarray]:
+        """State, and covariance of shape (12, 12)."""
+        assert self._filter is not None
+        now, P = self._filter.snapshot()
+        state = RigidBodyState(now.position, now.quat_xyzw, now.velocity, now.rate)
+        axes = rotate(now.quat_xyzw, np.eye(3)).T  # body to world
+        chosen = np.r_[
+            np.arange(15)[PLACE], np.arange(15)[TURN], np.arange(15)[VELOCITY], np.arange(15)[RATE_BIAS]
+        ]
+        covariance = P[np.ix_(chosen, chosen)].copy()
+        turn = np.eye(12)
+        turn[3:6, 3:6] = axes
+        covariance = turn @ covariance @ turn.T
+        covariance[9:, 9:] += self._settings.gyroscope_std**2 * np.eye(3)
+        return state, covariance

@@ -1,1 +1,0 @@
-"""Torques of wheels that make the inertia of a satellite observable."""

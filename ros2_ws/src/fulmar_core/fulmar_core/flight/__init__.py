@@ -1,1 +1,0 @@
-"""Aircraft: air, coefficients, ground effect, propulsion, turbulence, trim and modes."""

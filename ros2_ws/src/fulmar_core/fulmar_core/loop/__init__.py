@@ -1,0 +1,1 @@
+"""The control loop from measurement to command, missions, rollouts, and policy bundles."""

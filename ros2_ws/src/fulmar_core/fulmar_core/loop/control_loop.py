@@ -1,0 +1,203 @@
+"""One control step from measurement to command, for nodes, re-runs, evaluation and identification."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fulmar_core.controllers.controller import Controller, Inputs
+from fulmar_core.estimators.actuator_health.actuator_estimator import ActuatorEstimate, ActuatorEstimator
+from fulmar_core.estimators.actuator_health.applied import Applied, AppliedHistory
+from fulmar_core.robots.robot import Robot
+from fulmar_core.safety.command_gate import command_problem
+from fulmar_core.states.state import State
+from fulmar_core.tasks import Task
+from fulmar_core.tasks.goal import Goal
+from fulmar_core.tasks.observation import Observer, slewed
+
+NEVER_NS = 1 << 62  # no pause is that long
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """Outcome of one control step of n robots."""
+
+    observation: np.ndarray  # shape (n, k)
+    action: np.ndarray  # what the controller chose, of whatever shape
+    command: np.ndarray  # the action after every limit; the safe one where it was refused, shape (n, m)
+    refusal: str  # why the action was refused; empty if it was not
+
+
+class ControlLoop:
+    """Advances the goal by what was measured, observes, asks the controller, and limits and gates its command.
+
+    Attributes:
+        goal: Of all robots, leading shape (n,); None before there is one.
+        previous: Command of the step before, after every limit, shape (n, m).
+        answered_ns: Stamp of the measurement that this was the answer to; -1 before the first [ns].
+        estimate: Of the controller's actuator estimator at the newest step; None without one.
+        wheels: Newest speeds of reaction wheels, shape (n, count); None where they are not measured [rad/s].
+        inertia: Newest estimate of one robot's inertia, shape (3, 3); None without one [kg·m²].
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        task: Task,
+        controller: Controller,
+        *,
+        robots: int = 1,
+        pause_ns: int = NEVER_NS,
+        applied: AppliedHistory | None = None,
+    ) -> None:
+        """Begin without a goal.
+
+        Args:
+            robot: The robot.
+            task: What it does.
+            controller: Chooses the commands.
+            robots: n, how many of it run side by side.
+            pause_ns: After a longer time without a command the past is forgotten [ns].
+            applied: What the actuators of one robot did, as far as that is known; without it the loop takes commands
+                for what was applied.
+        """
+        self.robot, self.task = robot, task.fitted(robot)
+        self.observer = Observer(robot, self.task)
+        self.dt = robot.timing.substeps(controller.control_hz) * robot.timing.physics_dt
+        self._pause_ns, self._applied = pause_ns, applied
+        self._safe = np.tile(np.asarray(robot.actuators.safe_command, dtype=float), (robots, 1))
+        self.goal: Goal | None = None
+        self._began_ns: int | None = None
+        self.previous, self.answered_ns = self._safe, -1
+        self._estimator = self._estimator_for(controller)
+        self.estimate: ActuatorEstimate | None = None
+        self._estimated_ns = -1
+        self._controller = controller
+        self.wheels: np.ndarray | None = None
+        self.inertia: np.ndarray | None = None
+
+    @property
+    def controller(self) -> Controller:
+        """The controller that chooses the commands."""
+        return self._controller
+
+    def use(self, controller: Controller) -> None:
+        """Let another controller go on; what is estimated begins anew."""
+        if controller.estimator != self._controller.estimator:
+            self._estimator = self._estimator_for(controller)
+        self._controller = controller
+        self._forget_estimates()
+
+    def begin(self, goal: Goal | None) -> None:
+        """Take a new goal, leading shape (n,), or none; its time begins with the next step."""
+        self.goal, self._began_ns = goal, None
+
+    def reset(self) -> None:
+        """Let controller and estimator forget the past: a new goal or episode, or time or place jumped."""
+        self._controller.reset()
+        self._forget_estimates()
+
+    def step(self, measured: State, stamp_ns: int) -> Step:
+        """Do one control step; see `inputs` and `act`."""
+        return self.act(self.inputs(measured, stamp_ns))
+
+    def inputs(self, measured: State, stamp_ns: int) -> Inputs:
+        """Advance the goal by a measurement, and observe.
+
+        Args:
+            measured: State of each robot, shapes (n,).
+            stamp_ns: When it was measured, on the plant's clock [ns].
+
+        Returns:
+            The controller's inputs.
+        """
+        if stamp_ns - self.answered_ns > self._pause_ns:
+            self.previous = self._safe
+            self.reset()
+        state = measured.in_float64()
+        goal = self._advanced(state, stamp_ns)
+        self._estimate(state, stamp_ns)
+        observation = np.asarray(self.observer(state, goal, self.previous), dtype=float)
+        return Inputs(
+            state,
+            goal,
+            observation,
+            self.previous,
+            self.estimate,
+            stamp_ns,
+            self.dt,
+            self.wheels,
+            self.inertia,
+        )
+
+    def act(self, inputs: Inputs) -> Step:
+        """Ask the controller, and limit and gate its command, which is the previous one from then on.
+
+        Raises:
+            Exception: Whatever the controller raises; the previous command is the safe one then.
+        """
+        self.rest(inputs.stamp_ns)
+        return self.take(inputs, self._controller.act(inputs))
+
+    def take(self, inputs: Inputs, chosen: np.ndarray) -> Step:
+        """Limit and gate an action (see `Controller.act`) that was chosen from these inputs."""
+        action = np.asarray(chosen, dtype=float)
+        refusal = command_problem(action, self._safe.shape) or ""
+        command = self._safe
+        if not refusal:
+            command = slewed(self.robot.actuators.limited(action), inputs.previous, self.robot, self.dt)
+        self.previous, self.answered_ns = command, inputs.stamp_ns
+        return Step(inputs.observation, action, command, refusal)
+
+    def rest(self, stamp_ns: int) -> None:
+        """Answer a measurement with the safe command, without asking the controller [ns]."""
+        self.previous, self.answered_ns = self._safe, stamp_ns
+
+    def _advanced(self, state: State, stamp_ns: int) -> Goal:
+        """The goal with those targets done that a measurement reaches."""
+        assert self.goal is not None, "a control step needs a goal"
+        if self._began_ns is None:
+            self._began_ns = stamp_ns
+            self.goal = self.task.begun(self.goal, state)
+        else:
+            time_s = np.asarray((stamp_ns - self._began_ns) / 1e9)
+            self.goal = self.task.advance(self.goal, state, time_s)
+        assert self.goal is not None
+        return self.goal
+
+    def _estimator_for(self, controller: Controller) -> ActuatorEstimator | None:
+        return (
+            ActuatorEstimator(self.robot, controller.estimator) if controller.estimator is not None else None
+        )
+
+    def _forget_estimates(self) -> None:
+        if self._estimator is not None:
+            self._estimator.reset()
+        self.estimate, self._estimated_ns = None, -1
+
+    def _estimate(self, state: Any, stamp_ns: int) -> None:
+        """Update the estimate of a robot in the plane by what moved it since the last one."""
+        passed_ns = stamp_ns - self._estimated_ns
+        if self._estimator is None or passed_ns == 0:  # by the clock, one measurement may serve twice
+            return
+        applied: np.ndarray | Applied | None = None
+        passed_s = self.dt
+        if 0 < passed_ns <= self._pause_ns:
+            applied, passed_s = self.previous, 1e-9 * passed_ns
+            if self._applied is not None:
+                applied = self._applied.between(self._estimated_ns, stamp_ns)
+        self.estimate = self._estimator.update(state, applied, passed_s)
+        self._estimated_ns = stamp_ns
+
+
+def unknown_inputs(loop: ControlLoop, stamp_ns: int) -> Inputs:
+    """Inputs of one robot whose state and goal are not known: NaN."""
+    form = loop.task.state_type
+    twist = loop.task.goal_topic == "goal_velocity"
+    things = {thing.name: form.targets_of(np.full((1, 7), np.nan)) for thing in loop.task.things}
+    target = form.targets_of(np.full((1, 1, 6 if twist else 7), np.nan))
+    goal = Goal(target, np.zeros(1), np.zeros((1, 0, 3)), things)
+    observation = np.full((1, len(loop.observer.names)), np.nan)
+    return Inputs(form.unknown(), goal, observation, loop.previous, None, stamp_ns, loop.dt)

@@ -1,0 +1,215 @@
+"""Closed loops without ROS: a controller in the core's batch, or in simulators side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from typing import Protocol
+
+import numpy as np
+
+from fulmar_core.controllers.controller import Controller
+from fulmar_core.dynamics.things import Poses
+from fulmar_core.loop.control_loop import ControlLoop
+from fulmar_core.robots.robot import Robot
+from fulmar_core.simulation.backend import Backend, Sample
+from fulmar_core.simulation.episode import draw_episodes, episode_steps
+from fulmar_core.simulation.metrics import TargetCounter, Trajectories, TrajectoryLog, join
+from fulmar_core.simulation.simulation import BatchSimulation
+from fulmar_core.states.rotation import Array
+from fulmar_core.states.state import State
+from fulmar_core.tasks import Task
+from fulmar_core.tasks.goal import Goal, goal_in_float64
+from fulmar_core.worlds.scenario import Scenario
+
+SIDE_BY_SIDE = 256  # simulators alive at once
+WORLDS = 2048  # of a batch at once: nearly as fast as more, and their record stays below some 200 MB
+
+Progress = Callable[[int], None]  # called with the number of control steps done
+
+
+def roll_out_in_batch(
+    controller: Controller,
+    robot: Robot,
+    task: Task,
+    scenario: Scenario,
+    *,
+    episodes: int,
+    seed: int,
+    progress: Progress = lambda steps: None,
+) -> Trajectories:
+    """Run episodes in the core's own dynamics; arguments and errors as in `batches`, their runs in one."""
+    return join(
+        list(batches(controller, robot, task, scenario, episodes=episodes, seed=seed, progress=progress))
+    )
+
+
+def batches(
+    controller: Controller,
+    robot: Robot,
+    task: Task,
+    scenario: Scenario,
+    *,
+    episodes: int,
+    seed: int,
+    worlds: int = WORLDS,
+    progress: Progress = lambda steps: None,
+) -> Iterator[Trajectories]:
+    """Run some episodes of a seed in the core's own dynamics, some at once.
+
+    Args:
+        controller: The controller.
+        robot: The robot.
+        task: The task.
+        scenario: What episodes are drawn from.
+        episodes: Number of episodes, >= 1.
+        seed: Seed of the draws.
+        worlds: How many run at once, >= 1; what happens does not depend on it.
+        progress: Receives the number of control steps done.
+
+    Yields:
+        What happened, from the true states, for the next so many episodes.
+
+    Raises:
+        ConfigError: An episode is shorter than one control step.
+    """
+    for done in range(0, episodes, worlds):
+        count = min(worlds, episodes - done)
+        simulation = BatchSimulation(
+            robot,
+            task,
+            scenario,
+            worlds=count,
+            seed=seed,
+            first=done,
+            control_hz=controller.control_hz,
+        )
+        before = done * episode_steps(task, simulation.control_dt)
+
+        def further(steps: int, before: int = before) -> None:
+            progress(before + steps)
+
+        yield _roll_out(controller, robot, task, simulation, simulation.goal, further)
+
+
+def roll_out_in_backends(
+    controller: Controller,
+    make_backend: Callable[[], Backend],
+    task: Task,
+    scenario: Scenario,
+    *,
+    episodes: int,
+    seed: int,
+    progress: Progress = lambda steps: None,
+) -> Trajectories:
+    """Run some episodes of a seed, each in a backend of its own, stepped side by side.
+
+    Args:
+        controller: The controller.
+        make_backend: Builds one simulator.
+        task: The task.
+        scenario: What episodes are drawn from.
+        episodes: Number of episodes, >= 1.
+        seed: Seed of the draws.
+        progress: Receives the number of control steps done.
+
+    Returns:
+        What happened, from the true states.
+
+    Raises:
+        ConfigError: An episode is shorter than one control step.
+    """
+    runs: list[Trajectories] = []
+    with ExitStack() as stack:
+        backends = []
+        for _ in range(min(episodes, SIDE_BY_SIDE)):
+            backends.append(make_backend())
+            stack.callback(backends[-1].close)
+        for number in range(0, episodes, SIDE_BY_SIDE):
+            numbers = range(number, min(number + SIDE_BY_SIDE, episodes))
+            done = sum(run.position_error.size for run in runs)
+
+            def further(steps: int, done: int = done) -> None:
+                progress(done + steps)
+
+            robot = backends[0].robot
+            drawn = draw_episodes(robot, task.fitted(robot), scenario, seed=seed, numbers=np.asarray(numbers))
+            samples = [
+                backend.reset(drawn[i], seed=seed, number=each)
+                for i, (backend, each) in enumerate(zip(backends, numbers, strict=False))
+            ]
+            worlds = _Backends(
+                backends, samples, robot.timing.substeps(controller.control_hz), task.state_type
+            )
+            runs.append(_roll_out(controller, robot, task, worlds, drawn.goal, further))
+    return join(runs)
+
+
+class _Worlds(Protocol):
+    """Worlds that are stepped side by side: the core's batch, or as many simulators."""
+
+    @property
+    def measured(self) -> State:
+        """Odometry now, shapes (worlds,)."""
+        ...
+
+    @property
+    def truth(self) -> State:
+        """True state now, shapes (worlds,)."""
+        ...
+
+    @property
+    def things(self) -> Poses:
+        """Where the task's things are, each (worlds, 3)."""
+        ...
+
+    @property
+    def wheels(self) -> np.ndarray | None:
+        """Measured speeds of reaction wheels, shape (worlds, count) [rad/s]; None of robots without any."""
+        ...
+
+    def move(self, command: Array) -> None:
+        """Apply commands within every limit for one control step, shape (worlds, n)."""
+        ...
+
+
+def _roll_out(
+    controller: Controller, robot: Robot, task: Task, worlds: _Worlds, goal: Goal, progress: Progress
+) -> Trajectories:
+    """Run one episode in each world; what happened is taken from the true states."""
+    loop = ControlLoop(robot, task, controller, robots=len(goal.done))
+    log, counter = TrajectoryLog(robot, loop.task, loop.dt), TargetCounter(loop.task, goal, loop.dt)
+    loop.reset()
+    loop.begin(goal_in_float64(goal))
+    for number in range(episode_steps(task, loop.dt)):
+        assert loop.goal is not None
+        loop.goal = goal_in_float64(loop.goal.among(worlds.things))
+        loop.wheels = worlds.wheels
+        step = loop.step(worlds.measured, round(1e9 * number * loop.dt))
+        worlds.move(step.command)
+        log.add(worlds.truth, counter.update(worlds.truth, worlds.things), step.command)
+        progress((number + 1) * len(goal.done))
+    return log.trajectories()
+
+
+class _Backends:
+    """Simulators that are stepped side by side."""
+
+    def __init__(
+        self, backends: list[Backend], samples: list[Sample], substeps: int, form: type[State]
+    ) -> None:
+        self._backends, self._substeps, self._form = backends, substeps, form
+        self._take(samples)
+
+    def move(self, command: Array) -> None:
+        """Apply commands for one control step."""
+        stepped = zip(self._backends, command, strict=False)
+        self._take([backend.step(each, self._substeps) for backend, each in stepped])
+
+    def _take(self, samples: list[Sample]) -> None:
+        form = self._form
+        self.measured = form.stack([form.from_rigid(sample.measured) for sample in samples])
+        self.truth = form.stack([form.from_rigid(each.truth) for each in samples if each.truth is not None])
+        self.things = {name: np.stack([each.things[name] for each in samples]) for name in samples[0].things}
+        speeds = [each.readings["wheels"].value.speeds for each in samples if "wheels" in each.readings]
+        self.wheels = np.stack(speeds) if speeds else None

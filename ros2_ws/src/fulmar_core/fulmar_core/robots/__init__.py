@@ -1,0 +1,1 @@
+"""Robots as their files describe them: body, actuators, sensors, airframe, calibration, and topics."""

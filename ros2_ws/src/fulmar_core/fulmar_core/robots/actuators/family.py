@@ -1,0 +1,153 @@
+"""What every family of actuators says about itself, with defaults for what a family need not have.
+
+A family is a frozen dataclass that is read from the `actuators` of a robot's YAML: one file beside this one, and one
+row in `families.py`. Families that push at places derive from `Pushing`, those on wheels from `Rolling`.
+"""
+
+from __future__ import annotations
+
+import functools
+from abc import ABC, abstractmethod
+from dataclasses import Field
+from typing import Any, ClassVar
+
+import numpy as np
+
+from fulmar_core.config.plausible_ranges import Plausible
+from fulmar_core.robots.actuators.excitation import Excitation
+from fulmar_core.robots.actuators.parts import MovingParts
+from fulmar_core.robots.actuators.refuge import Refuge, StopAtOnce
+from fulmar_core.robots.actuators.response import Response
+from fulmar_core.states.rotation import Array
+
+
+class Actuators(ABC):
+    """One family. A command has one value for each actuator, shape (..., n), in the order of `names`.
+
+    Attributes:
+        kind: Name of the family: the key `kind` of the YAML.
+        response: How fast actuators follow their commands.
+        law: Name of the classical law that drives the family (`controllers/classical.py`); empty for none.
+        excitation: Random commands that identify it; None: the controller `excite` rejects the family.
+        one_way: Commands go from 0 to `scale`; else from -scale to scale.
+        opens_late: Actuators may take longer to begin than to end, as valves do.
+        turns_only: Commands turn the body and push it nowhere.
+        flies: Commands steer an aircraft, which the robot's `airframe` describes.
+        takes_velocity: A command is (speed, turn rate) of the body, which ROS has a message of its own for.
+        plausible: Ranges of the family's own keys beside those of `plausible_ranges.ROBOT`, or in their place.
+    """
+
+    kind: str
+    response: Response
+    __dataclass_fields__: ClassVar[dict[str, Field[Any]]]  # every family is a frozen dataclass
+
+    law: ClassVar[str] = ""
+    excitation: ClassVar[Excitation | None] = None
+    one_way: ClassVar[bool] = False
+    opens_late: ClassVar[bool] = False
+    turns_only: ClassVar[bool] = False
+    takes_velocity: ClassVar[bool] = False
+    flies: ClassVar[bool] = False
+    plausible: ClassVar[tuple[Plausible, ...]] = ()
+
+    @property
+    @abstractmethod
+    def names(self) -> tuple[str, ...]:
+        """Names of the actuators."""
+
+    @property
+    @abstractmethod
+    def scale(self) -> np.ndarray:
+        """Largest command of each, shape (n,)."""
+
+    @abstractmethod
+    def limited(self, command: Array) -> Array:
+        """Nearest command that the hardware can carry out, shape (..., n)."""
+
+    @property
+    def positions(self) -> int:
+        """How many of the actuators, the first ones, are commanded by a position: surfaces on servos."""
+        return 0
+
+    @property
+    def remembers(self) -> bool:
+        """Whether what an actuator does depends on more than the newest command."""
+        return self.response.remembers
+
+    @property
+    def binary(self) -> bool:
+        """Whether actuators know only on and off."""
+        return False
+
+    @property
+    def lowest(self) -> np.ndarray:
+        """Smallest command of each, shape (n,)."""
+        return 0.0 * self.scale if self.one_way else -self.scale
+
+    @property
+    def parts(self) -> MovingParts:
+        """What of it can stick, one by one: what its commands name."""
+        return MovingParts(self.names, self.lowest, self.scale)
+
+    @property
+    def safe_command(self) -> np.ndarray:
+        """Command that moves nothing by itself, shape (n,)."""
+        return np.zeros(len(self.names))
+
+    @functools.cached_property
+    def refuge(self) -> Refuge:
+        """What is applied when commands end."""
+        return StopAtOnce(self.safe_command)
+
+    @property
+    def recipe(self) -> str:
+        """Training settings where a robot and task have none of their own: a file of `configs/training`."""
+        return self.kind
+
+    @property
+    def sideways(self) -> bool:
+        """Whether a robot moves to either side without turning."""
+        return False
+
+    @property
+    def largest_yaw_rate(self) -> float | None:
+        """The fastest turn that a command can ask for [rad/s]; None where the robot's `limits` say it."""
+        return None
+
+    @property
+    def largest_curvature(self) -> float | None:
+        """Of the tightest circle that it drives [1/m]; None where it turns on the spot."""
+        return None
+
+    def by_hand(self, ahead: float, left: float, turn: float) -> np.ndarray | None:
+        """Command for what a person asks for, each from -1 to 1 of what the robot can.
+
+        Returns:
+            Shape (n,), within the limits; None where it is found by allocating the wrench that is asked for.
+
+        Raises:
+            ValueError: A person cannot drive this family.
+        """
+        raise ValueError(f"robots with {self.kind} are not driven by hand.")
+
+    def random_commands(self, rng: np.random.Generator, count: int) -> np.ndarray:
+        """Commands to excite a robot with, shape (count, n): anything between the ends, or some one-way actuators.
+
+        Args:
+            rng: Source of randomness.
+            count: How many.
+        """
+        shape = count, len(self.scale)
+        if not self.one_way:
+            return np.asarray(self.limited(rng.uniform(-1.0, 1.0, shape) * self.scale))
+        order = np.argsort(rng.random(shape), axis=1)
+        working = order < rng.integers(1, 4, size=(count, 1))
+        return np.asarray(working * (1.0 if self.binary else rng.random(shape)) * self.scale)
+
+    def mirrored(self) -> np.ndarray | None:
+        """Matrix from shares of a command to those of its mirror image, left for right, shape (n, n); None for none."""
+        return None
+
+    def turned(self) -> np.ndarray | None:
+        """Same for a robot that is turned round, front for back."""
+        return None

@@ -1,0 +1,1 @@
+"""Airframes: coefficients, ground effect, propulsion, and the air."""

@@ -1,0 +1,23 @@
+"""The table of sensors: a row makes a sensor known to robots, simulators, drivers, nodes and bags."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from fulmar_core.config.plausible_ranges import Plausible
+from fulmar_core.robots.sensors import air_data, imu, odometer, star_tracker, surfaces, wheels
+from fulmar_core.robots.sensors.kind import SensorKind
+
+# By the name in a robot's YAML, in the order in which a plant publishes: controllers wait for the odometry.
+SENSORS: dict[str, SensorKind] = {
+    "odometry": odometer.KIND,
+    "imu": imu.KIND,
+    "star_tracker": star_tracker.KIND,
+    "wheels": wheels.KIND,
+    "air_data": air_data.KIND,
+    "surfaces": surfaces.KIND,
+}
+
+RANGES: tuple[Plausible, ...] = tuple(
+    replace(row, key=f"sensors.{name}.{row.key}") for name, kind in SENSORS.items() for row in kind.plausible
+)

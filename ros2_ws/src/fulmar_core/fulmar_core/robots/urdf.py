@@ -1,0 +1,158 @@
+"""A robot as URDF, and the fixed frames on its body, from its YAML."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import atan2, hypot, pi
+from xml.etree import ElementTree
+
+from scipy.spatial.transform import Rotation
+
+from fulmar_core.robots.actuators.pushing import Pushing
+from fulmar_core.robots.actuators.reaction_wheels import ReactionWheels
+from fulmar_core.robots.actuators.rolling import CASTER_RADIUS, WHEEL_WIDTH, Rolling
+from fulmar_core.robots.robot import Robot
+from fulmar_core.wires.robot_name import PLAIN, Frames
+
+IMU = "imu_link"
+HULL_COLOUR = (0.25, 0.45, 0.7, 1.0)  # red, green, blue, opacity
+PART_COLOUR = (0.9, 0.4, 0.2, 1.0)
+WHEEL_COLOUR = (0.15, 0.15, 0.17, 1.0)
+NOZZLE = 0.04  # length and, halved, diameter of the cylinder that shows an actuator; our value [m]
+
+
+@dataclass(frozen=True)
+class BodyFrame:
+    """A frame fixed to the body."""
+
+    name: str  # without the prefix of a named robot
+    position: tuple[float, float, float]  # in `base_link` [m]
+    rpy: tuple[float, float, float] = (0.0, 0.0, 0.0)  # roll, pitch and yaw of its axes in `base_link` [rad]
+
+    @property
+    def quat_xyzw(self) -> tuple[float, float, float, float]:
+        """The same turn as a quaternion."""
+        x, y, z, w = Rotation.from_euler("xyz", self.rpy).as_quat().tolist()
+        return x, y, z, w
+
+
+def body_frames(robot: Robot) -> tuple[BodyFrame, ...]:
+    """Frames of the parts of a robot.
+
+    Returns:
+        `imu_link`, then `<name>_link` of each actuator that pushes, its x axis along the force of a positive command,
+        of each reaction wheel, its x axis along the axis, or of each wheel on the floor, its y axis along the axle, and
+        of each caster.
+    """
+    parts = [BodyFrame(IMU, (0.0, 0.0, 0.0))]
+    if isinstance(robot.actuators, Pushing):
+        parts += [
+            BodyFrame(f"{push.name}_link", push.position, _x_axis_along(push.direction))
+            for push in robot.actuators.pushes
+        ]
+    elif isinstance(robot.actuators, ReactionWheels):
+        parts += [
+            BodyFrame(f"{wheel.name}_link", (0.0, 0.0, 0.0), _x_axis_along(wheel.direction.tolist()))
+            for wheel in robot.actuators.wheels
+        ]
+    elif isinstance(robot.actuators, Rolling):
+        parts += [BodyFrame(f"{name}_link", (x, y, 0.0)) for name, (x, y) in robot.actuators.wheels.items()]
+        sunk = (CASTER_RADIUS - 1.0) * robot.actuators.wheel_radius  # wheels and casters stand on one floor
+        parts += [BodyFrame(f"{name}_link", (x, 0.0, sunk)) for name, x in robot.actuators.casters.items()]
+    return tuple(parts)
+
+
+def urdf_of(robot: Robot, frames: Frames = PLAIN) -> str:
+    """A robot's model for RViz, Foxglove and other readers of URDF.
+
+    `base_link` has the whole mass, and the inertia tensor about the centre of mass; the other links have none and are
+    fixed to it, so that no joint states are needed to show them.
+
+    Args:
+        robot: The robot.
+        frames: Names of its frames, which its links have too.
+
+    Returns:
+        XML text.
+    """
+    root = ElementTree.Element("robot", name=robot.name)
+    base = ElementTree.SubElement(root, "link", name=frames.base)
+    inertial = ElementTree.SubElement(base, "inertial")
+    _place(inertial, robot.body.com)
+    ElementTree.SubElement(inertial, "mass", value=_number(robot.body.mass))
+    names = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+    tensor = dict(zip(names, map(_number, robot.body.tensor), strict=True))
+    ElementTree.SubElement(inertial, "inertia", tensor)
+    low, high = robot.hull_span
+    for purpose in ("visual", "collision"):
+        part = ElementTree.SubElement(base, purpose)
+        _place(part, (robot.body.footprint_x, 0.0, 0.5 * (low + high)))
+        _add_hull(ElementTree.SubElement(part, "geometry"), robot, high - low)
+        if purpose == "visual":
+            _colour(part, "hull", HULL_COLOUR)
+    for frame in body_frames(robot):
+        name = frames.named(frame.name)
+        link = ElementTree.SubElement(root, "link", name=name)
+        if frame.name != IMU:
+            _add_part(ElementTree.SubElement(link, "visual"), robot, frame)
+        joint = ElementTree.SubElement(root, "joint", name=f"{name}_joint", type="fixed")
+        _place(joint, frame.position, frame.rpy)
+        ElementTree.SubElement(joint, "parent", link=frames.base)
+        ElementTree.SubElement(joint, "child", link=name)
+    ElementTree.indent(root)
+    return ElementTree.tostring(root, encoding="unicode", xml_declaration=True) + "\n"
+
+
+def _add_hull(geometry: ElementTree.Element, robot: Robot, height: float) -> None:
+    if robot.body.footprint is None:
+        _cylinder(geometry, robot.body.radius, height)
+    else:
+        ElementTree.SubElement(geometry, "box", size=_numbers((*robot.body.footprint, height)))
+
+
+def _add_part(visual: ElementTree.Element, robot: Robot, frame: BodyFrame) -> None:
+    """Show a caster, a wheel, or a nozzle that ends where its force acts."""
+    if isinstance(robot.actuators, Rolling):
+        radius = robot.actuators.wheel_radius
+        if frame.name.removesuffix("_link") in robot.actuators.casters:
+            _place(visual, (0.0, 0.0, 0.0))
+            ball = ElementTree.SubElement(visual, "geometry")
+            ElementTree.SubElement(ball, "sphere", radius=_number(CASTER_RADIUS * radius))
+            _colour(visual, "wheel", WHEEL_COLOUR)
+            return
+        _place(visual, (0.0, 0.0, 0.0), (0.5 * pi, 0.0, 0.0))
+        _cylinder(ElementTree.SubElement(visual, "geometry"), radius, WHEEL_WIDTH * radius)
+        _colour(visual, "wheel", WHEEL_COLOUR)
+    else:
+        _place(visual, (-0.5 * NOZZLE, 0.0, 0.0), (0.0, 0.5 * pi, 0.0))
+        _cylinder(ElementTree.SubElement(visual, "geometry"), 0.25 * NOZZLE, NOZZLE)
+        _colour(visual, "actuator", PART_COLOUR)
+
+
+def _cylinder(geometry: ElementTree.Element, radius: float, length: float) -> None:
+    ElementTree.SubElement(geometry, "cylinder", radius=_number(radius), length=_number(length))
+
+
+def _colour(visual: ElementTree.Element, name: str, rgba: Sequence[float]) -> None:
+    material = ElementTree.SubElement(visual, "material", name=name)
+    ElementTree.SubElement(material, "color", rgba=_numbers(rgba))
+
+
+def _place(parent: ElementTree.Element, xyz: Sequence[float], rpy: Sequence[float] = (0.0, 0.0, 0.0)) -> None:
+    ElementTree.SubElement(parent, "origin", xyz=_numbers(xyz), rpy=_numbers(rpy))
+
+
+def _numbers(values: Sequence[float]) -> str:
+    return " ".join(map(_number, values))
+
+
+def _number(value: float) -> str:
+    """The shortest text that is read as the same number."""
+    return repr(float(value))
+
+
+def _x_axis_along(direction: Sequence[float]) -> tuple[float, float, float]:
+    """Roll, which is 0, pitch and yaw that turn the x axis into a direction [rad]."""
+    x, y, z = direction
+    return 0.0, -atan2(z, hypot(x, y)), atan2(y, x)

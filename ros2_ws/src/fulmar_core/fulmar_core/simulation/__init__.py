@@ -1,0 +1,1 @@
+"""Simulation in batches: episodes, trajectories, metrics, and the seam to other simulators."""

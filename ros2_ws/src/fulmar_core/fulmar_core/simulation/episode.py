@@ -1,0 +1,85 @@
+"""Episodes: everything that is drawn before the first step, reproducible by seed and number.
+
+Episode i of a seed is the same in the core's batch, in MuJoCo and through ROS, whatever the batch size.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Generic
+
+import numpy as np
+
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.dynamics.dynamics_of import dynamics_of
+from fulmar_core.robots.robot import Robot
+from fulmar_core.states.counter_rng import START, WORLD, Draws
+from fulmar_core.states.state import S
+from fulmar_core.tasks import Task
+from fulmar_core.tasks.goal import Goal
+from fulmar_core.worlds.scenario import Scenario
+from fulmar_core.worlds.world import World
+
+
+@dataclass(frozen=True, slots=True)
+class Episode(Generic[S]):
+    """Where an episode starts, what it is about, and in which world; or many episodes at once."""
+
+    start: S
+    goal: Goal
+    world: World
+
+    def __getitem__(self, index: int) -> Episode:
+        """One episode out of many."""
+        return Episode(self.start[index], self.goal[index], self.world[index])
+
+
+def episode_steps(task: Task, control_dt: float) -> int:
+    """Control steps of one episode, >= 1.
+
+    Raises:
+        ConfigError: The episode is shorter than one control step [s].
+    """
+    steps = round(task.episode_s / control_dt)
+    if steps < 1:
+        raise ConfigError(
+            f"an episode of task '{task.name}' lasts {task.episode_s:g} s, less than one control step of "
+            f"{control_dt:g} s. Use a higher rate or a longer episode."
+        )
+    return steps
+
+
+def draw_episodes(
+    robot: Robot,
+    task: Task,
+    scenario: Scenario,
+    *,
+    seed: int,
+    numbers: np.ndarray,
+    repeats: np.ndarray | None = None,
+    training: bool = False,
+) -> Episode:
+    """Draw episodes.
+
+    Args:
+        robot: The robot.
+        task: Says where episodes start and what they are about.
+        scenario: Says what may differ.
+        seed: Seed of the run, >= 0.
+        numbers: Numbers of the episodes, or of the worlds they run in, shape (n,), >= 0.
+        repeats: How many episodes each of these worlds has had before, shape (n,); none by default.
+        training: Start where learning starts instead of where evaluation does.
+
+    Returns:
+        As many episodes.
+    """
+    numbers = np.asarray(numbers)
+    repeats = np.zeros_like(numbers) if repeats is None else repeats
+    start, goal = task.draw(Draws(seed, numbers, repeats, START), robot, training=training)
+    world = dynamics_of(robot).draw_world(scenario, Draws(seed, numbers, repeats, WORLD))
+    return Episode(start, goal, world)
+
+
+def draw_episode(robot: Robot, task: Task, scenario: Scenario, *, seed: int, number: int) -> Episode:
+    """Draw one episode, without a batch axis; arguments as in `draw_episodes`."""
+    return draw_episodes(robot, task, scenario, seed=seed, numbers=np.array([number]))[0]

@@ -1,1 +1,0 @@
-"""Stars, cameras that see them, and events of their motion."""

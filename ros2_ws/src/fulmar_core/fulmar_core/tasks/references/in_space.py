@@ -1,0 +1,92 @@
+"""Reference paths in space, each given by a few sizes, and the attitudes along them.
+
+A new path is one class, and a member of `SpacePath` below.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+import numpy as np
+
+from fulmar_core.tasks.references.spacing import few, on_circle, positive, spread_along
+
+Place = tuple[float, float, float]  # x, y, z [m]
+
+
+class SpaceCurve(ABC):
+    """A smooth path in space, open unless it says otherwise."""
+
+    centre: Place
+    closed: ClassVar[bool] = False
+
+    @abstractmethod
+    def at(self, t: np.ndarray) -> np.ndarray:
+        """Positions (n, 3) about the origin for parameters (n,) from 0 to 1 [m]."""
+
+    @property
+    @abstractmethod
+    def up(self) -> np.ndarray:
+        """Unit vector, nowhere along the path, that a body on it keeps its z axis nearest to, shape (3,)."""
+
+    def points(self, count: int) -> np.ndarray:
+        """Equally spaced points, shape (count, 3) [m]; see `spread_along`."""
+        return np.asarray(spread_along(self.at, count, closed=self.closed) + np.array(self.centre))
+
+
+@dataclass(frozen=True)
+class Helix(SpaceCurve):
+    """Screw about the world's z, upwards through its middle at the centre: x = r cos t, y = r sin t, z = p t / 2π."""
+
+    kind: Literal["helix"]
+    radius: float  # r [m]
+    pitch: float  # p: rise in a turn [m]
+    turns: float
+    centre: Place = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        positive(radius=self.radius, pitch=self.pitch, turns=self.turns)
+        few(turns=self.turns)
+
+    def at(self, t: np.ndarray) -> np.ndarray:
+        """See `SpaceCurve.at`."""
+        flat = self.radius * on_circle(self.turns * t)
+        return np.column_stack((flat, self.pitch * self.turns * (t - 0.5)))
+
+    @property
+    def up(self) -> np.ndarray:
+        """See `SpaceCurve.up`."""
+        return np.array([0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True)
+class TiltedCircle(SpaceCurve):
+    """Circle that begins due east of its centre, in a plane that is turned about x; 90: upright."""
+
+    kind: Literal["tilted_circle"]
+    radius: float  # [m]
+    tilt_deg: float = 0.0  # [deg]
+    centre: Place = (0.0, 0.0, 0.0)
+
+    closed: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        positive(radius=self.radius)
+
+    def at(self, t: np.ndarray) -> np.ndarray:
+        """See `SpaceCurve.at`."""
+        east, north = self.radius * on_circle(t).T
+        tilt = math.radians(self.tilt_deg)
+        return np.column_stack((east, north * math.cos(tilt), north * math.sin(tilt)))
+
+    @property
+    def up(self) -> np.ndarray:
+        """See `SpaceCurve.up`."""
+        tilt = math.radians(self.tilt_deg)
+        return np.array([0.0, -math.sin(tilt), math.cos(tilt)])
+
+
+SpacePath = Helix | TiltedCircle

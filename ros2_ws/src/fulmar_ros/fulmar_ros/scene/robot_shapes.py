@@ -1,0 +1,105 @@
+"""Shapes of a robot: its body, what its actuators do, and velocities."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from fulmar_core.robots.actuators.ackermann import Ackermann
+from fulmar_core.robots.actuators.pushing import Pushing
+from fulmar_core.robots.actuators.reaction_wheels import ReactionWheels
+from fulmar_core.robots.robot import Robot
+from fulmar_ros.scene.shape import Color, Kind, Shape, arrow, circle, line
+
+BODY, THRUST, DRIVE = "body", "thrust", "drive"
+GREY: Color = (0.6, 0.6, 0.65, 0.35)  # the model of `robot_description` shows through
+FLAME: Color = (1.0, 0.5, 0.1, 0.9)
+WATER: Color = (0.2, 0.7, 0.9, 0.9)
+YELLOW: Color = (0.95, 0.85, 0.1, 1.0)
+LEAST = 0.02  # share of full command below which nothing is drawn
+AHEAD_S = 1.0  # a velocity is drawn as what it goes in this time [s]
+
+
+def body_shapes(robot: Robot) -> list[Shape]:
+    """The outline of the body: a box, a ball or a cylinder, where the URDF has the hull."""
+    body, (low, high) = robot.body, robot.hull_span
+    width, in_space = 2.0 * body.radius, robot.state_type.AXES == 3
+    kind: Kind = "sphere" if in_space else "cylinder"
+    across = (width, width)
+    if body.footprint is not None:
+        kind, across = "box", body.footprint
+    place = (body.footprint_x, 0.0, 0.5 * (low + high))
+    return [Shape(BODY, 0, kind, True, (*across, high - low), GREY, place)]
+
+
+def applied_shapes(robot: Robot, effort: Sequence[float]) -> list[Shape]:
+    """What the actuators do: a plume for each that pushes, the torque of reaction wheels, or where wheels drive to.
+
+    Args:
+        robot: The robot.
+        effort: What was applied, in the order of the actuators' names.
+    """
+    if isinstance(robot.actuators, Pushing):
+        return _plumes(robot, robot.actuators, np.asarray(effort, dtype=float))
+    if isinstance(robot.actuators, ReactionWheels):
+        return _torques(robot, robot.actuators, np.asarray(effort, dtype=float))
+    if robot.flies:
+        return []
+    speed, turn = effort
+    if isinstance(robot.actuators, Ackermann):
+        turn = speed * math.tan(turn) / robot.actuators.wheelbase
+    return velocity_shapes(DRIVE, (speed, 0.0, 0.0, 0.0, 0.0, turn), robot, YELLOW)
+
+
+def _plumes(robot: Robot, actuators: Pushing, effort: np.ndarray) -> list[Shape]:
+    """What leaves a nozzle, a propeller or a fan: against its push, at full thrust as long as the body's radius."""
+    shares = np.asarray(actuators.thrusts(effort)) / actuators.full_thrust
+    color = WATER if robot.hydrodynamics is not None else FLAME
+    shapes = []
+    for number, (push, share) in enumerate(zip(actuators.pushes, shares.tolist(), strict=True)):
+        if abs(share) < LEAST:
+            continue
+        reach = robot.body.radius * share
+        tip = [p - reach * d for p, d in zip(push.position, push.direction, strict=True)]
+        shapes.append(arrow(THRUST, number, push.position, tip, color, in_body=True))
+    return shapes
+
+
+def _torques(robot: Robot, wheels: ReactionWheels, effort: np.ndarray) -> list[Shape]:
+    """Torque of each actuator on the body, along its axis: at full torque as long as the body's radius."""
+    tips = robot.body.radius * (effort / wheels.scale)[:, None] * wheels.torque_per_command
+    origin = (0.0, 0.0, 0.0)
+    return [
+        arrow(THRUST, number, origin, tip.tolist(), YELLOW, in_body=True)
+        for number, tip in enumerate(tips)
+        if np.linalg.norm(tip) >= LEAST * robot.body.radius
+    ]
+
+
+def velocity_shapes(group: str, twist: Sequence[float], robot: Robot, color: Color) -> list[Shape]:
+    """A velocity as an arrow, and a turn rate as an arc around the body or, in space, as an arrow along its axis.
+
+    Args:
+        group: Of the shapes.
+        twist: Velocity [m/s] and turn rate [rad/s] along the body's axes, six numbers.
+        robot: Arcs go around its body.
+        color: Of both.
+    """
+    above = 0.0 if robot.state_type.AXES == 3 else robot.hull_span[1]
+    origin = (0.0, 0.0, above)
+    velocity = [AHEAD_S * part for part in twist[:3]]
+    rate = [AHEAD_S * part for part in twist[3:]]
+    shapes = []
+    if math.hypot(*velocity) >= LEAST:
+        tip = [start + way for start, way in zip(origin, velocity, strict=True)]
+        shapes.append(arrow(group, 0, origin, tip, color, in_body=True))
+    if math.hypot(*rate) >= LEAST:
+        if robot.state_type.AXES == 3:
+            shapes.append(arrow(group, 1, origin, rate, color, in_body=True))
+        else:
+            shapes.append(
+                line(group, 1, circle(origin, robot.body.radius, turn=rate[2]), color, in_body=True)
+            )
+    return shapes
