@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 
 from fulmar_core.dynamics.flight_dynamics import FlightDynamics
-from fulmar_core.dynamics.motion import surface_positions_of, wheel_speeds_of
+from fulmar_core.dynamics.motion import truths_of
 from fulmar_core.dynamics.things import Poses, Thing
 from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.sensors.air_data import NAME as AIR
 from fulmar_core.robots.sensors.air_data import AirData
 from fulmar_core.robots.sensors.kind import Truth
 from fulmar_core.robots.sensors.simulated import SimulatedSensors
@@ -74,19 +75,17 @@ class MockBackend:
     def close(self) -> None:
         """Nothing to release."""
 
-    def _air(self) -> AirData | None:
+    def _air(self) -> dict[str, AirData]:
         dynamics = self._world.dynamics
         world: Any = self._world.world
         if not isinstance(dynamics, FlightDynamics) or not isinstance(self._state, SpatialState):
-            return None
-        return dynamics.air_data(self._state, None, world)
+            return {}
+        return {AIR: dynamics.air_data(self._state, None, world)}
 
     def _sample(self, ticks: int = 0) -> Sample:
         self._ticks += ticks
         truth = self._state[0].to_rigid()
-        wheels = wheel_speeds_of(self.robot, self._world.actuation)
-        surfaces = surface_positions_of(self.robot, self._world.actuation)
-        true = Truth(truth, wheels=wheels, air=self._air(), surfaces=surfaces)
+        true = Truth(truth, more=truths_of(self.robot, self._world.actuation) | self._air())
         others = self._sensors.measure(true, self._ticks * self.robot.timing.physics_dt)
         things = {name: pose[0] for name, pose in self._poses.items()}
         return Sample({"odometry": Reading(truth), **others}, truth, things)

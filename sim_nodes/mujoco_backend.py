@@ -139,7 +139,7 @@ class MujocoBackend:
         position[2] -= self._scene.robot_model.rest_height
         w, x, y, z = read["attitude"]
         state = RigidBodyState(position, np.array([x, y, z, w]), read["velocity"], read["gyroscope"])
-        return Truth(state, read["accelerometer"], **self._scene.robot_model.own_truth(self.data))
+        return Truth(state, read["accelerometer"], self._scene.robot_model.own_truth(self.data))
 
     def _sample(self, truth: Truth, odometry: RigidBodyState) -> Sample:
         self._truth = truth.state

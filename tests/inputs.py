@@ -74,5 +74,5 @@ def some_of(inputs: Inputs, index: Any) -> Inputs:
         observation=inputs.observation[index],
         previous=inputs.previous[index],
         estimates=estimates,
-        wheels=None if inputs.wheels is None else inputs.wheels[index],
+        readings={name: values[index] for name, values in inputs.readings.items()},
     )

@@ -94,19 +94,20 @@ def fly(
     loop.begin(simulation.goal)
     command = robot.actuators.safe_command
     flight, goals = Flight(), 0
+    known: dict[str, np.ndarray] = {}  # newest speeds of the wheels
     for number in range(round(1e9 * seconds / TICK_NS)):
         now_ns = BEGIN_NS + number * TICK_NS
         now_s = 1e-9 * number * TICK_NS
         truth = simulation.truth[0].to_rigid()
-        wheels = WheelSpeeds(robot.actuators.wheel_names, simulation.wheels[0].copy())
-        readings = sensors.measure(Truth(truth, np.zeros(3), wheels=wheels), now_s)
+        wheels = WheelSpeeds(robot.actuators.wheel_names, simulation.readings["wheels"][0].copy())
+        readings = sensors.measure(Truth(truth, np.zeros(3), {"wheels": wheels}), now_s)
         for which, reading in sorted(readings.items()):
             stamped = replace(reading, stamp_ns=reading.stamp(now_ns))
             arrived = spoil(which, stamped, now_s)
             if arrived is not None and not reading_problem(which, arrived, robot):
                 estimator.take(which, arrived)
                 if which == "wheels":
-                    loop.wheels = arrived.value.speeds[None]
+                    known = {"wheels": arrived.value.speeds[None]}
         estimate = estimator.estimate(now_ns)
         for words in (*estimator.warnings(), *([estimator.problem] if estimator.problem else [])):
             flight.said.setdefault(words, now_s)
@@ -119,7 +120,7 @@ def fly(
         if number % 2 == 0:
             command = robot.actuators.safe_command
             if estimate is not None:
-                command = loop.step(SpatialState.from_rigid(estimate.value)[None], now_ns).command[0]
+                command = loop.step(SpatialState.from_rigid(estimate.value)[None], known, now_ns).command[0]
         flight.errors_deg.append(error)
         flight.rates_deg.append(float(np.degrees(np.linalg.norm(truth.angular_velocity_in_body))))
         flight.pointing_deg.append(

@@ -111,7 +111,7 @@ def write_run(folder: Path, plan: Plan = Plan()) -> Path:
             bag.thing(name, pose[0], time_s, now_ns)
         if tick % substeps == 0 and not plan.silence_s[0] <= time_s < plan.silence_s[1]:
             loop.goal = loop.goal.among(simulation.things)
-            command = loop.step(simulation.measured, round(time_s * NS)).command[0]
+            command = loop.step(simulation.measured, {}, round(time_s * NS)).command[0]
             received_s, steps = time_s, steps + 1
             late_ns = LATENCY_NS + int(jitter.gamma(2.0, 300_000))
             bag.command(command, UNSTAMPED_S if external else time_s, now_ns + late_ns)

@@ -178,7 +178,7 @@ def watch(
         measured = worlds.measured.to_rigid()
         for i, each in enumerate(watched):
             each.see(RigidBodyState(*(np.asarray(getattr(measured, part))[i] for part in PARTS)), stamp_ns)
-        inputs = loop.inputs(worlds.measured, stamp_ns)
+        inputs = loop.inputs(worlds.measured, {}, stamp_ns)
         commands = loop.act(inputs).command
         late = convergence.see(inputs.state, inputs.goal, commands)
         there = np.asarray(loop.task.tolerance.holds(loop.task.errors(worlds.truth, loop.goal)))

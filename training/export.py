@@ -164,7 +164,7 @@ def _golden(network: DeployedNetwork, robot: Robot, task: Task) -> Golden:
     memory = np.zeros((simulation.worlds, network.plan.memory), dtype=np.float32)
     moments = []
     for number in range(GOLDEN_STEPS + 1):
-        inputs = loop.inputs(simulation.measured, round(1e9 * number * loop.dt))
+        inputs = loop.inputs(simulation.measured, {}, round(1e9 * number * loop.dt))
         seen = with_disturbances(loop.observer, inputs) if network.plan.disturbances else inputs.observation
         seen = seen.astype(np.float32)
         if network.fallback is not None:

@@ -9,9 +9,10 @@ import numpy as np
 
 from fulmar_core.dynamics.actuators.actuation import ActuationState
 from fulmar_core.dynamics.flight_dynamics import FlightDynamics
-from fulmar_core.dynamics.motion import surface_positions_of
+from fulmar_core.dynamics.motion import truths_of
 from fulmar_core.dynamics.rigid_body import inertia_of
 from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.sensors.air_data import NAME as AIR
 from fulmar_core.states.gravity import GRAVITY
 from fulmar_core.states.spatial import SpatialState
 from fulmar_core.worlds.turbulence import Gust
@@ -79,7 +80,7 @@ class Aircraft:
         """What air probes and servos would measure without errors."""
         assert self._actuation is not None  # as of `fly_in`
         air = self._dynamics.air_data(self._state(data), self._gust, self._world)
-        return {"air": air, "surfaces": surface_positions_of(self._robot, self._actuation)}
+        return {AIR: air, **truths_of(self._robot, self._actuation)}
 
     def drive(
         self, model: mujoco.MjModel, data: mujoco.MjData, applied: np.ndarray, gain: np.ndarray, outside: Any

@@ -13,6 +13,7 @@ import numpy as np
 
 from fulmar_core.robots.actuators.reaction_wheels import ReactionWheels
 from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.sensors.wheels import NAME as WHEELS
 from fulmar_core.robots.sensors.wheels import WheelSpeeds
 from fulmar_core.states.attitude import turn_back
 from fulmar_core.states.spatial import SpatialState
@@ -97,7 +98,7 @@ class Satellite:
 
     def own_truth(self, data: mujoco.MjData) -> dict[str, Any]:
         """Speeds of the wheels."""
-        return {"wheels": self.wheel_speeds(data)}
+        return {WHEELS: self.wheel_speeds(data)}
 
     def wheel_speeds(self, data: mujoco.MjData) -> WheelSpeeds:
         """Of each wheel relative to the body."""

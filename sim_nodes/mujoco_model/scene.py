@@ -169,7 +169,7 @@ class RobotModel(Protocol):
         ...
 
     def own_truth(self, data: mujoco.MjData) -> dict[str, Any]:
-        """What is true of robots of this family alone, by the names of `robots.sensors.kind.Truth`."""
+        """What is true of robots of this family alone, see `Truth.more`."""
         ...
 
     @property

@@ -102,12 +102,10 @@ def measured(robot, task, controller, simulation, *, steps=0):
     loop.reset()
     rng, size = np.random.default_rng(1), loop.previous.shape
     for number in range(steps):
-        loop.wheels = simulation.wheels
-        inputs = loop.inputs(simulation.measured, round(1e9 * number * loop.dt))
+        inputs = loop.inputs(simulation.measured, simulation.readings, round(1e9 * number * loop.dt))
         simulation.move(loop.take(inputs, robot.actuators.scale * rng.uniform(-1.0, 1.0, size)).command)
         loop.goal = goal_in_float64(loop.goal.among(simulation.things))
-    loop.wheels = simulation.wheels
-    return loop.inputs(simulation.measured, round(1e9 * steps * loop.dt))
+    return loop.inputs(simulation.measured, simulation.readings, round(1e9 * steps * loop.dt))
 
 
 @pytest.fixture(scope="module")

@@ -48,9 +48,9 @@ def observed(robot_name, task_name, scenario, *, number, seconds):
     accused: dict[str, float] = {}
     for step in range(round(seconds / loop.dt)):
         speeds = sample.readings.get("wheels")
-        loop.wheels = None if speeds is None else speeds.value.speeds[None]
+        readings = {} if speeds is None else {"wheels": speeds.value.speeds[None]}
         measured = task.state_type.from_rigid(sample.measured)[None]
-        command = loop.step(measured, round(1e9 * step * loop.dt)).command[0]
+        command = loop.step(measured, readings, round(1e9 * step * loop.dt)).command[0]
         sample = backend.step(command, robot.timing.substeps(controller.control_hz))
         feedback.see(command, loop.dt, sample)
         for finding in feedback.findings:

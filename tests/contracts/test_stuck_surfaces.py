@@ -98,7 +98,7 @@ def landed(refuge, share: float, controller: str, seed: int, from_s: float):
         now_ns = round(1e9 * tick * DT)
         if tick % round(1.0 / (hz * DT)) == 0 and not guard.handed_over:
             measured = TASK.state_type.from_rigid(sample.measured)[None]
-            command = loop.step(measured, now_ns).command[0]
+            command = loop.step(measured, {}, now_ns).command[0]
             guard.offer(ROBOT.actuators.names, command.tolist(), now_ns, stamp_ns=now_ns)
         command = guard.output(now_ns, sample.odometry, plant_ns=now_ns)
         sample = backend.step(command)

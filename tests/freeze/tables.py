@@ -148,6 +148,8 @@ def _commands(robot: Robot, task: Task, law: str) -> list[np.ndarray]:
     loop.begin(goal_in_float64(batch.goal))
     commands = []
     for number in range(STEPS):
-        commands.append(loop.act(loop.inputs(batch.measured, round(1e9 * number * loop.dt))).command.copy())
+        commands.append(
+            loop.act(loop.inputs(batch.measured, {}, round(1e9 * number * loop.dt))).command.copy()
+        )
         batch.move(commands[-1])
     return commands

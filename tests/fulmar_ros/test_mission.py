@@ -42,7 +42,7 @@ class Followed(Mission):
         super().__init__(self.loop, **how)
 
     def observe(self, state, stamp_ns):
-        return self.loop.inputs(state, stamp_ns).observation[0]
+        return self.loop.inputs(state, {}, stamp_ns).observation[0]
 
 
 def mission(task, **how):

@@ -37,17 +37,11 @@ def inertia(factor):
     return message
 
 
-def given(inputs):
-    loop = SimpleNamespace()
-    inputs.fill(loop, SECOND)
-    return loop
-
-
 @pytest.mark.parametrize("value", [4294967295.0, float("nan"), -600.0])
 def test_a_wheel_speed_that_no_wheel_has_is_refused_and_the_one_before_stays(inputs, value):
     inputs._take_wheels(speeds(100.0))
     inputs._take_wheels(speeds(value))
-    np.testing.assert_array_equal(given(inputs).wheels, [[100.0, 0.0, 0.0]])
+    np.testing.assert_array_equal(inputs.readings(SECOND).get("wheels"), [[100.0, 0.0, 0.0]])
     assert inputs.refused == 1
     assert inputs.refusal.startswith("wheel wheel_x reports")
     inputs._take_wheels(speeds(101.0))
@@ -65,5 +59,5 @@ def test_a_wheel_speed_that_no_wheel_has_is_refused_and_the_one_before_stays(inp
 def test_an_inertia_that_the_robot_cannot_have_is_refused(inputs, factor, said):
     inputs._take_inertia(inertia(1.1))
     inputs._take_inertia(inertia(factor))
-    np.testing.assert_allclose(given(inputs).inertia, 1.1 * CUBESAT.body.inertia_matrix)
+    np.testing.assert_allclose(inputs.readings(SECOND).get("inertia"), 1.1 * CUBESAT.body.inertia_matrix)
     assert said in inputs.refusal

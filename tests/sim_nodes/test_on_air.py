@@ -114,7 +114,7 @@ def drive(lqr, backend, sample, seconds):
     for tick in range(round(TICKS_A_SECOND * seconds)):
         before = command
         if tick % ticks == 0:
-            command = loop.step(PlanarState.from_rigid(sample.measured)[None], tick * tick_ns).command[0]
+            command = loop.step(PlanarState.from_rigid(sample.measured)[None], {}, tick * tick_ns).command[0]
         sample = backend.step(before)
         applied.add(tick * tick_ns, sample.applied)
     return float(np.hypot(*place(sample)[:2])), loop.estimate.health

@@ -57,7 +57,7 @@ def test_only_deflections_have_noise_and_steps():
     sensors.reset(1, 0)
     seen = np.array(
         [
-            sensors.measure(Truth(still, surfaces=true), 0.01 * k)["surfaces"].value.positions
+            sensors.measure(Truth(still, more={"surfaces": true}), 0.01 * k)["surfaces"].value.positions
             for k in range(400)
         ]
     )
@@ -78,7 +78,9 @@ def test_its_covariance_is_that_of_deflections_alone_and_its_rate_that_of_the_fi
     still = RigidBodyState(np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0]), np.zeros(3), np.zeros(3))
     sensors = SimulatedSensors({"surfaces": SurfacesSpec(std=0.02, quantum=0.01, rate_hz=50.0)}, noisy=True)
     sensors.reset(1, 0)
-    seen = [sensors.measure(Truth(still, surfaces=true), 0.01 * k).get("surfaces") for k in range(100)]
+    seen = [
+        sensors.measure(Truth(still, more={"surfaces": true}), 0.01 * k).get("surfaces") for k in range(100)
+    ]
     found = [each for each in seen if each is not None]
     assert len(found) == 50
     np.testing.assert_allclose(found[0].covariance, np.diag([0.02**2 + 0.01**2 / 12.0, 0.0]))

@@ -44,8 +44,8 @@ def lived(scenario, steps, *, worlds=8, seed=4):
     loop = ControlLoop(ROBOT, TASK, controller, robots=worlds)
     loop.begin(goal_in_float64(simulation.goal))
     for number in range(steps):
-        simulation.move(loop.step(simulation.measured, round(1e9 * number * loop.dt)).command)
-    loop.step(simulation.measured, round(1e9 * steps * loop.dt))
+        simulation.move(loop.step(simulation.measured, {}, round(1e9 * number * loop.dt)).command)
+    loop.step(simulation.measured, {}, round(1e9 * steps * loop.dt))
     return controller.shown, simulation
 
 

@@ -119,7 +119,7 @@ def test_the_served_policy_flies_as_the_network_does(learner, bundle):
     loop = ControlLoop(ROBOT, TASK, served, robots=8)
     loop.begin(goal_in_float64(env.simulation.goal))
     for number in range(5):
-        inputs = loop.inputs(env.simulation.measured, round(1e9 * number * loop.dt))
+        inputs = loop.inputs(env.simulation.measured, {}, round(1e9 * number * loop.dt))
         assert (inputs.estimates is not None) == learner[1].unwrapped.takes_disturbances
         step = loop.act(inputs)
         np.testing.assert_array_equal(step.action, twin.act(inputs))

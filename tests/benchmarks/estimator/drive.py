@@ -56,7 +56,7 @@ def drives(robot: Robot, *, count: int, seconds: float, seed: int) -> list[Drive
             assert loop.goal is not None
             loop.begin(_turned_about(loop.goal))
         if tick % hold == 0:
-            command = loop.step(simulation.measured, round(1e9 * tick * TICK_S)).command
+            command = loop.step(simulation.measured, {}, round(1e9 * tick * TICK_S)).command
         simulation.move(command)
         t = simulation.truth
         states.append(np.stack((t.x, t.y, t.yaw, t.vx, t.vy, t.yaw_rate), axis=-1))

@@ -177,7 +177,9 @@ class SteeredRobot:
             found.blind_s += self._hold * self._dt * (begun and state is None)
             command = self._safe
             if state is not None and moves:
-                command = self._loop.step(self._robot.state_type.from_rigid(state)[None], stamp_ns).command[0]
+                command = self._loop.step(
+                    self._robot.state_type.from_rigid(state)[None], {}, stamp_ns
+                ).command[0]
             self._note(found, t - fault_s, state, command)
         return found
 

@@ -204,7 +204,7 @@ def drive(machine: Machine, leg: Leg, nominal: Robot, folder: Path, *, seed: int
         for tick in range(round(duration_s / dt)):
             if tick % substeps == 0:
                 state = PlanarState.stack([PlanarState.from_rigid(sample.measured)])
-                command = loop.step(state, round(1e9 * tick * dt)).command[0]
+                command = loop.step(state, {}, round(1e9 * tick * dt)).command[0]
                 bag.joints(ACTUATORS_STATE.name, command, tick * dt, _log_ns(tick * dt))
             sample = backend.step(command)
             measured(sample.measured, (tick + 1) * dt)

@@ -49,10 +49,10 @@ def momenta(robot, scenario, seconds):
     simulation = BatchSimulation(robot, task, scenario, worlds=4, seed=2, dtype=np.float64)
     law = load_classical(robot, task, law="pd")
     for _ in range(round(seconds * law.control_hz)):
-        inputs = replace(inputs_of(simulation), wheels=simulation.wheels)
+        inputs = replace(inputs_of(simulation), readings=simulation.readings)
         simulation.move(law.act(inputs))
     error = task.errors(simulation.truth, simulation.goal).attitude
-    return np.abs(simulation.wheels).max() / robot.actuators.top_speed, np.degrees(error.max())
+    return np.abs(simulation.readings["wheels"]).max() / robot.actuators.top_speed, np.degrees(error.max())
 
 
 def test_without_unloading_a_leak_fills_the_wheels_and_the_satellite_is_lost():

@@ -87,7 +87,7 @@ def test_integrals_stop_where_an_error_is_cut(above, winds):
     loop.reset()
     state = replace(simulation.measured, z=np.array([20.0 + above]))
     for step in range(10):
-        loop.step(state, 10_000_000 * step)
+        loop.step(state, {}, 10_000_000 * step)
     assert (law._sums[0, 1] > 0.0) == winds
 
 

@@ -57,7 +57,7 @@ def loop_of(controller, *, task=WAYPOINTS, goal=COURSE, robot=BASE, **given):
 def test_a_step_gives_the_controller_what_was_measured_and_the_goal_as_it_is_seen():
     controller = Scripted()
     loop = loop_of(controller)
-    step = loop.step(at(1.0), 5 * S)
+    step = loop.step(at(1.0), {}, 5 * S)
     inputs = controller.inputs
     np.testing.assert_array_equal(step.command, [GENTLE])
     assert inputs.state == at(1.0)
@@ -67,7 +67,7 @@ def test_a_step_gives_the_controller_what_was_measured_and_the_goal_as_it_is_see
         step.observation, Observer(BASE, loop.task)(at(1.0), COURSE, np.zeros((1, 2)))
     )
     assert loop.answered_ns == 5 * S
-    loop.step(at(1.0), 5 * S + PERIOD_NS)
+    loop.step(at(1.0), {}, 5 * S + PERIOD_NS)
     np.testing.assert_array_equal(controller.inputs.previous, [GENTLE])
 
 
@@ -76,7 +76,7 @@ def test_a_target_is_done_at_the_step_that_measures_it_reached_and_that_step_see
     loop = loop_of(controller)
     seen = []
     for number, x in enumerate((1.0, 0.5, 0.05, 0.5)):
-        loop.step(at(x), number * PERIOD_NS)
+        loop.step(at(x), {}, number * PERIOD_NS)
         seen.append(float(controller.inputs.goal.current[0, 0]))
     assert seen == [0.0, 0.0, 3.0, 3.0]
 
@@ -88,15 +88,15 @@ def test_the_time_of_a_goal_begins_with_its_first_step_and_anew_with_another_goa
     hold = round(S * task.hold_s)
     for began in (100 * S, 200 * S):
         times = (began, began + hold - MS, began + hold)
-        seen = [float(loop.inputs(at(0.0), stamp).goal.current[0, 0]) for stamp in times]
+        seen = [float(loop.inputs(at(0.0), {}, stamp).goal.current[0, 0]) for stamp in times]
         assert seen == [0.1, 0.1, 0.2]
         loop.begin(goal)
 
 
 def test_each_robot_is_as_far_along_as_it_has_come_itself():
     loop = loop_of(Scripted(), goal=stack_goals([COURSE[0], COURSE[0]]), robots=2)
-    loop.step(at(1.0, 1.0), 0)
-    step = loop.step(at(0.05, 0.5), PERIOD_NS)
+    loop.step(at(1.0, 1.0), {}, 0)
+    step = loop.step(at(0.05, 0.5), {}, PERIOD_NS)
     assert loop.goal.done.tolist() == [1.0, 0.0]
     assert step.command.shape == (2, 2)
 
@@ -106,7 +106,7 @@ def test_a_goal_of_gates_begins_where_the_robot_is_measured():
         Scripted(), task=load_task("race_gates"), goal=goal_at((0.2, 0.0, 0.0), (3.0, 0.0, 0.0))[None]
     )
     for number, x in enumerate((0.4, 0.6)):  # behind the gate already, whatever was before the goal
-        loop.step(at(x), number * PERIOD_NS)
+        loop.step(at(x), {}, number * PERIOD_NS)
     assert loop.goal.done.tolist() == [0.0]
 
 
@@ -122,9 +122,9 @@ def test_a_goal_of_gates_begins_where_the_robot_is_measured():
 def test_a_refused_action_becomes_the_safe_command_and_the_previous_one(answer, reason):
     controller = Scripted()
     loop = loop_of(controller)
-    assert loop.step(at(1.0), 0).command.any()
+    assert loop.step(at(1.0), {}, 0).command.any()
     controller.answer = answer
-    step = loop.step(at(1.0), PERIOD_NS)
+    step = loop.step(at(1.0), {}, PERIOD_NS)
     assert step.refusal == reason
     np.testing.assert_array_equal(step.command, [[0.0, 0.0]])
     np.testing.assert_array_equal(step.action.ravel()[: np.size(answer)], np.ravel(answer))
@@ -134,10 +134,10 @@ def test_a_refused_action_becomes_the_safe_command_and_the_previous_one(answer, 
 def test_an_exception_of_a_controller_comes_through_and_leaves_the_safe_command_as_previous():
     controller = Scripted()
     loop = loop_of(controller)
-    loop.step(at(1.0), 0)
+    loop.step(at(1.0), {}, 0)
     controller.answer = RuntimeError("lost its way")
     with pytest.raises(RuntimeError, match="lost its way"):
-        loop.step(at(1.0), PERIOD_NS)
+        loop.step(at(1.0), {}, PERIOD_NS)
     np.testing.assert_array_equal(loop.previous, [[0.0, 0.0]])
     assert loop.answered_ns == PERIOD_NS
 
@@ -145,7 +145,7 @@ def test_an_exception_of_a_controller_comes_through_and_leaves_the_safe_command_
 def test_a_command_is_cut_to_the_limits_and_to_what_the_actuators_reach_in_one_step():
     loop = loop_of(Scripted((100.0, -100.0)))
     slew = np.array(BASE.actuators.response.slew) * loop.dt
-    first, second = (loop.step(at(1.0), number * PERIOD_NS).command[0] for number in range(2))
+    first, second = (loop.step(at(1.0), {}, number * PERIOD_NS).command[0] for number in range(2))
     np.testing.assert_allclose(first, [slew[0], -slew[1]])
     np.testing.assert_allclose(second, [2.0 * slew[0], -2.0 * slew[1]])
 
@@ -154,9 +154,9 @@ def test_a_command_is_cut_to_the_limits_and_to_what_the_actuators_reach_in_one_s
 def test_a_pause_lets_the_loop_forget_and_no_shorter_time_does(gap_ns, forgets):
     controller = Scripted()
     loop = loop_of(controller, pause_ns=500 * MS)
-    loop.step(at(1.0), S)
+    loop.step(at(1.0), {}, S)
     before = controller.resets
-    loop.step(at(1.0), S + gap_ns)
+    loop.step(at(1.0), {}, S + gap_ns)
     assert controller.resets - before == forgets
     np.testing.assert_array_equal(controller.inputs.previous, [(0.0, 0.0) if forgets else GENTLE])
 
@@ -164,7 +164,7 @@ def test_a_pause_lets_the_loop_forget_and_no_shorter_time_does(gap_ns, forgets):
 def test_a_step_at_rest_answers_with_the_safe_command_without_the_controller():
     controller = Scripted()
     loop = loop_of(controller)
-    loop.step(at(1.0), 0)
+    loop.step(at(1.0), {}, 0)
     controller.inputs = None
     loop.rest(PERIOD_NS)
     assert controller.inputs is None
@@ -197,7 +197,7 @@ def steadfast(applied=None, steps=6, *, answer=(1.0, 0, 0, 0, 0, 1.0, 0, 0), est
     controller = Scripted(answer, robot=PLATFORM, estimator=estimator)
     loop = loop_of(controller, task=POSE, goal=POSE_GOAL, robot=PLATFORM, applied=applied, pause_ns=500 * MS)
     for number in range(steps):
-        loop.step(at(1.0), S + number * TICK_NS)
+        loop.step(at(1.0), {}, S + number * TICK_NS)
     return loop
 
 
@@ -226,7 +226,7 @@ def test_the_lqr_gets_its_estimates_from_the_loop():
     lqr = load_classical(PLATFORM, POSE, control_hz=5.0, law="lqr")
     loop = loop_of(lqr, task=POSE, goal=POSE_GOAL, robot=PLATFORM)
     for number in range(6):
-        assert loop.step(at(1.0), S + number * TICK_NS).command.any()
+        assert loop.step(at(1.0), {}, S + number * TICK_NS).command.any()
     assert push_of(loop) > 0.3  # believed to hold the platform against its open valves
 
 
@@ -240,7 +240,7 @@ def test_what_is_estimated_is_forgotten(forget):
     else:
         settings = ESTIMATOR if forget == "use" else HealthSettings(held=0.0)
         loop.use(Scripted(np.zeros(8), robot=PLATFORM, estimator=settings))
-    loop.step(at(1.0), stamp)
+    loop.step(at(1.0), {}, stamp)
     assert push_of(loop) == 0.0
 
 
@@ -248,7 +248,7 @@ def test_a_controller_without_an_estimator_gets_no_estimate():
     loop = steadfast()
     other = Scripted(np.zeros(8), robot=PLATFORM)
     loop.use(other)
-    loop.step(at(1.0), S + 6 * TICK_NS)
+    loop.step(at(1.0), {}, S + 6 * TICK_NS)
     assert loop.controller is other
     assert other.inputs.estimates is None
     assert loop.estimate is None

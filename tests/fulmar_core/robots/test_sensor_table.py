@@ -27,9 +27,11 @@ EACH = pytest.mark.parametrize("name", SENSORS)
 TRUTH = Truth(
     RigidBodyState(np.zeros(3), np.array([0.0, 0.6, 0.0, 0.8]), np.zeros(3), np.array([0.1, 0.2, 0.3])),
     np.array([1.0, 2.0, 9.0]),
-    WheelSpeeds(("wheel_x", "wheel_y"), np.array([10.0, -20.0])),
-    AirData(AirDataSpec.NAMES, np.array([28.0, 0.03, -0.01, 1.0])),
-    SurfacePositions(("elevator", "throttle"), np.array([0.1, 0.4])),
+    {
+        "wheels": WheelSpeeds(("wheel_x", "wheel_y"), np.array([10.0, -20.0])),
+        "air_data": AirData(AirDataSpec.NAMES, np.array([28.0, 0.03, -0.01, 1.0])),
+        "surfaces": SurfacePositions(("elevator", "throttle"), np.array([0.1, 0.4])),
+    },
 )
 
 

@@ -75,7 +75,7 @@ def test_a_valve_that_works_again_is_believed_again_by_the_lqr():
         lost = np.zeros(worlds, dtype=bool)
         for step in range(300):
             simulation.world.alive[sick, everywhere] = float(step >= 75)
-            simulation.move(loop.step(simulation.measured, round(1e9 * step * loop.dt)).command)
+            simulation.move(loop.step(simulation.measured, {}, round(1e9 * step * loop.dt)).command)
             if step == 75:
                 lost = loop.estimate.health.effectiveness[everywhere, sick] < 0.1
         assert lost.sum() >= 8

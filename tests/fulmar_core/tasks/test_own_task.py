@@ -212,10 +212,10 @@ def test_a_mistake_on_the_way_is_the_task_s_not_the_controller_s(own):
     loop = ControlLoop(ROBOT, task, Still())
     episode = draw_episodes(ROBOT, task, NOMINAL, seed=0, numbers=np.zeros(1, dtype=int))
     loop.begin(episode.goal)
-    loop.step(episode.start, 0)
+    loop.step(episode.start, {}, 0)
     task.own.observe = lambda *_: 1 / 0
     with pytest.raises(TaskError, match=rf"^task '{name}': observe raised ZeroDivisionError"):
-        loop.step(episode.start, 100_000_000)
+        loop.step(episode.start, {}, 100_000_000)
     with pytest.raises(TaskError, match=rf"^task '{name}': observe raised ZeroDivisionError"):
         warm_up(Still(), ROBOT, task)
 
@@ -284,14 +284,14 @@ def test_a_goal_counts_when_every_thing_is_seen_and_what_the_task_keeps_goes_on_
     assert mission.lacks_something_of(2 * S)
     mission.see_thing("box", np.zeros(3), 2 * S)
     assert not mission.lacks_something_of(2 * S)
-    loop.inputs(here, 2 * S)
+    loop.inputs(here, {}, 2 * S)
     mission.see_thing("gate", np.array([1.5, 2.0, 0.5]), 3 * S)
     kept = {name: pose.tolist() for name, pose in loop.goal.things.items()}
     assert kept == {"start": [[1.0] * 3], "gate": [[1.5, 2.0, 0.5]], "box": [[0.0] * 3]}
     mission.turn_to(3 * S + 1)
     assert mission.lacking == "place of the box"
     mission.see_thing("box", np.zeros(3), 4 * S)
-    loop.inputs(here[np.array([0])], 4 * S)  # it begins anew: what the task keeps is there
+    loop.inputs(here[np.array([0])], {}, 4 * S)  # it begins anew: what the task keeps is there
     assert set(loop.goal.things) == {"start", "gate", "box"}
 
 

@@ -313,7 +313,7 @@ class ControllerNode(LifecycleNode):
             self._swap.took_over()
             self._announce()
         stamp = measurement.stamp_ns if measurement else 0
-        self._satellite.fill(guard.loop, stamp)
+        guard.readings = self._satellite.readings(stamp)
         command, step = self.robot.actuators.safe_command, None
         try:
             decision, inputs = guard.begin_step(measurement, time.monotonic_ns())

@@ -11,11 +11,12 @@ from rclpy.subscription import Subscription
 from sensor_msgs.msg import JointState
 
 from fulmar_bags.message_reader import reading_of, stamp_ns
+from fulmar_core.controllers.controller import INERTIA as INERTIA_ESTIMATE
 from fulmar_core.estimators.inertia.momentum_balance import is_body
-from fulmar_core.loop.control_loop import ControlLoop
 from fulmar_core.robots.actuators.reaction_wheels import ReactionWheels
 from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.sensors.table import SENSORS
+from fulmar_core.robots.sensors.wheels import NAME as WHEELS
 from fulmar_core.robots.topics import INERTIA, SENSOR_WIRES
 from fulmar_ros.operator_subscription import destroy_all, subscribe_every
 from fulmar_ros.qos import subscriber_qos
@@ -55,9 +56,9 @@ class SatelliteInputs:
         if not isinstance(robot.actuators, ReactionWheels):
             return
         self._names = robot.actuators.wheel_names
-        if "wheels" in robot.sensors.specs:
-            self._waits = lockstep and not robot.sensors.specs["wheels"].rate_hz
-            wire = SENSOR_WIRES["wheels"]
+        if WHEELS in robot.sensors.specs:
+            self._waits = lockstep and not robot.sensors.specs[WHEELS].rate_hz
+            wire = SENSOR_WIRES[WHEELS]
             qos = subscriber_qos(wire, reliable=lockstep)
             made = node.create_subscription(JointState, wire.name, self._take_wheels, qos)
             self.followed[wire.name] = [made]
@@ -71,14 +72,17 @@ class SatelliteInputs:
         """Whether a step of lock step waits for the speeds of its time [ns]."""
         return self._waits and (self._wheels is None or self._wheels[0] < time_ns)
 
-    def fill(self, loop: ControlLoop, time_ns: int) -> None:
-        """Give what is young enough at a time [ns] to the loop."""
-        loop.wheels = _young(self._wheels, time_ns, WHEELS_LAST_NS)
-        loop.inertia = _young(self._inertia, time_ns, INERTIA_LASTS_NS)
+    def readings(self, time_ns: int) -> dict[str, np.ndarray]:
+        """What is young enough at a time [ns], see `Inputs.readings`."""
+        newest = (
+            (WHEELS, self._wheels, WHEELS_LAST_NS),
+            (INERTIA_ESTIMATE, self._inertia, INERTIA_LASTS_NS),
+        )
+        return {name: one[1] for name, one, lasts in newest if one is not None and time_ns - one[0] <= lasts}
 
     def _take_wheels(self, message: JointState) -> None:
-        reading = reading_of(message, SENSORS["wheels"])
-        problem = SENSORS["wheels"].problem(reading, self._robot)
+        reading = reading_of(message, SENSORS[WHEELS])
+        problem = SENSORS[WHEELS].problem(reading, self._robot)
         if self._accept(problem):  # refused speeds count as not measured
             by_name = dict(zip(message.name, reading.value.speeds.tolist(), strict=True))
             speeds = np.array([[by_name[name] for name in self._names]])
@@ -107,9 +111,3 @@ def _inertia_problem(tensor: np.ndarray, known: np.ndarray) -> str:
     if shares.min() < 1.0 / MOST_INERTIA or shares.max() > MOST_INERTIA:
         return f"the inertia on the wire differs from that of the robot's file by a factor of over {MOST_INERTIA:g}"
     return ""
-
-
-def _young(newest: tuple[int, np.ndarray] | None, time_ns: int, lasts_ns: int) -> np.ndarray | None:
-    if newest is None or time_ns - newest[0] > lasts_ns:
-        return None
-    return newest[1]

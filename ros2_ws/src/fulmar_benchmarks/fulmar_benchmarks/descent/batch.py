@@ -74,7 +74,7 @@ class _Batch:
         """What each guard lets through, shape (worlds, n)."""
         now_ns = round(1e9 * tick * self._simulation.control_dt)
         if tick % self._period == 0 and tick < self._killed.max():
-            command = self._loop.step(self._simulation.measured, now_ns).command
+            command = self._loop.step(self._simulation.measured, {}, now_ns).command
             for guard, own, killed in zip(self._guards, command, self._killed, strict=True):
                 if tick < killed:
                     guard.offer(self._robot.actuators.names, own.tolist(), now_ns, stamp_ns=now_ns)

@@ -13,6 +13,7 @@ from fulmar_core.estimators.kinds import make_estimator
 from fulmar_core.loop.control_loop import ControlLoop
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.robots.sensors.catalogue import load_stars
+from fulmar_core.robots.sensors.wheels import NAME as WHEELS
 from fulmar_core.simulation.episode import draw_episode
 from fulmar_core.states.spatial import SpatialState
 from fulmar_core.tasks import load_task
@@ -62,6 +63,7 @@ def point_without_gyroscope(
     loop.begin(stack_goals([episode.goal]))
     step_ns, substeps = round(1e9 * loop.dt), robot.timing.substeps(robot.timing.control_hz)
     errors, truth = [], sample.truth
+    known: dict[str, np.ndarray] = {}  # newest speeds of the wheels
     goal, begun_ns, used_ns = stack_goals([episode.goal]), -1, -1
     for number in range(round(seconds / loop.dt)):
         now_ns = 1_000_000_000 + number * step_ns
@@ -78,9 +80,9 @@ def point_without_gyroscope(
         command = robot.actuators.safe_command
         if estimate is not None:
             begun_ns = now_ns if begun_ns < 0 else begun_ns
-            if "wheels" in sample.readings:
-                loop.wheels = sample.readings["wheels"].value.speeds[None]
-            command = loop.step(SpatialState.from_rigid(estimate.value)[None], now_ns).command[0]
+            speeds = sample.readings.get(WHEELS)
+            known = {WHEELS: speeds.value.speeds[None]} if speeds else known
+            command = loop.step(SpatialState.from_rigid(estimate.value)[None], known, now_ns).command[0]
         before, sample = truth, backend.step(command, substeps)
         truth = sample.truth
         assert before is not None and truth is not None

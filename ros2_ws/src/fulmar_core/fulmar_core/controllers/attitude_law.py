@@ -17,6 +17,7 @@ from fulmar_core.controllers.law import Law
 from fulmar_core.controllers.space_frame import SpaceFrame, SpaceMotion
 from fulmar_core.controllers.target_motion import TargetMotion
 from fulmar_core.robots.actuators.reaction_wheels import ReactionWheels
+from fulmar_core.robots.sensors.wheels import NAME as WHEELS
 from fulmar_core.states.attitude import logarithm
 
 # Share of a wheel's momentum from which on it is unloaded, and down to which.
@@ -94,9 +95,10 @@ class AttitudeLaw(Law):
 
     def _momentum(self, inputs: Inputs) -> np.ndarray:
         """Momentum of the wheels in the body frame, shape (n, 3) [N·m·s]."""
-        if inputs.wheels is None:
+        speeds = inputs.readings.get(WHEELS)
+        if speeds is None:
             return np.zeros((len(inputs.previous), 3))
-        return self._wheels.to_body(self._wheels.spin_inertia * inputs.wheels)
+        return self._wheels.to_body(self._wheels.spin_inertia * speeds)
 
     def _outside(self, momentum: np.ndarray, most: float) -> np.ndarray:
         """Torque of unloading, shape (n, 3) [N·m]: from half of a wheel's momentum on, until little is left."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fulmar_core.controllers.attitude_law import AttitudeGains, AttitudeLaw
-from fulmar_core.controllers.controller import Inputs
+from fulmar_core.controllers.controller import INERTIA, Inputs
 from fulmar_core.controllers.space_frame import SpaceMotion
 from fulmar_core.robots.actuators.reaction_wheels import ReactionWheels
 from fulmar_core.robots.robot import Robot
@@ -55,11 +55,12 @@ class AdaptiveAttitude(AttitudePd):
 
     def inertia_of(self, inputs: Inputs) -> np.ndarray:
         """The estimate, each entry no farther from the file's than `stray` allows."""
-        if inputs.inertia is None:
+        estimated = inputs.readings.get(INERTIA)
+        if estimated is None:
             return self.inertia
         diagonal = np.sqrt(np.diag(self.inertia))
         most = self.gains.stray * np.outer(diagonal, diagonal)
-        return np.asarray(self.inertia + np.clip(inputs.inertia - self.inertia, -most, most))
+        return np.asarray(self.inertia + np.clip(estimated - self.inertia, -most, most))
 
 
 def attitude_pd_gains(robot: Robot) -> AttitudePdGains:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any, Generic, Protocol
 
 import numpy as np
@@ -11,6 +12,9 @@ from fulmar_core.estimators.actuator_health.actuator_estimator import ActuatorEs
 from fulmar_core.estimators.actuator_health.filters import HealthSettings
 from fulmar_core.states.state import S
 from fulmar_core.tasks.goal import Goal
+
+INERTIA = "inertia"  # name of what an inertia estimator says: tensor of one robot, shape (3, 3) [kg·m²]
+Readings = Mapping[str, np.ndarray]
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,10 +31,9 @@ class Inputs(Generic[S]):
     estimates: ActuatorEstimate | None  # of an estimator that the controller asks for; None without one
     stamp_ns: int  # when the state was measured, on the plant's clock [ns]
     dt: float  # time of one control step [s]
-    wheels: np.ndarray | None = (
-        None  # speeds of reaction wheels, shape (n, count); None: not measured [rad/s]
-    )
-    inertia: np.ndarray | None = None  # estimated tensor of one robot, shape (3, 3); None: none [kg·m²]
+    # What else is measured or estimated, by the name of its sensor or estimator: `wheels`, speeds of reaction wheels,
+    # shape (n, count) [rad/s]; `inertia`, see `INERTIA`. What is not measured, or is too old, is not there.
+    readings: Readings = field(default_factory=dict)
 
 
 class Controller(Protocol):

@@ -18,8 +18,7 @@ from fulmar_core.robots.actuators.pushing import Pushing
 from fulmar_core.robots.actuators.reaction_wheels import ReactionWheels
 from fulmar_core.robots.actuators.rolling import Rolling
 from fulmar_core.robots.robot import Robot
-from fulmar_core.robots.sensors.surfaces import SurfacePositions
-from fulmar_core.robots.sensors.wheels import WheelSpeeds
+from fulmar_core.robots.sensors import surfaces, wheels
 from fulmar_core.states.arrays import array_namespace
 from fulmar_core.states.planar import PlanarState
 from fulmar_core.states.rotation import Array
@@ -67,19 +66,16 @@ def actuation_of(
     return ActuationState(response, **usual)
 
 
-def wheel_speeds_of(robot: Robot, actuation: ActuationState) -> WheelSpeeds | None:
-    """True speeds of the reaction wheels of a batch of one; None of robots that have none."""
-    if not isinstance(actuation, WheelActuation):
-        return None
-    assert isinstance(robot.actuators, ReactionWheels)  # as of `actuation_of`
-    return WheelSpeeds(robot.actuators.wheel_names, np.asarray(actuation.speeds[:, 0], dtype=float))
-
-
-def surface_positions_of(robot: Robot, actuation: ActuationState) -> SurfacePositions | None:
-    """True deflections and thrust levels of an aircraft in a batch of one; None of other robots."""
-    if not isinstance(actuation, FlightActuation):
-        return None
-    return SurfacePositions(robot.actuators.names, np.asarray(actuation.applied[:, 0], dtype=float))
+def truths_of(robot: Robot, actuation: ActuationState) -> dict[str, Any]:
+    """What sensors measure of the actuators of a batch of one, by the names of the sensors; see `Truth.more`."""
+    if isinstance(actuation, WheelActuation):
+        assert isinstance(robot.actuators, ReactionWheels)  # as in `actuation_of`
+        speeds = np.asarray(actuation.speeds[:, 0], dtype=float)
+        return {wheels.NAME: wheels.WheelSpeeds(robot.actuators.wheel_names, speeds)}
+    if isinstance(actuation, FlightActuation):
+        positions = np.asarray(actuation.applied[:, 0], dtype=float)
+        return {surfaces.NAME: surfaces.SurfacePositions(robot.actuators.names, positions)}
+    return {}
 
 
 def may_open_late(robot: Robot, scenario: Scenario) -> bool:

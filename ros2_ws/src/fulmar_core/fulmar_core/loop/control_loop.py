@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_core.controllers.controller import Controller, Inputs
+from fulmar_core.controllers.controller import Controller, Inputs, Readings
 from fulmar_core.estimators.actuator_health.actuator_estimator import ActuatorEstimate, ActuatorEstimator
 from fulmar_core.estimators.actuator_health.applied import Applied, AppliedHistory
 from fulmar_core.robots.robot import Robot
@@ -38,8 +38,6 @@ class ControlLoop:
         previous: Command of the step before, after every limit, shape (n, m).
         answered_ns: Stamp of the measurement that this was the answer to; -1 before the first [ns].
         estimate: Of the controller's actuator estimator at the newest step; None without one.
-        wheels: Newest speeds of reaction wheels, shape (n, count); None where they are not measured [rad/s].
-        inertia: Newest estimate of one robot's inertia, shape (3, 3); None without one [kg·m²].
     """
 
     def __init__(
@@ -75,8 +73,6 @@ class ControlLoop:
         self.estimate: ActuatorEstimate | None = None
         self._estimated_ns = -1
         self._controller = controller
-        self.wheels: np.ndarray | None = None
-        self.inertia: np.ndarray | None = None
 
     @property
     def controller(self) -> Controller:
@@ -99,15 +95,16 @@ class ControlLoop:
         self._controller.reset()
         self._forget_estimates()
 
-    def step(self, measured: State, stamp_ns: int) -> Step:
+    def step(self, measured: State, readings: Readings, stamp_ns: int) -> Step:
         """Do one control step; see `inputs` and `act`."""
-        return self.act(self.inputs(measured, stamp_ns))
+        return self.act(self.inputs(measured, readings, stamp_ns))
 
-    def inputs(self, measured: State, stamp_ns: int) -> Inputs:
+    def inputs(self, measured: State, readings: Readings, stamp_ns: int) -> Inputs:
         """Advance the goal by a measurement, and observe.
 
         Args:
             measured: State of each robot, shapes (n,).
+            readings: What else is measured or estimated, see `Inputs.readings`.
             stamp_ns: When it was measured, on the plant's clock [ns].
 
         Returns:
@@ -128,8 +125,7 @@ class ControlLoop:
             self.estimate,
             stamp_ns,
             self.dt,
-            self.wheels,
-            self.inertia,
+            readings,
         )
 
     def act(self, inputs: Inputs) -> Step:

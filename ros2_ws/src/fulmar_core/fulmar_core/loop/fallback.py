@@ -45,7 +45,7 @@ def warm_up(
     loop.begin(goal_in_float64(episode.goal))
     try:
         for number in range(WARM_UP):
-            loop.step(episode.start, round(1e9 * number * loop.dt))
+            loop.step(episode.start, {}, round(1e9 * number * loop.dt))
         controller.reset()
     except TaskError:
         raise

@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from fulmar_core.controllers.controller import Controller, Inputs
+from fulmar_core.controllers.controller import Controller, Inputs, Readings
 from fulmar_core.controllers.excite import Excite
 from fulmar_core.controllers.excite_wheels import ExciteWheels
 from fulmar_core.estimators.actuator_health.applied import AppliedHistory
@@ -61,6 +61,7 @@ class GuardedLoop:
         mission: Goal, obstacles and things.
         switch: The controller that acts, and its fallback.
         newest: The newest usable measurement since the activation.
+        readings: What the next step gets beside it, see `Inputs.readings`.
         acted: Control steps with a command of the controller's own since the activation.
         refusal: Why the newest goal does not count: it is invalid or out of bounds, or the e-stop refused it or took it
             away.
@@ -99,6 +100,7 @@ class GuardedLoop:
         )
         self.mission = Mission(self.loop, streamed=settings.goals_streamed)
         self.newest: Measurement | None = None
+        self.readings: Readings = {}
         self._newest_state: State  # of `newest`, shapes (1,)
         self.acted = 0
         self.refusal = Refusal()
@@ -324,7 +326,7 @@ class GuardedLoop:
 
     def _inputs(self, measurement: Measurement) -> Inputs:
         state = self._newest_state if measurement is self.newest else self._state_of(measurement)
-        return self.loop.inputs(state, measurement.stamp_ns)
+        return self.loop.inputs(state, self.readings, measurement.stamp_ns)
 
     def _state_of(self, measurement: Measurement) -> State:
         """What the task takes of a measurement, shapes (1,)."""

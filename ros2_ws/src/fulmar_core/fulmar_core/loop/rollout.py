@@ -8,10 +8,11 @@ from typing import Protocol
 
 import numpy as np
 
-from fulmar_core.controllers.controller import Controller
+from fulmar_core.controllers.controller import Controller, Readings
 from fulmar_core.dynamics.things import Poses
 from fulmar_core.loop.control_loop import ControlLoop
 from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.sensors.wheels import NAME as WHEELS
 from fulmar_core.simulation.backend import Backend, Sample
 from fulmar_core.simulation.episode import draw_episodes, episode_steps
 from fulmar_core.simulation.metrics import TargetCounter, Trajectories, TrajectoryLog, join
@@ -164,8 +165,8 @@ class _Worlds(Protocol):
         ...
 
     @property
-    def wheels(self) -> np.ndarray | None:
-        """Measured speeds of reaction wheels, shape (worlds, count) [rad/s]; None of robots without any."""
+    def readings(self) -> Readings:
+        """What else is measured, see `Inputs.readings`."""
         ...
 
     def move(self, command: Array) -> None:
@@ -184,8 +185,7 @@ def _roll_out(
     for number in range(episode_steps(task, loop.dt)):
         assert loop.goal is not None
         loop.goal = goal_in_float64(loop.goal.among(worlds.things))
-        loop.wheels = worlds.wheels
-        step = loop.step(worlds.measured, round(1e9 * number * loop.dt))
+        step = loop.step(worlds.measured, worlds.readings, round(1e9 * number * loop.dt))
         worlds.move(step.command)
         log.add(worlds.truth, counter.update(worlds.truth, worlds.things), step.command)
         progress((number + 1) * len(goal.done))
@@ -211,5 +211,5 @@ class _Backends:
         self.measured = form.stack([form.from_rigid(sample.measured) for sample in samples])
         self.truth = form.stack([form.from_rigid(each.truth) for each in samples if each.truth is not None])
         self.things = {name: np.stack([each.things[name] for each in samples]) for name in samples[0].things}
-        speeds = [each.readings["wheels"].value.speeds for each in samples if "wheels" in each.readings]
-        self.wheels = np.stack(speeds) if speeds else None
+        speeds = [each.readings[WHEELS].value.speeds for each in samples if WHEELS in each.readings]
+        self.readings = {WHEELS: np.stack(speeds)} if speeds else {}

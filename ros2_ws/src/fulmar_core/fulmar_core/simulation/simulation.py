@@ -15,6 +15,7 @@ from fulmar_core.dynamics.dynamics_of import dynamics_of
 from fulmar_core.dynamics.motion import actuation_of, may_be_off_centre, may_open_late
 from fulmar_core.dynamics.things import Poses
 from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.sensors.wheels import NAME as WHEELS
 from fulmar_core.simulation.episode import draw_episodes
 from fulmar_core.simulation.episode_prefetch import Beginning, UpcomingEpisodes
 from fulmar_core.states.arrays import array_namespace
@@ -169,11 +170,11 @@ class BatchSimulation(MutableState, Generic[S]):
         return {thing.name: self.goal.things[thing.name] for thing in self.task.things}
 
     @property
-    def wheels(self) -> np.ndarray | None:
-        """True speeds of reaction wheels, shape (worlds, count) [rad/s]; None of robots without any."""
+    def readings(self) -> dict[str, np.ndarray]:
+        """What is measured beside the odometry, without errors: speeds of reaction wheels, see `Inputs.readings`."""
         if not isinstance(self._actuation, WheelActuation):
-            return None
-        return np.asarray(self._actuation.speeds, dtype=float).T
+            return {}
+        return {WHEELS: np.asarray(self._actuation.speeds, dtype=float).T}
 
     def step(self, command: Array) -> None:
         """Do one control step of a learner: limit and apply its command, and advance the goals by what is measured.

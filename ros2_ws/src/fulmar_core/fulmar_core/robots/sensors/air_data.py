@@ -84,10 +84,11 @@ class AirProbes:
 
     def measure(self, truth: Truth, time_s: float) -> Reading | None:
         """`AirData` with the variances of its parts; None between two measurements, or where the air is not known."""
-        if truth.air is None:
+        air = truth.more.get(NAME)
+        if air is None:
             return None
         if self._sampling.is_due(time_s):
-            every = dict(zip(truth.air.names, truth.air.values, strict=True))
+            every = dict(zip(air.names, air.values, strict=True))
             values = np.array([every[name] for name in self._spec.names])
             if self._noisy:
                 noise = self._std * self._rng.standard_normal(len(values))

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
@@ -22,9 +22,8 @@ class Truth:
     specific_force: np.ndarray | None = (
         None  # (3,) acceleration minus gravity, in the body; None: not computed [m/s²]
     )
-    wheels: Any = None  # `robots.sensors.wheels.WheelSpeeds` of a robot with reaction wheels
-    air: Any = None  # `robots.sensors.air_data.AirData` of an aircraft
-    surfaces: Any = None  # `robots.sensors.surfaces.SurfacePositions` of an aircraft
+    # What else sensors of some robots measure: by the name of the sensor, a value of its own type.
+    more: Mapping[str, Any] = field(default_factory=dict)
 
 
 class SimulatedSensor(Protocol):

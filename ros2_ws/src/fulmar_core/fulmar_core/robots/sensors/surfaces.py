@@ -40,9 +40,9 @@ class ServoSensors(JointSensors):
 
     def measure(self, truth: Truth, time_s: float) -> Reading | None:
         """`SurfacePositions`, with their covariance (n, n); None between two measurements or of other robots."""
-        if truth.surfaces is None or not self._sampling.is_due(time_s):
+        true = truth.more.get(NAME)
+        if true is None or not self._sampling.is_due(time_s):
             return None
-        true = truth.surfaces
         turned = np.array([not is_throttle(name) for name in true.names])
         positions, covariance = self.with_errors(true.positions, turned)
         return Reading(SurfacePositions(true.names, positions), covariance=covariance)

@@ -39,9 +39,9 @@ class Tachometers(JointSensors):
 
     def measure(self, truth: Truth, time_s: float) -> Reading | None:
         """`WheelSpeeds`, with their covariance of shape (n, n); None between two measurements or without wheels."""
-        if truth.wheels is None or not self._sampling.is_due(time_s):
+        true = truth.more.get(NAME)
+        if true is None or not self._sampling.is_due(time_s):
             return None
-        true = truth.wheels
         speeds, covariance = self.with_errors(true.speeds, np.ones(len(true.names), dtype=bool))
         return Reading(WheelSpeeds(true.names, speeds), covariance=covariance)
 
