@@ -35,7 +35,7 @@ class Figures:
 
 
 def settings(repository: Path = REPOSITORY) -> dict[str, object]:
-    """What import-linter is told."""
+    """Settings of import-linter."""
     text = (repository / "pyproject.toml").read_text(encoding="utf-8")
     found: dict[str, object] = tomllib.loads(text)["tool"]["importlinter"]
     return found

@@ -18,6 +18,7 @@ TARGETS = {
     "demo",
     "freeze",
     "freeze-check",
+    "rooms",
     "train-demo",
     "profile-step",
     "test",

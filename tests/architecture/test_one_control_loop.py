@@ -11,11 +11,11 @@ STEPS = ("act", "observe")
 LOOPS = {"loop", "guard"}  # names of a `ControlLoop` and a `GuardedLoop`, private or not
 CORE = "ros2_ws/src/fulmar_core/fulmar_core"
 WRITTEN = {
-    f"{CORE}/control_loop.py": "the step itself",
-    f"{CORE}/guarded_loop.py": "the same behind its guards",
-    f"{CORE}/observation.py": "what the step observes with",
-    f"{CORE}/simulation.py": "the batch that learners step",
-    f"{CORE}/learning_step.py": "a step of a learner",
+    f"{CORE}/loop/control_loop.py": "the step itself",
+    f"{CORE}/loop/guarded_loop.py": "the same behind its guards",
+    f"{CORE}/tasks/observation.py": "what the step observes with",
+    f"{CORE}/simulation/simulation.py": "the batch that learners step",
+    f"{CORE}/simulation/learning_step.py": "a step of a learner",
     "ros2_ws/src/fulmar_benchmarks/fulmar_benchmarks/throughput.py": "measures that one",
     "policy_server/policy.py": "inputs of a network beside its observation",
     "policy_server/own_controller.py": "a user's class behind the interface of controllers",

@@ -76,7 +76,7 @@ def test_the_feed_forward_uses_the_momentum_of_the_wheels():
     simulation = BatchSimulation(CUBESAT, task, STILL, worlds=3, seed=1)
     law, inputs = load_classical(CUBESAT, task, law="pd"), inputs_of(simulation)
     turning = replace(inputs, state=replace(inputs.state, wx=np.full(3, 0.01)))
-    spinning = replace(turning, wheels=np.full((3, 3), 200.0))
+    spinning = replace(turning, readings={"wheels": np.full((3, 3), 200.0)})
     law.reset()
     without = law.act(turning)
     law.reset()
@@ -99,15 +99,15 @@ class TestAdaptive:
         inputs = inputs_of(simulation)
         plain = law.act(inputs)
         law.reset()
-        heavier = law.act(replace(inputs, inertia=1.1 * CUBESAT.body.inertia_matrix))
+        heavier = law.act(replace(inputs, readings={"inertia": 1.1 * CUBESAT.body.inertia_matrix}))
         np.testing.assert_allclose(heavier[:, :3], 1.1 * plain[:, :3], rtol=1e-9, atol=0)
 
     def test_an_estimate_strays_no_farther_than_its_bound(self):
         law = self.law()
         simulation = BatchSimulation(CUBESAT, law.task, STILL, worlds=1, seed=1)
-        wild = replace(inputs_of(simulation), inertia=50.0 * CUBESAT.body.inertia_matrix)
+        wild = replace(inputs_of(simulation), readings={"inertia": 50.0 * CUBESAT.body.inertia_matrix})
         np.testing.assert_allclose(law.inertia_of(wild), 1.3 * np.diag(CUBESAT.body.inertia))
-        assert law.inertia_of(replace(wild, inertia=None)) is law.inertia
+        assert law.inertia_of(replace(wild, readings={})) is law.inertia
 
 
 def test_a_task_that_moves_a_body_is_refused_for_a_satellite_and_the_other_way_round():

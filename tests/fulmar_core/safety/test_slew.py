@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from fulmar_core.safety.actuator_guard import ActuatorGuard
@@ -65,3 +66,35 @@ class TestSlew:
     def test_valves_have_no_slew(self, guard):
         guard.offer(NAMES, GOOD, 0)
         assert guard.output(1).tolist() == GOOD
+
+
+class TestAStopThatEndsEarly:
+    """The e-stop node was lost, and is there again before the wheels stand."""
+
+    @pytest.mark.parametrize("commanded_then", [0.0, 0.45])
+    def test_the_wheels_go_on_from_where_it_brought_them(self, base, commanded_then):
+        base.estop.receive(False, 0)
+        speeds = []
+        for now in range(0, 1100, 20):
+            if now % 100 == 0:
+                wanted = [0.45 if now < 500 else commanded_then, 0.0]
+                base.offer(BASE.names, wanted, now * MS, stamp_ns=(1 + now) * MS)
+            if not 0 < now < 700:
+                base.estop.receive(False, now * MS)
+            speeds.append(float(base.output(now * MS)[0]))
+        stopped, again = 520 // 20, 700 // 20
+        assert speeds[stopped - 1] == pytest.approx(0.45)
+        assert 0.2 < speeds[again] < 0.3
+        most = 0.09 if commanded_then else 0.0  # m/s: a control step's
+        assert max(np.diff(speeds[stopped:])) <= most + 1e-9
+        assert speeds[-1] == pytest.approx(commanded_then)
+
+    def test_valves_stay_closed_until_the_next_command(self, guard):
+        guard.estop.receive(False, 0)
+        for now in range(0, 510, 100):
+            guard.offer(NAMES, GOOD, now * MS)
+        assert guard.output(501 * MS).tolist() == [0.0] * 8
+        guard.estop.receive(False, 520 * MS)
+        assert guard.output(530 * MS).tolist() == [0.0] * 8
+        guard.offer(NAMES, GOOD, 540 * MS)
+        assert guard.output(550 * MS).tolist() == GOOD

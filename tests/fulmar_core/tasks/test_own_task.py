@@ -389,7 +389,7 @@ def test_a_task_in_space_learns_and_is_evaluated_as_the_shipped_ones(own):
 
 def test_a_state_type_that_is_none_is_one_line(own):
     with pytest.raises(
-        ConfigError, match=r"state_type = 'space' must be fulmar_core\.planar\.PlanarState or"
+        ConfigError, match=r"state_type = 'space' must be fulmar_core\.states\.planar\.PlanarState or"
     ):
         load_task(own("    state_type = 'space'", members=IN_SPACE, head=OF_SPACE))
 

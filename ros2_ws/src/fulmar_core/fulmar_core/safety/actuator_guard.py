@@ -276,10 +276,20 @@ class ActuatorGuard:
         """Since when the e-stop, a second publisher or the device's refusal holds the robot; None if none does."""
         contested = not self.person and self.publishers.reason(now_ns)
         if not self.estop.reason(now_ns) and not contested and not self.held:
+            if self._stopped_ns is not None and not self._steers:
+                self.command = self._slowed(self._stopped_ns, now_ns)  # never back to the command before the stop
             self._stopped_ns = None
         elif self._stopped_ns is None:
             self._stopped_ns = now_ns
         return self._stopped_ns
+
+    def _slowed(self, since_ns: int, now_ns: int) -> np.ndarray:
+        """Where a stop has brought the actuators by now, one that began at `since_ns` or within another one [ns]."""
+        if self._lockstep:
+            return self._actuators.safe_command
+        if self._safe_since_ns is not None:
+            since_ns = min(since_ns, self._safe_since_ns)
+        return self.refuge.command(max(0, now_ns - since_ns) / 1e9, self._applied_last, None)
 
     def _is_last_word(self, values: Sequence[float], now_ns: int) -> bool:
         """Whether a person who has just given back would take the actuators with a safe command that came late."""

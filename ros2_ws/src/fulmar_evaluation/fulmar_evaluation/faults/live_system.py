@@ -29,6 +29,7 @@ from fulmar_core.robots.topics import (
     Wire,
     command_wire,
 )
+from fulmar_core.safety.estop import TIMEOUT_NS
 from fulmar_core.safety.watchdog import default_timeout
 from fulmar_core.tasks import load_task
 from fulmar_evaluation.faults.fault_environment import (
@@ -110,6 +111,8 @@ class LiveSystem:
         self.ramp_s = actuators.refuge.longest_s
         # From the last command to standstill.
         self.silenced_s = self.watchdog_s + self.tick_s + self.ramp_s
+        # From the last message of the e-stop to the same: a plant looks at each tick.
+        self.estop_silent_s = 1e-9 * TIMEOUT_NS + 2.0 * self.tick_s + self.ramp_s
         # From what a controller notices to the same.
         self.corrected_s = self.beat_s + 2.0 * self.tick_s + slew_s
 

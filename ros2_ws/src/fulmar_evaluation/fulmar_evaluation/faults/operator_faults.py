@@ -61,8 +61,9 @@ def _hand(live: LiveSystem, number: signal.Signals) -> Outcome:
     with _held_gamepad(live):
         if not wait_for(lambda: _commanded_by(live) == "person", TAKES_S):
             raise RunFailed(f"the hand did not get the robot within {TAKES_S:g} s")
+        node = live.process("teleop")
         since_s = live.until_it_moves()
-        live.send("teleop", number)
+        node.send_signal(number)
         return stopped(live, since_s, live.silenced_s)
 
 

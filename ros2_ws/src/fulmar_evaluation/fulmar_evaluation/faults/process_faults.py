@@ -11,14 +11,12 @@ import psutil
 
 from fulmar_core.estimators.kinds import default_estimator, load_estimator
 from fulmar_core.robots.topics import MOCAP
-from fulmar_core.safety.estop import TIMEOUT_NS
 from fulmar_evaluation.faults.fault import STAYS_S, WORDS_S, Fault, Outcome, stopped, went_on
 from fulmar_evaluation.faults.fault_environment import FaultEnvironment, lost
 from fulmar_evaluation.faults.launched import LAUNCHERS
 from fulmar_evaluation.faults.live_system import LiveSystem
 from fulmar_evaluation.faults.observer import HealthStatus, wait_for
 
-ESTOP_S = TIMEOUT_NS / 1e9
 PAUSE_S = 2.0
 REPORT_S = 0.5  # what a recorder said before it died has come by then
 AGAIN_S = 30.0  # for a recorder to be started again, on a busy computer
@@ -37,12 +35,12 @@ def controller_hangs(live: LiveSystem) -> Outcome:
 
 def estop_killed(live: LiveSystem) -> Outcome:
     """SIGKILL of the e-stop: its silence counts as pressed."""
-    return signalled(live, "estop", signal.SIGKILL, ESTOP_S + live.tick_s + live.ramp_s)
+    return signalled(live, "estop", signal.SIGKILL, live.estop_silent_s)
 
 
 def estop_hangs(live: LiveSystem) -> Outcome:
     """SIGSTOP of the e-stop."""
-    return signalled(live, "estop", signal.SIGSTOP, ESTOP_S + live.tick_s + live.ramp_s)
+    return signalled(live, "estop", signal.SIGSTOP, live.estop_silent_s)
 
 
 def estimator_killed(live: LiveSystem) -> Outcome:
@@ -65,8 +63,9 @@ def mocap_lost(live: LiveSystem) -> Outcome:
 
 def signalled(live: LiveSystem, name: str, number: signal.Signals, limit_s: float) -> Outcome:
     """Send a signal to one process while the robot moves; the robot has to stop within the limit [s]."""
+    node = live.process(name)  # takes a tenth of a second
     since_s = live.until_it_moves()
-    live.send(name, number)
+    node.send_signal(number)
     return stopped(live, since_s, limit_s)
 
 
@@ -82,8 +81,9 @@ def plant_hangs(live: LiveSystem) -> Outcome:
 
 def _plant(live: LiveSystem, number: signal.Signals) -> Outcome:
     """Nothing is applied from then on; what a device then does by itself is another matter."""
+    node = live.process("plant")
     since_s = live.until_it_moves()
-    live.send("plant", number)
+    node.send_signal(number)
     limit_s = live.watchdog_s + live.beat_s + live.tick_s
     time.sleep(limit_s + STAYS_S)
     wait_for(lambda: live.observer.problem_since(since_s) is not None, WORDS_S)
@@ -117,8 +117,8 @@ def markers_hang(live: LiveSystem) -> Outcome:
 
 def helper_lost(live: LiveSystem, name: str, number: signal.Signals) -> Outcome:
     """Send a signal to a node without which the robot goes on; the launcher has to start it again."""
-    since_s = live.until_it_moves()
     lost = live.process(name)
+    since_s = live.until_it_moves()
     lost.send_signal(number)
     again = _is_started_again(live, lost, name)
     time.sleep(PAUSE_S)
