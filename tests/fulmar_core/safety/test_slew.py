@@ -75,9 +75,9 @@ class TestAStopThatEndsEarly:
     def test_the_wheels_go_on_from_where_it_brought_them(self, base, commanded_then):
         base.estop.receive(False, 0)
         speeds = []
-        for now in range(0, 1100, 20):
+        for now in range(0, 1300, 20):
             if now % 100 == 0:
-                wanted = [0.45 if now < 500 else commanded_then, 0.0]
+                wanted = [0.45 if now <= 500 else commanded_then, 0.0]
                 base.offer(BASE.names, wanted, now * MS, stamp_ns=(1 + now) * MS)
             if not 0 < now < 700:
                 base.estop.receive(False, now * MS)

@@ -277,7 +277,9 @@ class ActuatorGuard:
         contested = not self.person and self.publishers.reason(now_ns)
         if not self.estop.reason(now_ns) and not contested and not self.held:
             if self._stopped_ns is not None and not self._steers:
-                self.command = self._slowed(self._stopped_ns, now_ns)  # never back to the command before the stop
+                self.command = self._slowed(
+                    self._stopped_ns, now_ns
+                )  # never back to the command before the stop
             self._stopped_ns = None
         elif self._stopped_ns is None:
             self._stopped_ns = now_ns

@@ -34,8 +34,11 @@ def controller_hangs(live: LiveSystem) -> Outcome:
 
 
 def estop_killed(live: LiveSystem) -> Outcome:
-    """SIGKILL of the e-stop: its silence counts as pressed."""
-    return signalled(live, "estop", signal.SIGKILL, live.estop_silent_s)
+    """SIGKILL of the e-stop: its silence counts as pressed, until another e-stop node is there.
+
+    That one may come before wheels stand; they then follow commands, of which one may just have been missed.
+    """
+    return signalled(live, "estop", signal.SIGKILL, live.estop_silent_s + live.beat_s)
 
 
 def estop_hangs(live: LiveSystem) -> Outcome:
