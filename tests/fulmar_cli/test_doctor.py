@@ -35,6 +35,7 @@ from fulmar_cli.diagnosis.network import (
     check_discovery,
     check_multicast,
     check_profile,
+    check_receive_buffer,
     check_running_robots,
 )
 from fulmar_cli.diagnosis.sockets import Listener, check_sockets, listeners
@@ -140,6 +141,14 @@ def test_a_profile_of_the_user_that_may_share_memory_is_named():
     assert check_profile({}).level == "ok"
     finding = check_profile({"FASTDDS_DEFAULT_PROFILES_FILE": "/etc/mine.xml"})
     assert (finding.level, "/etc/mine.xml is yours" in finding.found) == ("advice", True)
+
+
+@pytest.mark.parametrize(("text", "level"), [("4194304", "ok"), ("212992", "advice"), ("", "ok")])
+def test_sockets_that_may_keep_little_are_named_with_the_command_that_gives_them_more(tmp_path, text, level):
+    (tmp_path / "rmem_max").write_text(text)
+    finding = check_receive_buffer(tmp_path / "rmem_max")
+    assert finding.level == level
+    assert ("sysctl -w net.core.rmem_max=4194304" in finding.fix) == (level == "advice")
 
 
 def test_sockets_that_other_hosts_can_reach_are_found_with_their_process_and_the_cause():

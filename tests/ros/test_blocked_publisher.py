@@ -6,6 +6,8 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 import pytest
 
@@ -50,26 +52,28 @@ STOPPED_S, RECEIVING_S = 2.0, 2.0
 ALLOWED_S = 0.15  # a third of the shortest watchdog; in shared memory half of the stops cost 2 s
 
 
-def node(code: str, env: dict[str, str], *arguments: str) -> subprocess.Popen[str]:
-    child = subprocess.Popen(
-        [sys.executable, "-c", code, *arguments], env=env, stdout=subprocess.PIPE, text=True
-    )
-    assert child.stdout is not None
-    assert child.stdout.readline()
-    return child
+@contextmanager
+def node(code: str, env: dict[str, str], *arguments: str) -> Iterator[subprocess.Popen[str]]:
+    """A process that has begun; it is gone afterwards."""
+    command = [sys.executable, "-c", code, *arguments]
+    with subprocess.Popen(command, env=env, stdout=subprocess.PIPE, text=True) as child:
+        try:
+            assert child.stdout is not None
+            assert child.stdout.readline()
+            yield child
+        finally:
+            child.kill()
 
 
 @pytest.mark.slow
 def test_a_subscriber_that_is_stopped_and_killed_blocks_no_publisher(ros_domain: RosDomain) -> None:
     lasts_s = sum(PAUSES) + len(PAUSES) * (STOPPED_S + RECEIVING_S + 3.0)
-    publisher = node(PUBLISHER, ros_domain.env, f"{lasts_s}")
-    for pause in PAUSES:
-        subscriber = node(SUBSCRIBER, ros_domain.env)
-        time.sleep(RECEIVING_S)
-        subscriber.send_signal(signal.SIGSTOP)
-        time.sleep(STOPPED_S)
-        subscriber.kill()
-        subscriber.wait()
-        time.sleep(pause)
-    longest = float(publisher.communicate(timeout=lasts_s)[0])
+    with node(PUBLISHER, ros_domain.env, f"{lasts_s}") as publisher:
+        for pause in PAUSES:
+            with node(SUBSCRIBER, ros_domain.env) as subscriber:
+                time.sleep(RECEIVING_S)
+                subscriber.send_signal(signal.SIGSTOP)
+                time.sleep(STOPPED_S)
+            time.sleep(pause)
+        longest = float(publisher.communicate(timeout=lasts_s)[0])
     assert longest < ALLOWED_S

@@ -28,6 +28,7 @@ from fulmar_cli.diagnosis.network import (
     check_discovery,
     check_multicast,
     check_profile,
+    check_receive_buffer,
     check_round_trip,
     check_running_robots,
 )
@@ -63,6 +64,7 @@ def diagnose(purpose: str | None = None, name: str | None = None) -> list[Findin
         partial(check_discovery, environment, hardware=hardware),
         partial(check_multicast, environment),
         partial(check_profile, environment),
+        check_receive_buffer,
         partial(check_sockets, environment),
         check_round_trip,
         check_running_robots,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import socket
 from collections.abc import Mapping
+from pathlib import Path
 
 from fulmar_bringup.domains import DOMAINS, LARGEST
 from fulmar_cli.diagnosis.check_result import Finding
@@ -21,6 +22,8 @@ from fulmar_ros.middleware import OWN_HOST as OURS
 RANGES = ("SUBNET", "LOCALHOST", "OFF", "SYSTEM_DEFAULT")
 GROUP = "239.255.0.1"  # of DDS discovery (OMG DDSI-RTPS 2.5, 9.6.2)
 LOOPBACK = "127.0.0.1"
+RECEIVE_LIMIT = Path("/proc/sys/net/core/rmem_max")
+RECEIVE_BYTES = 4_194_304  # of fast_dds.xml
 ROS_FIX = (
     "sudo ip link set lo up && ROS_DOMAIN_ID=77 fulmar doctor   # without loopback, or in a domain in use"
 )
@@ -105,6 +108,28 @@ def _without_multicast(found: str, timeout_s: float) -> Finding:
         )
     fix = "sudo ip link set lo multicast on && sudo sysctl net.ipv4.igmp_max_memberships=20"
     return Finding("multicast", "advice", found, fix)
+
+
+def check_receive_buffer(limit: Path = RECEIVE_LIMIT) -> Finding:
+    """Whether sockets may keep what comes while a node is held up; the profiles ask for `RECEIVE_BYTES`.
+
+    Args:
+        limit: File in which the kernel says the most that a socket gets [bytes].
+    """
+    what = "receive buffer"
+    try:
+        most = int(limit.read_text())
+    except (OSError, ValueError):
+        return Finding(what, "ok", "the system states no limit")
+    found = f"up to {most / 1e6:.1f} MB a socket"
+    if most >= RECEIVE_BYTES:
+        return Finding(what, "ok", found)
+    return Finding(
+        what,
+        "advice",
+        f"{found}: a node that is held up for some tenths of a second can miss messages",
+        f"sudo sysctl -w net.core.rmem_max={RECEIVE_BYTES}",
+    )
 
 
 def check_profile(environment: Mapping[str, str]) -> Finding:
