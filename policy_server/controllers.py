@@ -85,11 +85,11 @@ def _load_excite(robot: Robot, task: Task, choice: Choice) -> Controller:
 
 
 def _check_excite(robot: Robot, task: Task) -> None:
-    if robot.flies:
-        raise ConfigError(
-            f"controller 'excite' is not for aircraft such as '{robot.name}': random commands crash it."
-        )
     tasks = excite_tasks(robot)
+    if not tasks:
+        raise ConfigError(
+            f"controller 'excite' is not for {robot.kind.name} such as '{robot.name}': random commands crash it."
+        )
     if task.kind not in tasks:
         raise ConfigError(
             f"controller 'excite' stays around one place, '{task.name}' has none. "

@@ -11,6 +11,9 @@ from typing import Any
 import gymnasium
 
 from fulmar_core.config.paths import config_names
+from fulmar_core.robots.kinds.aircraft import AIRCRAFT
+from fulmar_core.robots.kinds.free_flyer import FREE_FLYER
+from fulmar_core.robots.kinds.planar import PLANAR
 from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.states.planar import PlanarState
@@ -20,8 +23,10 @@ from fulmar_core.tasks import Task, load_task
 from fulmar_core.worlds.scenario import Scenario, load_scenario
 from training.gym_env import TaskEnv, TaskVectorEnv
 
-DEFAULT_ROBOTS: dict[type[State], str] = {PlanarState: "floating_platform", SpatialState: "spacecraft_16"}
-AIRCRAFT = "airship_v7"
+DEFAULT_ROBOTS: dict[type[State], str] = {
+    PlanarState: PLANAR.usual_robot,
+    SpatialState: FREE_FLYER.usual_robot,
+}
 
 
 def task_env(task: str, robot: str | None = None, scenario: str | None = None, **options: Any) -> TaskEnv:
@@ -48,11 +53,10 @@ def task_vector_env(
 
 def _parts(task: str, robot: str | None, scenario: str | None) -> tuple[Robot, Task, Scenario]:
     the_task = load_task(task)
-    usual = AIRCRAFT if the_task.flies else DEFAULT_ROBOTS[the_task.state_type]
+    usual = AIRCRAFT.usual_robot if the_task.flies else DEFAULT_ROBOTS[the_task.state_type]
     the_robot = load_robot(robot or usual)
     the_task.check(the_robot)
-    # The delays of `randomised` are longer than the control step of an aircraft.
-    return the_robot, the_task, load_scenario(scenario or ("nominal" if the_robot.flies else "randomised"))
+    return the_robot, the_task, load_scenario(scenario or the_robot.kind.usual_scenario)
 
 
 def environment_id(task: str) -> str:

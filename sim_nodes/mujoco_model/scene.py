@@ -10,8 +10,6 @@ import numpy as np
 
 from fulmar_core.config.errors import ConfigError
 from fulmar_core.dynamics.things import Thing
-from fulmar_core.robots.actuators.pushing import Pushing
-from fulmar_core.robots.actuators.reaction_wheels import ReactionWheels
 from fulmar_core.robots.robot import Robot
 from fulmar_core.simulation.episode import Episode
 from fulmar_core.states.spatial import SpatialState
@@ -30,7 +28,13 @@ from sim_nodes.mujoco_model.objects import (
 from sim_nodes.mujoco_model.satellite import Satellite
 from sim_nodes.mujoco_model.scenery import add_scenery, add_sensors
 
-# Families on wheels each have a chassis of their own; all that push share `Floater`.
+BY_KIND: dict[str, Callable[[Robot], RobotModel]] = {
+    "planar": Floater,
+    "free_flyer": FreeFlyer,
+    "satellite": Satellite,
+    "aircraft": Aircraft,
+}
+# Families on wheels each have a chassis of their own.
 WHEELED: dict[str, Callable[[Robot], RobotModel]] = {"differential_drive": DifferentialBase, "ackermann": Car}
 PALE, WATER = [0.85, 0.87, 0.9, 1.0], [0.55, 0.75, 0.85, 1.0]
 
@@ -184,12 +188,8 @@ def robot_model_of(robot: Robot) -> RobotModel:
     Raises:
         ConfigError: The family has none.
     """
-    if robot.flies:
-        return Aircraft(robot)
-    if isinstance(robot.actuators, ReactionWheels):
-        return Satellite(robot)
-    if isinstance(robot.actuators, Pushing):
-        return FreeFlyer(robot) if robot.state_type is SpatialState else Floater(robot)
+    if robot.kind.name in BY_KIND:
+        return BY_KIND[robot.kind.name](robot)
     kind = robot.actuators.kind
     if kind not in WHEELED:
         raise ConfigError(

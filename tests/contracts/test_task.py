@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from fulmar_core.config.paths import config_names
+from fulmar_core.dynamics.by_kind import dynamics_of
 from fulmar_core.dynamics.contact import outline_of
-from fulmar_core.dynamics.dynamics_of import dynamics_of
 from fulmar_core.robots.topics import GOAL_WIRES
 from fulmar_core.simulation.simulation import BatchSimulation
 from fulmar_core.states.attitude import normalised, plus, product, turn

@@ -242,14 +242,13 @@ def _split_estimators(asked: Mapping[str, Any]) -> dict[str, Any]:
 
 def usual_controller(controller: str, policy: Path | None, robot: Robot, task: Task) -> str:
     """The controller that was asked for, or another one in the place of a policy that a satellite or aircraft lacks."""
-    instead = "classical" if robot.actuators.turns_only else "lqi" if robot.flies else controller
-    wanted = controller == POLICY and policy is None
-    return instead if wanted and shipped_policy(robot.name, task.name) is None else controller
+    wanted = controller == POLICY and policy is None and robot.kind.usual_law
+    return robot.kind.usual_law if wanted and shipped_policy(robot.name, task.name) is None else controller
 
 
 def with_usual_estimators(guards: Guards, robot: Robot, scenario: Scenario, backend: str) -> Guards:
     """The guards of a simulated satellite, whose attitude is estimated, and whose rate too where its gyroscope dies."""
-    if not robot.actuators.turns_only or backend == "hardware":
+    if not robot.kind.always_estimated or backend == "hardware":
         return guards
     if guards.estimator is None:
         guards = replace(guards, estimator=default_estimator(robot))

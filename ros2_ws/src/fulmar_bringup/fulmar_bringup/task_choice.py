@@ -22,8 +22,6 @@ from policy_server.controllers import CONTROLLERS, shipped_policy
 POSE, POSITION = "go_to_pose", "go_to_position"
 DEFAULT_TASKS = {Positions: POSITION, Poses: POSE}  # all others are about velocities
 EXCITED = "point_inertial"  # while a satellite plays torques
-POINT, SLEW = "point", "slew"  # of a satellite, without and with a goal
-HOLD = "fly_hold"  # of an aircraft
 
 
 def goal_options(form: type[State]) -> dict[str, str]:
@@ -86,8 +84,9 @@ def task_of_run(
     if task is not None:
         return task, note if goal is None else check_heading(task, goal)
     if goals:
-        turns = load_robot(robot).actuators.turns_only and task_of_goals(goals) == POSE + SpatialState.SUFFIX
-        return SLEW if turns else task_of_goals(goals), note
+        kind, poses = load_robot(robot).kind, task_of_goals(goals) == POSE + SpatialState.SUFFIX
+        turns = poses and not kind.goes_anywhere
+        return kind.goal_task if turns else task_of_goals(goals), note
     return default_task(robot, controller, backend, goal=goal, policy=policy, hardware=hardware), ""
 
 
@@ -112,11 +111,10 @@ def default_task(
     """
     if backend == "hardware":
         default_hardware(robot, hardware)
-    if load_robot(robot).actuators.turns_only:
-        return POINT if goal is None else SLEW
-    if load_robot(robot).flies:
-        return HOLD
-    form = load_robot(robot).state_type
+    kind = load_robot(robot).kind
+    if kind.goal_task:
+        return kind.usual_task if goal is None else kind.goal_task
+    form = kind.state_type
     pose, position = (name + form.SUFFIX for name in (POSE, POSITION))
     asked = position if goal is not None and len(goal) == form.AXES else pose
     reason = why_not(robot, asked, controller, policy)

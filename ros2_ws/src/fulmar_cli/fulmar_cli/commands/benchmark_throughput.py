@@ -99,13 +99,12 @@ def throughput(
 
 def _pairs(names: Sequence[str], task: str | None, *, named: bool) -> list[tuple[Robot, Task]]:
     """Robots, each with its task; of a given task those that it fits, unless they were `named`."""
-    from fulmar_benchmarks.usual_task import usual_task
     from fulmar_core.robots.robot_file import load_robot
     from fulmar_core.tasks import load_task
 
     robots = [load_robot(name) for name in names]
     if task is None:
-        return [(robot, load_task(usual_task(robot))) for robot in robots]
+        return [(robot, load_task(robot.kind.usual_task)) for robot in robots]
     the_task = load_task(task)
     if not named:
         robots = [robot for robot in robots if robot.state_type is the_task.state_type]

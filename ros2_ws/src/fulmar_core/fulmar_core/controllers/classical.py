@@ -52,7 +52,6 @@ from fulmar_core.controllers.space_pd import SpacePd, SpacePdGains
 from fulmar_core.robots.actuators.families import FAMILIES
 from fulmar_core.robots.actuators.pushing import WRENCH, Pushing
 from fulmar_core.robots.robot import Robot
-from fulmar_core.states.spatial import SpatialState
 from fulmar_core.tasks import Task
 
 POSITIONS = ("go_to_position", "go_to_position_with_obstacles", "go_through_positions", "race_waypoints")
@@ -115,6 +114,7 @@ FLIGHT_LAWS = {
     "mppi": Entry(FlightMppi, MppiSettings, ("follow_reference",), mppi_settings, draws=True),
     "pid": Entry(FlightPid, FlightPidGains, ("follow_reference",), flight_pid_gains),
 }
+LAWS_BEYOND_PLANE = {"free_flyer": SPACE_LAWS, "satellite": ATTITUDE_LAWS, "aircraft": FLIGHT_LAWS}  # by kind
 FLYING_FAMILIES = tuple(kind for kind, each in FAMILIES.items() if each.flies)
 TURNING_FAMILIES = tuple(kind for kind, each in FAMILIES.items() if each.turns_only)
 SPACE_FAMILIES = tuple(kind for kind, each in FAMILIES.items() if issubclass(each, Pushing) and each.one_way)
@@ -125,14 +125,12 @@ BEYOND_PLANE = {**FLIGHT_LAWS, **SPACE_LAWS, **ATTITUDE_LAWS}  # names of laws f
 
 def is_in_space(robot: Robot) -> bool:
     """Whether a robot's laws are those of `laws_in_space`."""
-    return robot.state_type is SpatialState
+    return robot.kind.name in LAWS_BEYOND_PLANE
 
 
 def laws_in_space(robot: Robot) -> dict[str, Entry]:
     """Laws of a body in space: those that fly it, that push it, or that only turn it."""
-    if robot.flies:
-        return FLIGHT_LAWS
-    return ATTITUDE_LAWS if robot.actuators.turns_only else SPACE_LAWS
+    return LAWS_BEYOND_PLANE[robot.kind.name]
 
 
 def families_of(law: str | None) -> tuple[str, ...]:
@@ -215,7 +213,7 @@ def _check_space(robot: Robot, law: str | None) -> None:
     fitting = laws_in_space(robot) if space else in_plane
     if law in fitting or law not in (*in_plane, *BEYOND_PLANE):
         return
-    here, there = ("flies", "elsewhere") if robot.flies else ("floats in space", "in the plane")
+    here, there = ("floats in space", "in the plane") if robot.kind.stops else ("flies", "elsewhere")
     if not space:
         here, there = "moves in the plane", "in space"
     raise ConfigError(

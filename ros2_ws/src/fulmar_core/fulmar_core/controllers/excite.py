@@ -18,7 +18,7 @@ from fulmar_core.controllers.excite_wheels import TASKS as TURNING
 from fulmar_core.controllers.excite_wheels import ExciteWheels
 from fulmar_core.controllers.law import Law
 from fulmar_core.dynamics.actuators.actuation import ActuationState
-from fulmar_core.dynamics.dynamics_of import dynamics_of
+from fulmar_core.dynamics.by_kind import dynamics_of
 from fulmar_core.dynamics.linear_model import calm, nominal_worlds
 from fulmar_core.dynamics.motion import actuation_of, move
 from fulmar_core.robots.actuators.excitation import Excitation
@@ -31,16 +31,15 @@ from fulmar_core.states.state import State
 from fulmar_core.tasks import Task
 from fulmar_core.tasks.excitation import Torques
 
-TASKS = {  # kinds with one place to stay around
-    PlanarState: ("go_to_position", "go_to_pose"),
-    SpatialState: ("go_to_position_3d", "go_to_pose_3d"),
-}
+IN_PLANE, IN_SPACE = ("go_to_position", "go_to_pose"), ("go_to_position_3d", "go_to_pose_3d")
+# Tasks with one place to stay around, by the kind of robot; no other kind is excited.
+TASKS = {"planar": IN_PLANE, "rolling": IN_PLANE, "free_flyer": IN_SPACE, "satellite": TURNING}
 SEED = 5  # of the commands: any number
 
 
 def excite_tasks(robot: Robot) -> tuple[str, ...]:
     """Kinds of tasks that `excite` drives a robot at."""
-    return TURNING if robot.actuators.turns_only else TASKS[robot.state_type]
+    return TASKS.get(robot.kind.name, ())
 
 
 class Excite(Law):
@@ -192,7 +191,7 @@ def excite_of(
         control_hz: Command rate; the robot's own by default [Hz].
         torques: Profile of a satellite; our own by default.
     """
-    if robot.actuators.turns_only:
+    if TASKS[robot.kind.name] is TURNING:
         return ExciteWheels(robot, task, torques, control_hz=control_hz)
-    kind = ExciteInSpace if robot.state_type is SpatialState else Excite
+    kind = ExciteInSpace if TASKS[robot.kind.name] is IN_SPACE else Excite
     return kind(robot, task, control_hz=control_hz)

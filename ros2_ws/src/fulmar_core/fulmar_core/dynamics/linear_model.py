@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from fulmar_core.config.errors import ConfigError
-from fulmar_core.dynamics.dynamics_of import dynamics_of
+from fulmar_core.dynamics.by_kind import dynamics_of
 from fulmar_core.dynamics.free_body import free_body_step
 from fulmar_core.dynamics.motion import actuation_of
 from fulmar_core.dynamics.rigid_body import inertia_of, rigid_body_step

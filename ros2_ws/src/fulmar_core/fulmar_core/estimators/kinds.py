@@ -44,8 +44,6 @@ Motion = TypeVar("Motion", bound=MotionSettings)
 
 FAR_ABOVE = 2.0  # times the noise of the settings: their poses would be outliers
 DEFAULT_KIND = "planar_motion"  # of a file that names none
-# Files of configs/estimators that make odometry of motion capture and inertial readings.
-DEFAULT_FILES: Mapping[type[State], str] = {PlanarState: "mocap_imu", SpatialState: "mocap_imu_3d"}
 
 
 @dataclass(frozen=True)
@@ -176,10 +174,8 @@ KINDS: dict[str, EstimatorKind] = {
 
 
 def default_estimator(robot: Robot) -> str:
-    """Name of the file of a robot that names no estimator, by what moves it and its state type."""
-    if robot.actuators.turns_only:
-        return "attitude"
-    return DEFAULT_FILES[robot.state_type]
+    """Name of the file of a robot that names no estimator."""
+    return robot.kind.usual_estimator
 
 
 def estimator_path(name: str) -> Path:

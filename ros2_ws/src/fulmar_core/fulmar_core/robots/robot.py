@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, TypeVar
 
@@ -14,12 +15,13 @@ from fulmar_core.robots.actuators.pushing import Pushing
 from fulmar_core.robots.actuators.rolling import CLEARANCE, Rolling
 from fulmar_core.robots.airframe.airframe import Airframe
 from fulmar_core.robots.hydrodynamics import Hydrodynamics
+from fulmar_core.robots.kinds import kind_of
+from fulmar_core.robots.kinds.kind import Kind
 from fulmar_core.robots.sensors.event_camera import EventCamera
 from fulmar_core.robots.sensors.imu import ImuSpec
 from fulmar_core.robots.sensors.odometer import OdometrySpec
 from fulmar_core.robots.sensors.table import SENSORS
 from fulmar_core.states.planar import PlanarState
-from fulmar_core.states.spatial import SpatialState
 from fulmar_core.states.state import State
 
 Range = tuple[float, float]
@@ -223,10 +225,15 @@ class Robot:
     event_cameras: tuple[EventCamera, ...] = ()  # that look at the stars, at most two
     air_bearing: bool = False  # it floats on air that `air_bearing/enable` switches
 
+    @functools.cached_property
+    def kind(self) -> Kind:
+        """What it has in common with others."""
+        return kind_of(self.actuators, planar=self.body.planar, swims=self.hydrodynamics is not None)
+
     @property
     def state_type(self) -> type[State]:
         """Form of its states: in the plane, or, of bodies that neither the floor nor water carries, in space."""
-        return SpatialState if (self.drifts or self.flies) and not self.body.planar else PlanarState
+        return self.kind.state_type
 
     @property
     def flies(self) -> bool:
@@ -254,9 +261,7 @@ class Robot:
     @property
     def recipe(self) -> str:
         """Training settings where a robot and task have none of their own: a file of `configs/training`."""
-        if self.flies:
-            return "aircraft"
-        return self.actuators.recipe if self.state_type is PlanarState else "free_flyer"
+        return self.kind.recipe or self.actuators.recipe
 
     def __post_init__(self) -> None:
         moving = [getattr(self.performance, name) for name in Performance.MOVING]

@@ -11,7 +11,7 @@ from typing import Generic
 import numpy as np
 
 from fulmar_core.config.errors import ConfigError
-from fulmar_core.dynamics.dynamics_of import dynamics_of
+from fulmar_core.dynamics.by_kind import dynamics_of
 from fulmar_core.robots.robot import Robot
 from fulmar_core.states.counter_rng import START, WORLD, Draws
 from fulmar_core.states.state import S

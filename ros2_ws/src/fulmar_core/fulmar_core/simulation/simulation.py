@@ -11,7 +11,7 @@ from array_api_compat import is_numpy_namespace
 
 from fulmar_core.dynamics.actuators.wheel_actuation import WheelActuation
 from fulmar_core.dynamics.batch_dynamics import Dynamics
-from fulmar_core.dynamics.dynamics_of import dynamics_of
+from fulmar_core.dynamics.by_kind import dynamics_of
 from fulmar_core.dynamics.motion import actuation_of, may_be_off_centre, may_open_late
 from fulmar_core.dynamics.things import Poses
 from fulmar_core.robots.robot import Robot

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 import time
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -20,6 +20,7 @@ from fulmar_bringup.planning import RunRequest, plan_run
 from fulmar_core.config.process import CONTROL_PRIORITY, take_priority_with_helpers
 from fulmar_core.dynamics.flight_trim import find_trim
 from fulmar_core.estimators.kinds import default_estimator
+from fulmar_core.robots.kinds.aircraft import AIRCRAFT
 from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.robots.topics import (
@@ -33,9 +34,7 @@ from fulmar_core.robots.topics import (
     VELOCITY_COMMAND,
     Wire,
 )
-from fulmar_core.states.planar import PlanarState
 from fulmar_core.states.spatial import SpatialState
-from fulmar_core.states.state import State
 from fulmar_core.tasks import Task, load_task
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 from policy_server.controllers import shipped_policy
@@ -101,16 +100,8 @@ class FaultInjector:
             self._publisher.publish(changed)
 
 
-FAR_M = 6.0  # the robot is under way for seconds
-# So far away, as people write it; in space along every axis, and with another attitude [m, deg].
-GOALS: Mapping[type[State], tuple[float, ...]] = {
-    PlanarState: (FAR_M, 0.0, 0.0),
-    SpatialState: (4.0, 4.0, 2.0, 20.0, -30.0, 90.0),
-}
 STAYS = "it stays where it is"  # why what only turns has no limits of place
-TURNED = (0.0, 0.0, 0.0, 20.0, -30.0, 90.0)  # the same of what only turns
-HOLD = "fly_hold"  # what an aircraft does
-HELD = (0.0, 0.0, 1.0, 0.0, 0.0, 0.0)  # where it begins: it goes on along x for ever
+HELD = AIRCRAFT.far_goal  # where an aircraft begins
 AISLE_M = 100.0  # of its area, to either side
 CORNER_M = 1.0  # from there to the second place that a node of goals sends it to, along y
 ROOM_M = 2.0  # of an area beyond start and goal
@@ -153,8 +144,8 @@ class FaultEnvironment:
 
     def why_not(self, robot: Robot) -> str:
         """Why a robot cannot be in such a system; empty if it can."""
-        turns, flies = robot.actuators.turns_only, robot.flies
-        if not (turns or flies):
+        turns, flies = not robot.kind.goes_anywhere, not robot.kind.stops
+        if not robot.kind.goal_task:
             return ""
         reasons = {
             "no policy is shipped for it": not _has_policy(robot)
@@ -174,10 +165,8 @@ COMMANDS = FaultEnvironment(answers_pass=True)
 
 def task_of(robot: Robot) -> Task:
     """What a robot does when a fault comes: the first of `TASKS` in its world that a policy is shipped for."""
-    if robot.actuators.turns_only:
-        return load_task("slew")
-    if robot.flies:
-        return load_task(HOLD)
+    if robot.kind.goal_task:
+        return load_task(robot.kind.goal_task)
     fitting = [task for task in map(load_task, TASKS) if task.state_type is robot.state_type]
     return next((task for task in fitting if shipped_policy(robot.name, task.name)), fitting[0])
 
@@ -188,15 +177,13 @@ def _has_policy(robot: Robot) -> bool:
 
 def goal_of(robot: Robot) -> tuple[float, ...]:
     """Where it goes, as people write it [m, deg]."""
-    if robot.flies:
-        return HELD
-    return TURNED if robot.actuators.turns_only else GOALS[robot.state_type]
+    return robot.kind.far_goal
 
 
 def area_of(robot: Robot) -> tuple[float, ...]:
     """The surroundings of start and goal: two sides for each axis [m]."""
     goal = goal_of(robot)[: robot.state_type.AXES]
-    if robot.flies:
+    if not robot.kind.stops:
         return (-ROOM_M, robot.limits.geofence, -AISLE_M, AISLE_M, -ROOM_M, goal[2] + ROOM_M)
     return tuple(side for far in goal for side in (-ROOM_M, far + ROOM_M))
 
@@ -221,7 +208,7 @@ def request_of(name: str, record: Path, about: FaultEnvironment = USUAL) -> RunR
         controller=controller,
         backend="hardware" if about.emulated else "mujoco",
         policy=None,
-        goal=None if about.by_goal_node or about.nadir or robot.flies else goal_of(robot),
+        goal=None if about.by_goal_node or about.nadir or not robot.kind.stops else goal_of(robot),
         start=_start_of(robot, about),
         duration_s=None,
         lockstep=False,
@@ -251,17 +238,15 @@ def _start_of(robot: Robot, about: FaultEnvironment) -> tuple[float, ...] | None
 
 
 def _controller_of(robot: Robot) -> str:
-    """The policy; of what turns only, and of an aircraft without one, its classical controller."""
-    if robot.actuators.turns_only or (robot.flies and not _has_policy(robot)):
-        return "classical"
-    return "policy"
+    """The policy; of kinds that have a law for it, where no policy is shipped, the classical controller."""
+    return "policy" if _has_policy(robot) or not robot.kind.usual_law else "classical"
 
 
 def _goals_file(folder: Path, robot: Robot, task: Task) -> str:
     kind = {GOAL_POSE.name: "poses", GOAL_POINT.name: "positions"}[task.goal_topic]
     far = list(goal_of(robot))
     corner = (
-        [-number for number in far] if robot.actuators.turns_only else [far[0], far[1] + CORNER_M, *far[2:]]
+        [-number for number in far] if not robot.kind.goes_anywhere else [far[0], far[1] + CORNER_M, *far[2:]]
     )
     places = [place if kind == "poses" else place[: robot.state_type.AXES] for place in (far, corner)]
     path = folder / "goals.yaml"

@@ -1,0 +1,21 @@
+"""Aircraft: wings carry them, and they cannot stop."""
+
+from __future__ import annotations
+
+from fulmar_core.robots.kinds.kind import Kind
+from fulmar_core.states.spatial import SpatialState
+
+AIRCRAFT = Kind(
+    name="aircraft",
+    state_type=SpatialState,
+    usual_robot="airship_v7",
+    usual_task="fly_hold",
+    usual_estimator="mocap_imu_3d",
+    far_goal=(0.0, 0.0, 1.0, 0.0, 0.0, 0.0),  # where it begins: it goes on along x for ever
+    goal_task="fly_hold",
+    usual_law="lqi",
+    recipe="aircraft",
+    # The delays of `randomised` are longer than the control step of an aircraft.
+    usual_scenario="nominal",
+    stops=False,
+)

@@ -1,0 +1,31 @@
+"""What all robots of a kind have in common."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from fulmar_core.states.state import State
+
+FAR_M = 6.0  # robots in the plane are under way for seconds [m]
+
+
+@dataclass(frozen=True)
+class Kind:
+    """One kind of vehicle. Poses are as people write them, see `State.NUMBERS` [m, deg]."""
+
+    name: str
+    state_type: type[State]
+    usual_robot: str  # that a task of this kind is tried with
+    usual_task: str  # what it does where nothing else is asked for
+    usual_estimator: str  # file of configs/estimators that says where it is
+    far_goal: tuple[float, ...]  # that it does not reach while a fault is done to it
+    # The one task of a goal; empty where a place is a position and with angles a pose.
+    goal_task: str = ""
+    # What drives it where no policy is shipped; empty where one has to be.
+    usual_law: str = ""
+    # Training settings of all its robots, a file of `configs/training`; empty: those of the family of actuators.
+    recipe: str = ""
+    usual_scenario: str = "randomised"  # that it is trained in
+    always_estimated: bool = False  # no simulator or driver says where it is: an estimator has to
+    goes_anywhere: bool = True  # it has places to go to, and may leave an area
+    stops: bool = True  # it can stay where it is; else its safe state is a flight

@@ -1,0 +1,15 @@
+"""Robots that actuators push in the plane: on air bearings, and boats."""
+
+from __future__ import annotations
+
+from fulmar_core.robots.kinds.kind import FAR_M, Kind
+from fulmar_core.states.planar import PlanarState
+
+PLANAR = Kind(
+    name="planar",
+    state_type=PlanarState,
+    usual_robot="floating_platform",
+    usual_task="go_to_pose",
+    usual_estimator="mocap_imu",
+    far_goal=(FAR_M, 0.0, 0.0),
+)

@@ -1,0 +1,15 @@
+"""Robots on driven wheels."""
+
+from __future__ import annotations
+
+from fulmar_core.robots.kinds.kind import FAR_M, Kind
+from fulmar_core.states.planar import PlanarState
+
+ROLLING = Kind(
+    name="rolling",
+    state_type=PlanarState,
+    usual_robot="turtlebot2",
+    usual_task="go_to_pose",
+    usual_estimator="mocap_imu",
+    far_goal=(FAR_M, 0.0, 0.0),
+)
