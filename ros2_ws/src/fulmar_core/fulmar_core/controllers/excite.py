@@ -57,11 +57,11 @@ class Excite(Law):
 
         Args:
             robot: The robot.
-            task: One of the kinds `TASKS` of its space; its goal is the middle of the room.
+            task: One of `excite_tasks`; its goal is the middle of the room.
             gains: How restless; the usual of the robot's family by default.
             control_hz: Command rate; the robot's own by default [Hz].
         """
-        tasks = TASKS[self.FORM]
+        tasks = excite_tasks(robot)
         if task.kind not in tasks:
             raise ValueError(f"'excite' stays around one place; tasks for that are {', '.join(tasks)}.")
         how = gains or (robot.actuators.excitation and (self.HOW or robot.actuators.excitation))
