@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import gc
 import os
 import shutil
@@ -85,6 +86,17 @@ def pytest_collection_finish() -> None:
     """Exclude imported modules from the garbage collection between tests of ROS nodes."""
     gc.collect()
     gc.freeze()
+
+
+@pytest.fixture(autouse=True)
+def ordinary_threads() -> Iterator[None]:
+    """Take the priority away that the loop of a node took in this process: it would hold up every test to come."""
+    yield
+    if sys.platform != "linux" or os.sched_getscheduler(0) == os.SCHED_OTHER:
+        return
+    for thread in map(int, os.listdir("/proc/self/task")):
+        with contextlib.suppress(OSError):  # it may have ended
+            os.sched_setscheduler(thread, os.SCHED_OTHER, os.sched_param(0))
 
 
 @pytest.fixture(autouse=True, scope="session")
