@@ -45,7 +45,7 @@ def attachments(plan: RunPlan) -> str:
         "scenario.yaml": scenario_path(plan.scenario),
         **_of_goals(plan.goals or plan.excitation),
         **({"hardware.yaml": Path(plan.hardware)} if plan.hardware else {}),
-        **({"estimator.yaml": estimator_path(estimator)} if estimator else {}),
+        **_of_estimator(estimator),
         **({CALIBRATION: calibration} if calibration else {}),
         **_of_controller(plan),
     }
@@ -63,6 +63,14 @@ def effective_system(plan: RunPlan) -> System:
         guards=plan.guards,
         recorder=plan.recording,
     )
+
+
+def _of_estimator(name: str | None) -> dict[str, Path]:
+    """The file of the estimator that says where the robot is: settings, or the source of a class."""
+    if not name:
+        return {}
+    path = estimator_path(name)
+    return {f"estimator{path.suffix}": path}
 
 
 def _of_goals(goals: str) -> dict[str, Path]:

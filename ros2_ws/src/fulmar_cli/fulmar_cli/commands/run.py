@@ -22,7 +22,7 @@ DURATION_HELP = "Simulated seconds; the task's episode by default."
 GOAL_HELP = "Where to go [m, deg], in space x,y,z or x,y,z,roll,pitch,yaw; by default the seed draws it."
 START_HELP = "Where to begin [m, deg], in space x,y,z or x,y,z,roll,pitch,yaw; by default the seed draws it."
 GOALS_HELP = "Goals in turn, a path, or torques for excite: one of `fulmar list goals`, or a .yaml file."
-ESTIMATOR_HELP = "Estimate odometry, inertia, rates: names from configs/estimators, with commas."
+ESTIMATOR_HELP = "Estimate odometry, inertia, rates: names of configs/estimators or classes, with commas."
 END_HELP = "An e-stop ends and fails the run; by default the robot waits for a reset and a new goal."
 AREA_HELP = "x_min, x_max, y_min, y_max, in space also z_min, z_max, not to be left [m]: --area=-2,2,-1,1."
 RECORDING_HELP = (

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from fulmar_core.config.errors import ConfigError, did_you_mean
+from fulmar_core.config.own_class import is_own, source_of
 from fulmar_core.config.paths import config_path
 from fulmar_core.config.strict_yaml import line_of, load_config
 from fulmar_core.estimators.motion.estimator import Estimator
@@ -173,13 +174,41 @@ KINDS: dict[str, EstimatorKind] = {
 }
 
 
+# What a user's own estimator may take, by name.
+READINGS: Mapping[str, Wire] = {
+    "mocap": MOCAP,
+    "rate": RATE,
+    "events": EVENTS,
+    "events_2": EVENTS_2,
+    **{name: wire for name, wire in SENSOR_WIRES.items() if wire != ODOMETRY},
+}
+
+
+def _own_kind(path: str) -> EstimatorKind:
+    """The row of a user's own estimator, which says where a robot is."""
+    from fulmar_core.estimators.own_estimator import OwnEstimator, own_takes
+
+    takes, more = (own_takes(path, attribute, READINGS) for attribute in ("takes", "takes_if_there"))
+    return EstimatorKind(
+        EstimatorSettings,
+        lambda _settings, robot: OwnEstimator(path, robot),
+        takes={name: READINGS[name] for name in takes},
+        publishes=(ODOMETRY,),
+        takes_if_there={name: READINGS[name] for name in more},
+    )
+
+
 def default_estimator(robot: Robot) -> str:
     """Name of the file of a robot that names no estimator."""
     return robot.kind.usual_estimator
 
 
 def estimator_path(name: str) -> Path:
-    """Path of `configs/estimators/<name>.yaml`, or the file itself where the name ends in `.yaml`."""
+    """Path of `configs/estimators/<name>.yaml`; of a name that ends in `.yaml` itself; of a class its source."""
+    if is_own(name):
+        from fulmar_core.estimators.own_estimator import own_class
+
+        return source_of(own_class(name))
     return Path(name) if name.endswith(".yaml") else config_path("estimators", name)
 
 
@@ -187,8 +216,10 @@ def estimator_kind(name: str) -> EstimatorKind:
     """The row of an estimator's file; `name` as of `load_estimator`.
 
     Raises:
-        ConfigError: No such file or kind, or the file is not YAML.
+        ConfigError: No such file, kind or class, or the file is not YAML.
     """
+    if is_own(name):
+        return _own_kind(name)
     path = estimator_path(name)
     kind = load_config(dict[str, Any], path).get("kind", DEFAULT_KIND)
     if kind not in KINDS:
@@ -202,9 +233,15 @@ def estimator_kind(name: str) -> EstimatorKind:
 def load_estimator(name: str) -> EstimatorSettings:
     """Read `configs/estimators/<name>.yaml`, or the file itself where the name ends in `.yaml`.
 
+    A dotted path names a user's own class, whose attributes they are then.
+
     Raises:
         ConfigError: Unknown name or kind, or a mistake in the file.
     """
+    if is_own(name):
+        from fulmar_core.estimators.own_estimator import own_settings
+
+        return own_settings(name)
     return load_config(estimator_kind(name).settings, estimator_path(name))
 
 
@@ -216,6 +253,8 @@ def check_estimator(name: str, robot: Robot) -> None:
     """
     load_estimator(name)
     kind = estimator_kind(name)
+    if is_own(name):
+        return
     form = kind.form
     if kind.turns_only is not robot.actuators.turns_only:
         what = "the attitude of a satellite" if kind.turns_only else "the place of a robot that moves"
