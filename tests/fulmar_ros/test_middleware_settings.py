@@ -6,6 +6,7 @@ import xml.etree.ElementTree as ElementTree
 
 import pytest
 
+from fulmar_cli.diagnosis.network import RECEIVE_BYTES
 from fulmar_ros import middleware
 from fulmar_ros.middleware import (
     DISCOVERY_RANGE,
@@ -121,4 +122,4 @@ def test_nodes_share_no_memory_in_which_one_that_dies_could_block_the_others(pat
         element.tag.rpartition("}")[2]: element.text for element in ElementTree.parse(path).getroot().iter()
     }
     assert (found["useBuiltinTransports"], found["type"]) == ("false", "UDPv4")
-    assert found["receiveBufferSize"] == "4194304"
+    assert found["receiveBufferSize"] == str(RECEIVE_BYTES)

@@ -191,7 +191,8 @@ def excite_of(
         control_hz: Command rate; the robot's own by default [Hz].
         torques: Profile of a satellite; our own by default.
     """
-    if TASKS[robot.kind.name] is TURNING:
+    tasks = excite_tasks(robot)
+    if tasks == TURNING:
         return ExciteWheels(robot, task, torques, control_hz=control_hz)
-    kind = ExciteInSpace if TASKS[robot.kind.name] is IN_SPACE else Excite
+    kind = Excite if tasks == IN_PLANE else ExciteInSpace
     return kind(robot, task, control_hz=control_hz)

@@ -4,7 +4,7 @@
                     `memory` and gives `next_memory`
     golden.npz      observations, and what the network gave for them when it was exported
     passport.json   robot, task, rate, names, hashes of the two files, and how it was made
-    signature.json  of the passport, if somebody has signed it: `fulmar_core.loop.bundle_signature`
+    signature.json  of the passport, where it is signed: `fulmar_core.loop.bundle_signature`
 
 Knows files and hashes, not how to run a network.
 """

@@ -58,7 +58,7 @@ class Positions:
         return _form_of(self.positions, "positions", 2, 3)
 
     def targets(self) -> np.ndarray:
-        """As of `fulmar_core.tasks.goal.Goal`, with an attitude of 0 that does not matter, shape (n, 3 or 7)."""
+        """Targets as in `fulmar_core.tasks.goal.Goal`, shape (n, 3 or 7); their attitude is 0 and does not matter."""
         return np.array([self.form.target_at(place) for place in self.positions])
 
 
@@ -80,7 +80,7 @@ class Poses:
         return _form_of(self.poses, "poses", 3, 6)
 
     def targets(self) -> np.ndarray:
-        """As of `fulmar_core.tasks.goal.Goal`, shape (n, 3 or 7)."""
+        """Targets as in `fulmar_core.tasks.goal.Goal`, shape (n, 3 or 7)."""
         if self.form is PlanarState:
             return np.asarray(np.array(self.poses) * _RADIANS)
         return np.array([self.form.target_at(pose) for pose in self.poses])

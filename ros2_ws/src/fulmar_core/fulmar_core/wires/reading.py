@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 # Between the stamps of two readings:
-BACK_NS = 1_000_000_000  # further back than this is no reordering: whoever measures has begun again
+BACK_NS = 1_000_000_000  # further back than this is no reordering: the sensor has begun anew
 FORWARD_NS = 10_000_000_000  # further ahead than this is no gap: it is another clock, or one wrong stamp
 
 
