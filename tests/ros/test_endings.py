@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import signal
+import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -145,6 +147,33 @@ def test_an_evaluation_that_is_reported_to_stop_leaves_nobody_behind(
         assert run.returncode == 1
         assert "fulmar: stopped by" in err
         assert "Traceback" not in err
+
+
+def test_a_worker_whose_stop_got_lost_in_another_error_ends_all_the_same() -> None:
+    """As where it is asked to stop while a module is being loaded: it would wait for another share for ever."""
+    done = subprocess.run(
+        [sys.executable, "-c", LOSES_ITS_STOP], capture_output=True, text=True, timeout=30.0, check=False
+    )
+    assert (done.returncode, done.stdout) == (1, ""), done.stderr
+
+
+LOSES_ITS_STOP = """
+import os, signal
+from fulmar_evaluation import ros_evaluation as evaluation
+
+def lose(*_):
+    try:
+        os.kill(os.getpid(), signal.SIGINT)
+    except SystemExit:
+        raise RuntimeError("could not be loaded")
+
+evaluation._roll_out_share = lose
+evaluation._begin_worker([], os.getppid())
+try:
+    evaluation._work(None, range(1), 0, 0)
+except RuntimeError:
+    print("waits for another share")
+"""
 
 
 @pytest.mark.slow

@@ -145,6 +145,7 @@ def _signals_held_back() -> Iterator[None]:
 
 
 _counts: list[Any] = []
+_asked_to_stop: list[int] = []  # signals that this worker has had
 
 
 def _begin_worker(counts: list[Any], parent: int) -> None:
@@ -159,7 +160,8 @@ def _begin_worker(counts: list[Any], parent: int) -> None:
         os._exit(1)
 
 
-def _on_stop(_number: int, _frame: FrameType | None) -> None:
+def _on_stop(asked: int, _frame: FrameType | None) -> None:
+    _asked_to_stop.append(asked)
     for number in STOPS:
         signal.signal(number, signal.SIG_IGN)  # stopping in order must not be disturbed
     raise SystemExit(1)
@@ -169,8 +171,11 @@ def _work(plan: RunPlan, numbers: range, domain: int, index: int) -> Trajectorie
     """Do a share; a worker that is asked to stop meanwhile stops its children and takes no further share."""
     try:
         return _roll_out_share(plan, numbers, domain, index)
-    except SystemExit:
-        os._exit(1)  # the pool would take it for the outcome of the share and wait for another one
+    finally:
+        # Else the pool would take what the stop raised for the outcome of the share and wait for another one. It need
+        # not be SystemExit: a module that is being loaded, or a node that is being configured, raises its own error.
+        if _asked_to_stop:
+            os._exit(1)
 
 
 def _in_order(runs: list[Trajectories], shares: list[range]) -> Trajectories:

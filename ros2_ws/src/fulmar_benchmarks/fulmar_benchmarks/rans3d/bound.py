@@ -7,13 +7,11 @@ spheres. So whatever is too much in the plane is too much in space, for any plan
 from __future__ import annotations
 
 from collections.abc import Mapping
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
 
 import numpy as np
 
 from fulmar_benchmarks.rans3d.unit import SpaceTrial
-from fulmar_benchmarks.workers import one_thread_each
+from fulmar_benchmarks.workers import mapped
 from fulmar_core.robots.robot import Robot
 from fulmar_core.simulation.episode import Episode
 from fulmar_core.tasks import Task
@@ -29,8 +27,8 @@ def bounds_of(trials: Mapping[Pair, SpaceTrial], *, jobs: int) -> dict[Pair, np.
     """Bound the first `BOUNDED` episodes of some trials, by what they are called."""
     if not trials:
         return {}
-    with one_thread_each(), ProcessPoolExecutor(jobs, get_context("spawn")) as pool:
-        return dict(zip(trials, pool.map(_bound, trials.values()), strict=True))
+    work = [(trial,) for trial in trials.values()]
+    return dict(zip(trials, mapped(_bound, work, jobs=jobs, progress=lambda *_: None), strict=True))
 
 
 def _bound(trial: SpaceTrial) -> np.ndarray:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
+import signal
 import tempfile
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
@@ -12,6 +14,7 @@ from pathlib import Path
 from fulmar_bringup.domains import environment, reserved_domains
 from fulmar_bringup.system import Guards, default_hardware, modules_of
 from fulmar_core.config.errors import ConfigError, FulmarError, UnknownNameError
+from fulmar_core.config.process import end_with
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_evaluation.faults.actuator_faults import ACTUATOR_FAULTS
 from fulmar_evaluation.faults.command_faults import CABLE_FAULTS, COMMAND_FAULTS
@@ -200,7 +203,8 @@ def _done(robot: str, fault: Fault, launcher: str, folder: Path) -> FaultResult:
     if not fault.about.two_hosts:
         return _do(robot, fault, launcher, folder, None)
     # In a process of its own: the middleware asks once in a process which networks there are.
-    with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
+    spawn = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(1, spawn, end_with, (os.getpid(), signal.SIGTERM)) as pool:
         return pool.submit(_do_on_two_hosts, robot, fault, launcher, folder).result()
 
 
