@@ -11,7 +11,7 @@ from fulmar_core.config.errors import ConfigError, DeviceError, FulmarError, did
 from fulmar_core.config.own_class import construct, load_class, one_line
 from fulmar_core.robots.actuators.differential_drive import DifferentialDrive
 from fulmar_core.robots.robot import Robot
-from fulmar_core.robots.sensors.table import SENSORS
+from fulmar_core.robots.sensors.table import SENSORS, sensor_kind
 from fulmar_core.wires.reading import Reading
 from hardware_drivers.driver import MEMBERS, Answering, DeviceDriver
 from hardware_drivers.driver_backend import DriverBackend, backend_of
@@ -153,13 +153,13 @@ class _FloatingDriver(_WiredDriver):
 
 def _problem_of(name: str, reading: Any, specs: Mapping[str, Any]) -> str:
     """Why a reading cannot be published, to go on after the sensor's name; empty where it can."""
-    if name not in SENSORS:
-        return f"is no sensor.{did_you_mean(str(name), SENSORS)}"
+    if name not in SENSORS and name not in specs:
+        return f"is no sensor.{did_you_mean(str(name), {**SENSORS, **specs})}"
     if name not in specs:
         return f"is no sensor of this robot: add '{name}:' below 'sensors:' in the robot's YAML"
     if not isinstance(reading, Reading):
         return f"is {type(reading).__name__}, which must be a Reading"
-    message = SENSORS[name].message
+    message = sensor_kind(name, specs[name]).message
     assert message is not None  # only the odometry has none, which is a field of the report
     try:
         values = message.write(reading, specs[name])

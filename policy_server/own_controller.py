@@ -13,10 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_core.config.errors import ConfigError
+from fulmar_core.config.errors import ConfigError, did_you_mean
 from fulmar_core.config.own_class import construct, load_class, settings_beside, source_of
 from fulmar_core.controllers.controller import Inputs
 from fulmar_core.estimators.actuator_health.filters import HealthSettings
+from fulmar_core.estimators.readings import readings_of
 from fulmar_core.robots.robot import Robot
 from fulmar_core.tasks import Task
 
@@ -28,6 +29,7 @@ class OwnController:
 
     Attributes:
         estimator: The user's own `estimator`, where the class has one; see `Controller`.
+        readings: The user's own `readings`, where the class has them; see `Controller`.
     """
 
     def __init__(self, path: str, robot: Robot, task: Task, control_hz: float) -> None:
@@ -57,6 +59,7 @@ class OwnController:
                 "it must be a HealthSettings or None."
             )
         self.estimator: HealthSettings | None = estimator
+        self.readings = _readings(path, getattr(self._own, "readings", ()), robot)
 
     def reset(self) -> None:
         """Reset the user's controller; see `Controller.reset`."""
@@ -78,3 +81,14 @@ class OwnController:
         }
         text = json.dumps(said, sort_keys=True, default=str).encode() + self._source.read_bytes()
         return said | {"sha256": hashlib.sha256(text).hexdigest()}
+
+
+def _readings(path: str, given: Any, robot: Robot) -> tuple[str, ...]:
+    names, known = (given,) if isinstance(given, str) else tuple(given), readings_of(robot)
+    for name in names:
+        if name not in known:
+            raise ConfigError(
+                f"controller '{path}': 'readings' has '{name}'. Known: {', '.join(known)}."
+                f"{did_you_mean(str(name), known)}"
+            )
+    return names

@@ -52,6 +52,7 @@ class OneWorld:
             latest_s=self.latest_s,
             step_s=self._robot.timing.physics_dt,  # in real time a command may come at every tick
             changes=bool(self.world.stuck_part[0] >= 0.0 or self.world.supply_left[0] < 1.0),
+            world=self.world,
         )
         self.outside: Any = None  # before the first command
         self._constant_push = self.dynamics.push_is_constant(self.world)

@@ -10,7 +10,7 @@ import numpy as np
 from fulmar_core.controllers.classical import load_classical
 from fulmar_core.controllers.excite import excite_of
 from fulmar_core.estimators.kinds import make_estimator
-from fulmar_core.estimators.motion.reading_check import reading_problem
+from fulmar_core.estimators.readings import reading_problem
 from fulmar_core.loop.control_loop import ControlLoop
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.robots.sensors.kind import Truth

@@ -21,7 +21,7 @@ class Wires:
     def __init__(self, stamp_ns: int | None) -> None:
         self.lock, self.answered_ns, self._stamp_ns = threading.Condition(), None, stamp_ns
 
-    def publish_sample(self, sample: object, time_ns: int, *, resend: bool = False) -> None:
+    def publish_sample(self, sample: object, time_ns: int) -> None:
         self.answered_ns = self._stamp_ns
 
     def wait_for_answer(self, time_ns: int, timeout_s: float) -> bool:

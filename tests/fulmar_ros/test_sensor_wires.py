@@ -75,7 +75,7 @@ def sample(**star):
 
 def test_a_robot_publishes_the_sensors_of_its_file_and_no_others(node):
     wires_of(node, robot=PLATFORM).publish(sample(), 5)
-    assert list(node.topics) == ["odom", "imu/data"]
+    assert list(node.topics) == ["odom", "imu/data", "supply/pressure"]
     assert len(node.topics["odom"].sent) == 1
 
 
@@ -83,7 +83,7 @@ def test_odometry_of_another_node_is_not_published(node):
     wires = wires_of(node, odometry=False)
     wires.publish(sample(), 5)
     assert wires.odometry is None
-    assert list(node.topics) == ["imu/data", "attitude"]
+    assert list(node.topics) == ["imu/data", "attitude", "supply/pressure"]
     assert node.topics["attitude"].sent == [5]
 
 

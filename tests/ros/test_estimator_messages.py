@@ -15,14 +15,16 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from sensor_msgs.msg import JointState, PointCloud2
 
+from fulmar_bags.reading_messages import reader_of
 from fulmar_core.dynamics.sky.events import Events
 from fulmar_core.estimators.kinds import KINDS
+from fulmar_core.estimators.readings import READINGS
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.robots.topics import SENSOR_WIRES
 from fulmar_ros.convert import stamp_of
 from fulmar_ros.estimator_node import BROKEN, EstimatorNode
-from fulmar_ros.estimator_wires import READERS
 from fulmar_ros.event_packets import cloud_of_events
+from fulmar_ros.message_class import needed_class
 from tests.ros.any_message import any_message, numbers
 from tests.ros.neighbour import Neighbour
 
@@ -94,8 +96,8 @@ def test_no_message_on_any_wire_breaks_an_estimator(
     wires = KINDS[kind].readings
     node._estimator.reset()
     for name in data.draw(st.lists(st.sampled_from(list(wires)), min_size=1, max_size=12)):
-        message_class, read = READERS[wires[name]]
-        message = data.draw(messages_of(wires[name], message_class))
+        read = reader_of(READINGS[name])
+        message = data.draw(messages_of(wires[name], needed_class(wires[name])))
         refused = node._refused
         with np.errstate(all="ignore"):
             node._on_message(name, wires[name].name, read, message)
@@ -112,7 +114,7 @@ def test_a_node_whose_estimator_raises_says_so_and_begins_anew(
     def breaks(*_given: object) -> None:
         raise ZeroDivisionError("of a test")
 
-    message = READERS[wire][0]()
+    message = needed_class(wire)()
     monkeypatch.setattr(node._estimator, "take", breaks)
     monkeypatch.setattr("fulmar_ros.estimator_node.reading_problem", lambda *_given: "")
     node._on_message(name, wire.name, lambda *_given: object(), message)

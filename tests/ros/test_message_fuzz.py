@@ -25,12 +25,13 @@ from std_msgs.msg import Bool, Float32MultiArray, Int16MultiArray, String
 from visualization_msgs.msg import Marker, MarkerArray
 
 from fulmar_bags.message_reader import goal_of
+from fulmar_bags.reading_messages import reader_of
+from fulmar_core.estimators.readings import READINGS
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.robots.topics import IMU, MOCAP, SENSOR_WIRES
 from fulmar_ros.controller_node import ControllerNode
 from fulmar_ros.convert import OdometryWriter
 from fulmar_ros.estimator_node import EstimatorNode
-from fulmar_ros.estimator_wires import READERS
 from fulmar_ros.estop_node import EstopNode
 from fulmar_ros.goal_node import GoalNode
 from fulmar_ros.plant_node import PlantNode
@@ -239,12 +240,14 @@ def test_estimator_e_stop_and_teleoperation_survive_anything(
     for message in messages:
         with np.errstate(all="ignore"):
             if isinstance(message, PoseStamped):
-                estimator._on_message("mocap", MOCAP.name, READERS[MOCAP][1], message)
+                estimator._on_message("mocap", MOCAP.name, reader_of(READINGS["mocap"]), message)
                 attitude = QuaternionStamped(header=message.header, quaternion=message.pose.orientation)
                 wire = SENSOR_WIRES["star_tracker"]
-                estimator._on_message("star_tracker", wire.name, READERS[wire][1], attitude)
+                estimator._on_message(
+                    "star_tracker", wire.name, reader_of(READINGS["star_tracker"]), attitude
+                )
             elif isinstance(message, Imu):
-                estimator._on_message("imu", IMU.name, READERS[IMU][1], message)
+                estimator._on_message("imu", IMU.name, reader_of(READINGS["imu"]), message)
             elif isinstance(message, JointState):
                 estop._on_command("actuators/command", message)
             elif isinstance(message, TwistStamped):

@@ -10,7 +10,7 @@ import pytest
 from fulmar_bags.event_packets import FIELDS, POINT, events_of_cloud
 from fulmar_core.dynamics.sky.events import events_of
 from fulmar_core.estimators.kinds import make_estimator
-from fulmar_core.estimators.motion.reading_check import reading_problem
+from fulmar_core.estimators.readings import reading_problem
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.robots.sensors.air_data import AirData
 from fulmar_core.robots.sensors.imu import ImuSample

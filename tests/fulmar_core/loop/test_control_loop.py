@@ -27,6 +27,7 @@ class Scripted:
     """Answers with what it is given, and counts resets."""
 
     name, estimator = "scripted", None
+    readings = ()
 
     def __init__(self, answer=GENTLE, *, robot=BASE, estimator=None):
         self.control_hz, self.estimator = robot.timing.control_hz, estimator

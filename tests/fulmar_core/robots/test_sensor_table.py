@@ -30,6 +30,7 @@ TRUTH = Truth(
     {
         "wheels": WheelSpeeds(("wheel_x", "wheel_y"), np.array([10.0, -20.0])),
         "air_data": AirData(AirDataSpec.NAMES, np.array([28.0, 0.03, -0.01, 1.0])),
+        "supply": 2.1e7,
         "surfaces": SurfacePositions(("elevator", "throttle"), np.array([0.1, 0.4])),
     },
 )

@@ -73,6 +73,7 @@ class Still:
     """Stands where it is."""
 
     name, control_hz, estimator = "still", 10.0, None
+    readings = ()
 
     def reset(self):
         pass

@@ -6,14 +6,17 @@ from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from fulmar_bags.contents import Bag, Topic, json_object
 from fulmar_bags.decode import NS, Odometries, Vectors, by_stamp, odometries
+from fulmar_bags.reading_messages import reader_of
 from fulmar_bags.recorded_estop import estop_messages
 from fulmar_bags.wire_reader import ABSENT, Received, WireReader
 from fulmar_core.config.errors import BagError, ConfigError
+from fulmar_core.estimators.readings import ReadingKind
 from fulmar_core.loop.controller_settings import ControllerSettings
 from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.robot_file import load_robot
@@ -31,6 +34,7 @@ from fulmar_core.safety.geofence import NO_AREA
 from fulmar_core.states.state import State
 from fulmar_core.tasks import Task, load_recorded_task, load_task
 from fulmar_core.tasks.goal import PoseTuple
+from fulmar_core.wires.reading import Reading
 from fulmar_core.wires.robot_name import Frames
 
 
@@ -59,6 +63,7 @@ class ControlSteps:
     applied: Vectors  # what the actuators did from each stamp on; empty where that is not recorded
     changes: tuple[Received, ...]  # folder and SHA-256 of policies that took over
     warnings: tuple[str, ...]
+    reader: WireReader
 
     def __len__(self) -> int:
         """Number of control steps."""
@@ -68,6 +73,16 @@ class ControlSteps:
     def answered(self) -> bool:
         """Whether the bag holds anything that a controller answered."""
         return bool(np.isfinite(self.actions).any() or np.isfinite(self.commands).any())
+
+    def readings(self, kind: ReadingKind) -> tuple[Received, ...]:
+        """What the bag holds of a reading, as `Reading`s in their order."""
+        read = reader_of(kind)
+
+        def value_of(message: Any, frames: Frames) -> tuple[Reading | None, str]:
+            found = read(message, frames)
+            return (None, found) if isinstance(found, str) else (found, "")
+
+        return self.reader.received(kind.wire, value_of)
 
     def before(self, received: tuple[Received, ...]) -> dict[int, list[Received]]:
         """Messages by the step that they came before; the number of steps for those that came after all of them.
@@ -161,6 +176,7 @@ def control_steps_of(
         applied=_checked(reader.vectors(ACTUATORS_STATE), names, ACTUATORS_STATE.name, reader.warnings),
         changes=_changes(reader),
         warnings=tuple(reader.warnings),
+        reader=reader,
     )
 
 

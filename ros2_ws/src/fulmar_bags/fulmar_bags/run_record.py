@@ -92,6 +92,21 @@ NO_SURFACES = Surfaces(np.zeros(0), (), np.zeros((0, 0)))
 
 
 @dataclass(frozen=True)
+class Pressures:
+    """Measured pressure of the gas supply over time."""
+
+    stamp_s: np.ndarray  # (n,) [s]
+    pascal: np.ndarray  # (n,) absolute [Pa]
+
+    def __len__(self) -> int:
+        """Number of samples."""
+        return len(self.stamp_s)
+
+
+NO_PRESSURES = Pressures(np.zeros(0), np.zeros(0))
+
+
+@dataclass(frozen=True)
 class Places:
     """Where one thing of the task was over time."""
 
@@ -140,6 +155,7 @@ class RunRecord:
     health: tuple[HealthSample, ...]
     warnings: tuple[str, ...]  # what could not be read
     surfaces: Surfaces = NO_SURFACES  # `surfaces/state` of an aircraft
+    supply: Pressures = NO_PRESSURES  # `supply/pressure` of thrusters
 
     @property
     def actuation(self) -> Actuation:
@@ -230,6 +246,7 @@ def _record(bag: Bag, info: dict[str, Any]) -> RunRecord:
         health=_health(reader, bag.name),
         warnings=tuple(reader.warnings),
         surfaces=Surfaces(surfaces.stamp_ns / NS, surfaces.names, surfaces.values),
+        supply=_pressures(reader),
     )
 
 
@@ -250,6 +267,14 @@ def _measured(reader: WireReader) -> Odometries:
         return odometries(reader.bag.odometry())
     except BagError:
         return found
+
+
+def _pressures(reader: WireReader) -> Pressures:
+    received = reader.received(SENSOR_WIRES["supply"], lambda message, _: (message.fluid_pressure, ""))
+    return Pressures(
+        np.array([each.stamp_ns / NS for each in received]),
+        np.array([each.value for each in received], dtype=float),
+    )
 
 
 def _places(poses: tuple[Received, ...]) -> Places:

@@ -16,6 +16,7 @@ from fulmar_core.estimators.kinds import estimator_path
 from fulmar_core.loop.policy_bundle import PASSPORT
 from fulmar_core.robots.calibration import calibration_path
 from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.robots.sensors.own_sensor import own_sensor_source
 from fulmar_core.tasks import load_task
 from fulmar_core.tasks.goal_files import goal_file_path
 from fulmar_core.tasks.own_task import OwnTask
@@ -46,6 +47,7 @@ def attachments(plan: RunPlan) -> str:
         **_of_goals(plan.goals or plan.excitation),
         **({"hardware.yaml": Path(plan.hardware)} if plan.hardware else {}),
         **_of_estimator(estimator),
+        **_of_sensors(plan.robot),
         **({CALIBRATION: calibration} if calibration else {}),
         **_of_controller(plan),
     }
@@ -71,6 +73,13 @@ def _of_estimator(name: str | None) -> dict[str, Path]:
         return {}
     path = estimator_path(name)
     return {f"estimator{path.suffix}": path}
+
+
+def _of_sensors(robot: str) -> dict[str, Path]:
+    """The sources of a robot's sensors of the user's own, by the names of the sensors."""
+    return {
+        f"sensor_{name}.py": own_sensor_source(spec) for name, spec in load_robot(robot).sensors.own.items()
+    }
 
 
 def _of_goals(goals: str) -> dict[str, Path]:

@@ -50,7 +50,7 @@ def _camera_spec(plan: RunPlan) -> NodeSpec:
 
 def _estimator_spec(plan: RunPlan, file: str, others: Sequence[NodeSpec]) -> NodeSpec:
     """The node that estimates, by a file of `configs/estimators`."""
-    kind = estimator_kind(file)
+    kind = estimator_kind(file, load_robot(plan.robot))
     parameters: dict[str, Parameter] = {"robot": plan.robot, "estimator": file}
     if simulates_without_noise(plan):
         parameters["exact_sensors"] = True

@@ -26,7 +26,6 @@ from fulmar_core.robots.topics import (
     OBSTACLES,
     ODOMETRY,
     PERIOD,
-    SENSOR_WIRES,
     STATIC_TRANSFORMS,
     STATUS,
     TRANSFORMS,
@@ -35,6 +34,7 @@ from fulmar_core.robots.topics import (
     Wire,
     command_wire,
     goal_wires,
+    own_wires,
 )
 from fulmar_core.safety.geofence import NO_AREA
 from fulmar_core.tasks import load_task
@@ -248,7 +248,7 @@ def plant_spec(plan: RunPlan, *, port: str = "") -> NodeSpec:
 def _sensor_topics(plan: RunPlan) -> tuple[str, ...]:
     """Topics of a robot's sensors but the odometry, which may come from another node."""
     return tuple(
-        SENSOR_WIRES[name].name for name in load_robot(plan.robot).sensors.specs if name != "odometry"
+        kind.wire.name for kind in load_robot(plan.robot).sensors.kinds.values() if kind.wire != ODOMETRY
     )
 
 
@@ -292,7 +292,7 @@ def recorder_spec(plan: RunPlan, *, directory: str = "", info: str = "", files: 
         files: As `bag_origin.attachments` gives it.
     """
     texts = {"directory": directory, "run_info": info, "attachments": files}
-    things = load_task(plan.task).things
+    things, own = load_task(plan.task).things, own_wires(load_robot(plan.robot))
     usual = asdict(Recording())
     unusual = {key: value for key, value in asdict(plan.recording).items() if value != usual[key]}
     return robot_row(
@@ -302,8 +302,11 @@ def recorder_spec(plan: RunPlan, *, directory: str = "", info: str = "", files: 
         {key: text for key, text in texts.items() if text}
         | unusual
         | ({"lossless": True} if chain_of(plan) else {})
-        | ({"things": [thing.name for thing in things]} if things else {}),
-        observed=tuple(wire.name for wire in (*WIRES, *(thing.wire for thing in things)) if wire.recorded),
+        | ({"things": [thing.name for thing in things]} if things else {})
+        | ({"own_topics": [f"{wire.name} {wire.type}" for wire in own]} if own else {}),
+        observed=tuple(
+            wire.name for wire in (*WIRES, *own, *(thing.wire for thing in things)) if wire.recorded
+        ),
         loss=plan.loss_of_helpers,
     )
 

@@ -39,8 +39,8 @@ from fulmar_ros.mission_inputs import MissionInputs
 from fulmar_ros.node_identity import identity_of
 from fulmar_ros.parameters import own_frames, read_parameters
 from fulmar_ros.qos import SAFE_REPEATS
+from fulmar_ros.reading_inputs import ReadingInputs
 from fulmar_ros.runtime import RequestExit, settle_memory
-from fulmar_ros.satellite_inputs import SatelliteInputs
 
 DONE, REFUSED = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
 
@@ -115,6 +115,14 @@ class ControllerNode(LifecycleNode):
             switch = controllers_of(
                 self._make_controller, self.robot, self.task, self.settings, self.get_logger().error
             )
+            self._readings = ReadingInputs(
+                self,
+                self.robot,
+                [name for each in switch.known for name in each.controller.readings],
+                self._go_on,
+                frames=own_frames(self, self.robot),
+                lockstep=self.settings.lockstep,
+            )
         except (FulmarError, ImportError) as error:
             self._refusal = str(error)
             self.get_logger().error(f"not configured: {error}")
@@ -138,10 +146,9 @@ class ControllerNode(LifecycleNode):
             on_bearing=self._on_bearing if self.settings.has_bearing(self.robot) else None,
             lockstep=self.settings.lockstep,
         )
-        self._satellite = SatelliteInputs(self, self.robot, self._go_on, lockstep=self.settings.lockstep)
         self.wires.publish_metadata(switch.current.metadata)
         self._wire_watch = WireWatch(self, self.wires.subscribed)
-        self._writer_watch = WriterWatch(self, self.wires.followed | self._satellite.followed)
+        self._writer_watch = WriterWatch(self, self.wires.followed | self._readings.followed)
         # Lock step has no beat of its own; a wall-clock timer keeps the status alive between messages.
         self._status_timer = self.create_timer(PERIOD_S / 4, self._publish_idle_status)
         return DONE
@@ -203,7 +210,7 @@ class ControllerNode(LifecycleNode):
             self._fall_silent()
             self.guard = None
             self.destroy_timer(self._status_timer)
-            self._satellite.destroy(self)
+            self._readings.destroy(self)
             self.wires.destroy(self)
 
     def _on_estop(self, message: Bool) -> None:
@@ -292,7 +299,9 @@ class ControllerNode(LifecycleNode):
         guard, answered_ns = self._guarded, self._guarded.loop.answered_ns
         if guard.mission.lacks_something_of(stamp) or not guard.bearing_known:
             return True
-        if not again and self._satellite.lacks_something_of(stamp):
+        if answered_ns < 0 and self._readings.lacks_the_first(again=again):
+            return True
+        if not again and self._readings.lacks_something_of(stamp):
             return True
         if again or guard.loop.controller.estimator is None or not 0 < stamp - answered_ns <= self._pause_ns:
             return False
@@ -313,7 +322,7 @@ class ControllerNode(LifecycleNode):
             self._swap.took_over()
             self._announce()
         stamp = measurement.stamp_ns if measurement else 0
-        guard.readings = self._satellite.readings(stamp)
+        guard.readings = self._readings.newest.at(stamp)
         command, step = self.robot.actuators.safe_command, None
         try:
             decision, inputs = guard.begin_step(measurement, time.monotonic_ns())
@@ -402,7 +411,7 @@ class ControllerNode(LifecycleNode):
         """Publish the status where no control step does it."""
         self._status.wire_problems = self._wire_watch.look()
         self._see_writers()
-        self._status.inputs_refused = self._satellite.refused, self._satellite.refusal
+        self._status.inputs_refused = self._readings.newest.refused, self._readings.newest.refusal
         flags = self._guarded.flags
         if self.settings.lockstep or not flags.activated or flags.latched_fault:
             self._publish_status()

@@ -22,21 +22,23 @@ from rclpy.publisher import Publisher
 from rclpy.subscription import Subscription
 
 from fulmar_bags.message_reader import stamp_ns
+from fulmar_bags.reading_messages import Read, reader_of
 from fulmar_core.config.errors import shortened
 from fulmar_core.config.process import CONTROL_PRIORITY, take_priority_with_helpers
 from fulmar_core.estimators.kinds import estimator_kind, load_estimator, make_estimator
 from fulmar_core.estimators.motion.estimator import LACKS_NOTHING, Estimate
-from fulmar_core.estimators.motion.reading_check import reading_problem
+from fulmar_core.estimators.readings import reading_problem, readings_of
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.robots.topics import ODOMETRY, Wire
 from fulmar_core.robots.wire_check import BETWEEN, WIRE_WARNINGS
 from fulmar_core.wires.reading import Reading
 from fulmar_ros.deadline import Spread
-from fulmar_ros.estimator_wires import READERS, WRITERS, Read, Write
+from fulmar_ros.estimator_wires import WRITERS, Write
 from fulmar_ros.frame_wires import odometry_transform
 from fulmar_ros.graph import WireWatch, WriterWatch
 from fulmar_ros.health import Health
 from fulmar_ros.lockstep_answer import LockstepAnswer
+from fulmar_ros.message_class import needed_class
 from fulmar_ros.operator_subscription import subscribe_every
 from fulmar_ros.parameters import name_of, own_frames, read_parameters
 from fulmar_ros.qos import EVERYTHING, LAST_WORDS_S, publisher_qos, subscriber_qos
@@ -76,7 +78,8 @@ class EstimatorNode(Node):
         """
         super().__init__("estimator", cli_args=cli_args)
         settings = read_parameters(self, EstimatorNodeSettings)
-        robot, kind = load_robot(settings.robot), estimator_kind(settings.estimator)
+        robot = load_robot(settings.robot)
+        kind = estimator_kind(settings.estimator, robot)
         self._robot = robot
         self._estimator = make_estimator(settings.estimator, robot, exact_sensors=settings.exact_sensors)
         self._bridge_s = load_estimator(settings.estimator).bridge_s
@@ -127,7 +130,7 @@ class EstimatorNode(Node):
         )
 
     def _subscribe(self, name: str, wire: Wire, *, lockstep: bool) -> list[Subscription]:
-        kind, read = READERS[wire]
+        kind, read = needed_class(wire), reader_of(readings_of(self._robot)[name])
         depth = EVERYTHING if lockstep else DEPTHS[wire.delivery]
         receive = partial(self._on_message, name, self.resolve_topic_name(wire.name), read)
         if lockstep:

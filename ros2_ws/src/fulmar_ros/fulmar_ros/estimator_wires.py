@@ -1,4 +1,4 @@
-"""Messages to readings of estimators, and estimates to messages: a row for each wire that is no sensor's."""
+"""Estimates to messages: a row for each wire."""
 
 from __future__ import annotations
 
@@ -6,63 +6,23 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from geometry_msgs.msg import InertiaStamped, PoseStamped, TwistWithCovarianceStamped
+from geometry_msgs.msg import InertiaStamped, TwistWithCovarianceStamped
 from nav_msgs.msg import Odometry
-from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension, MultiArrayLayout
 
-from fulmar_bags.event_packets import events_of_cloud
-from fulmar_bags.message_reader import reading_of, stamp_ns
-from fulmar_core.config.errors import shortened
 from fulmar_core.estimators.motion.estimator import Estimate
-from fulmar_core.robots.sensors.kind import SensorKind
-from fulmar_core.robots.sensors.table import SENSORS
 from fulmar_core.robots.topics import (
-    EVENTS,
-    EVENTS_2,
     INERTIA,
     INERTIA_COVARIANCE,
-    MOCAP,
     ODOMETRY,
     RATE,
     Wire,
 )
 from fulmar_core.states.rotation import rotate_inverse
-from fulmar_core.wires.reading import Reading
 from fulmar_core.wires.robot_name import Frames
 from fulmar_ros.convert import OdometryWriter, stamp_of
-from fulmar_ros.message_class import message_class
 
-FRAMES = ("odom", "map", "world")  # names of the room in motion captures; all with Z up
-Read = Callable[[Any, Frames], Reading | str | None]  # a reading, why there is none, or None without either
 Write = Callable[[Estimate], Any]
-
-
-def _pose(message: PoseStamped, frames: Frames) -> Reading | str:
-    frame = frames.plain(message.header.frame_id)
-    if frame not in FRAMES:
-        return f"pose is in '{shortened(frame)}', must be in one of {', '.join(FRAMES)}"
-    p, q = message.pose.position, message.pose.orientation
-    return Reading(np.array([p.x, p.y, p.z, q.x, q.y, q.z, q.w]), stamp_ns(message.header.stamp))
-
-
-def _sensor(kind: SensorKind) -> Read:
-    return lambda message, _frames: reading_of(message, kind)
-
-
-def _rate(message: TwistWithCovarianceStamped, _frames: Frames) -> Reading | str:
-    turning = message.twist.twist.angular
-    covariance = np.array(message.twist.covariance).reshape(6, 6)[3:, 3:]
-    if not (np.isfinite(covariance).all() and np.diag(covariance).min() > 0.0):
-        return "rate has a covariance that is not positive"
-    return Reading(
-        np.array([turning.x, turning.y, turning.z]), stamp_ns(message.header.stamp), covariance=covariance
-    )
-
-
-def _events(message: PointCloud2, _frames: Frames) -> Reading | str:
-    events, problem = events_of_cloud(message)
-    return problem if events is None else Reading(events, stamp_ns(message.header.stamp))
 
 
 def _rate_writer(frames: Frames) -> Write:
@@ -127,17 +87,6 @@ def _covariance_writer(_frames: Frames) -> Write:
     return write
 
 
-READERS: dict[Wire, tuple[type, Read]] = {
-    **{
-        kind.wire: (message_class(kind.wire), _sensor(kind))
-        for kind in SENSORS.values()
-        if kind.message is not None
-    },
-    MOCAP: (PoseStamped, _pose),
-    RATE: (TwistWithCovarianceStamped, _rate),
-    EVENTS: (PointCloud2, _events),
-    EVENTS_2: (PointCloud2, _events),
-}
 WRITERS: dict[Wire, tuple[type, Callable[[Frames], Write]]] = {
     ODOMETRY: (Odometry, _odometry_writer),
     INERTIA: (InertiaStamped, _inertia_writer),

@@ -81,7 +81,9 @@ class PlantHealth:
         unfit = BETWEEN.join(self._wire_watch.look())
         findings = self.feedback.findings if self.feedback is not None else ()
         failed = [finding.words for finding in findings]
-        warning = more.get("warning", "") or "; ".join(failed) or unfit
+        supply = self.feedback.supply if self.feedback is not None else None
+        low = supply.warning if supply is not None else ""
+        warning = more.get("warning", "") or "; ".join(failed) or low or unfit
         if warning and level == "ok":
             level, message = "warn", warning
         guard, listeners = self._guard, self._health.listeners()
@@ -95,7 +97,10 @@ class PlantHealth:
         held = self._held()
         parts = ", ".join(finding.part for finding in findings if finding.part)
         values = self._values() | {"failed_parts": parts, WIRE_WARNINGS: unfit} | more
-        self._health.publish(level, message, values, warnings=[*([held] if held else []), *failed])
+        if supply is not None and supply.pressure is not None:
+            values["supply_pressure_bar"] = f"{1e-5 * supply.pressure:.2f}"
+        also = [text for text in (held, *failed, low) if text]
+        self._health.publish(level, message, values, warnings=also)
 
     def _status(self) -> tuple[str, str, str]:
         """Level, message, and the part of the message whose change counts."""

@@ -100,8 +100,8 @@ class LockstepLoop:
                         f"no command answers the odom of t = {stamp / 1e9:.2f} s for {waited:.1f} s "
                         f"(limit {self._answer_timeout_s:g} s): {self._why_unanswered(before)} Look at its output."
                     )
-                # The first messages can get lost while endpoints still find each other.
-                self._wires.publish_sample(sample, stamp, resend=True)
+                # The first messages can get lost while endpoints still find each other: those of every sensor count.
+                self._wires.repeat_sample(sample, stamp, whole=before is None)
             # The very command that answered: how long its answer or this thread took does not matter here.
             command = self._guard.answer(time.monotonic_ns(), sample.odometry, plant_ns=stamp)
         if grounded:

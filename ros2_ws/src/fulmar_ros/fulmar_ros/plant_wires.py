@@ -122,7 +122,7 @@ class PlantWires:
             node, frames, wanted=transforms and odometry, publish=publish, lockstep=lockstep
         )
         self._sensors = SensorWires(
-            node, robot, frames, qos, self._publish, odometry=odometry, transform=transform
+            node, robot, frames, qos, self._publish, odometry=odometry, lockstep=lockstep, transform=transform
         )
         self._model = ModelWires(node, robot, frames, qos, simulated=simulated, transforms=transforms)
         self._poses = (
@@ -188,26 +188,19 @@ class PlantWires:
             return int(self._period.publisher.get_subscription_count())
         return int((self._sensors.odometry or self._poses or self._state).get_subscription_count())
 
-    def publish_sample(self, sample: Sample, time_ns: int, *, resend: bool = False) -> None:
+    def publish_sample(self, sample: Sample, time_ns: int) -> None:
         """Publish a sample, the odometry first, since the controller waits for it.
 
         Args:
             sample: From the backend.
             time_ns: Time of measurement, where the sample has none [ns].
-            resend: Repeat only the odometry.
         """
         if sample.stamp_ns is not None:
             if 0 <= self._captured_ns - sample.stamp_ns <= BACK_NS:
                 self._sensors.publish_stamped(sample.readings, time_ns)
                 return  # a device that has nothing else that is new; further back, the clock was set
             time_ns = self._captured_ns = sample.stamp_ns
-        with self.lock:
-            self._sent.note(time_ns, time.monotonic_ns())
-        for name, pose in sample.things.items():
-            self._publish_thing(name, pose, time_ns)
-        if resend:
-            self._sensors.publish_odometry(sample.readings, time_ns)
-            return
+        self._publish_things(sample, time_ns)
         self._sensors.publish(sample.readings, time_ns)
         if self._mocap is not None and sample.odometry is not None:
             for stamp, state in self._mocap.see(sample.odometry, time_ns):
@@ -217,6 +210,26 @@ class PlantWires:
         if self._clock is not None and now - self._clock_ns >= CLOCK_PERIOD_NS:
             self._publish(self._clock, Clock(clock=stamp_of(time_ns)))
             self._clock_ns = now
+
+    def repeat_sample(self, sample: Sample, time_ns: int, *, whole: bool) -> None:
+        """Publish a sample of lock step again.
+
+        Args:
+            sample: It was published before.
+            time_ns: Time of measurement [ns].
+            whole: Every reading, not the odometry alone.
+        """
+        self._publish_things(sample, time_ns)
+        if whole:
+            self._sensors.publish(sample.readings, time_ns)
+        else:
+            self._sensors.publish_odometry(sample.readings, time_ns)
+
+    def _publish_things(self, sample: Sample, time_ns: int) -> None:
+        with self.lock:
+            self._sent.note(time_ns, time.monotonic_ns())
+        for name, pose in sample.things.items():
+            self._publish_thing(name, pose, time_ns)
 
     def _publish_pose(self, stamp: int, state: RigidBodyState) -> None:
         if self._poses is not None:

@@ -29,6 +29,7 @@ from fulmar_core.robots.topics import (
     GOAL_POSES,
     GOAL_WIRES,
     MOCAP,
+    ODOMETRY,
     PERIOD,
     SENSOR_WIRES,
     VELOCITY_COMMAND,
@@ -54,6 +55,10 @@ REPEATED = {
     ),
     AIR_BEARING: 1,
 }
+MEASURED = tuple(
+    wire for wire in SENSOR_WIRES.values() if wire != ODOMETRY
+)  # repeated at the beginning of lock step
+REMEMBERED_OF_OTHERS = 32
 Keep = Callable[[bytes, dict[str, int]], None]
 
 
@@ -75,7 +80,8 @@ class RecorderNode(Node):
         self._robot = self.get_namespace().strip("/") or "robot"
         self._directory = Path(settings.directory or f"runs/{self._robot}_{time.strftime('%Y%m%d_%H%M%S')}")
         self._run_info, self._attachments = settings.run(), settings.files()
-        wires = dict.fromkeys((*WIRES, *(thing_wire(name) for name in settings.things if name)))
+        own = settings.own_wires()
+        wires = dict.fromkeys((*WIRES, *own, *(thing_wire(name) for name in settings.things if name)))
         found = {wire: message_class(wire) for wire in wires if wire.recorded}
         classes = {wire: kind for wire, kind in found.items() if kind is not None}
         # The bag names topics as every reader of bags knows them, whatever they are remapped to on the wire.
@@ -92,6 +98,8 @@ class RecorderNode(Node):
             put = self._keep(topic)
             if settings.lossless and wire in REPEATED:
                 put = once(put, REPEATED[wire])
+            elif wire in (*MEASURED, *own):
+                put = once(put, REMEMBERED_OF_OTHERS)
             made = subscribe_every(
                 self,
                 classes[wire],

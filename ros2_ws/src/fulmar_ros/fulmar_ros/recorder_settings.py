@@ -12,6 +12,7 @@ import yaml
 from fulmar_core.config.bounded_file import WEIGHTS_BYTES, read_bounded
 from fulmar_core.config.errors import BagError, ConfigError
 from fulmar_core.config.recording import Recording
+from fulmar_core.wires.wire import Wire
 
 
 @dataclass(frozen=True)
@@ -19,6 +20,8 @@ class RecorderSettings(Recording):
     """What is kept, where, and with what beside it."""
 
     things: tuple[str, ...] = ("",)  # names of the things of the task, beside the topics of the table
+    # Topics of the robot's own sensors, each with its type: `range/front sensor_msgs/msg/Range`.
+    own_topics: tuple[str, ...] = ("",)
     lossless: bool = False  # lock step with nodes between: lose nothing, and leave repetitions out
     resume: bool = False  # go on with what a recorder that died has left in the directory
     directory: str = ""  # bag folder to make; "" makes one under `runs/` that is named after robot and time
@@ -26,6 +29,23 @@ class RecorderSettings(Recording):
     attachments: str = (
         "{}"  # JSON object: name to path of files to carry along, or to what a YAML file is to say
     )
+
+    def own_wires(self) -> tuple[Wire, ...]:
+        """The topics of the robot's own sensors.
+
+        Raises:
+            ConfigError: An entry is not a topic and its type.
+        """
+        found = []
+        for entry in filter(None, self.own_topics):
+            name, _, kind = entry.partition(" ")
+            if kind.count("/") != 2:
+                raise ConfigError(
+                    f"parameter 'own_topics' of node 'recorder' has '{entry}', it must be a topic and its type: "
+                    "range/front sensor_msgs/msg/Range"
+                )
+            found.append(Wire(name, kind, "plant", "stream", "", ""))
+        return tuple(found)
 
     def run(self) -> dict[str, Any]:
         """What kind of run this is.

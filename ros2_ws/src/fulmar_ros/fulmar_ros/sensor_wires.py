@@ -11,13 +11,12 @@ from rclpy.qos import QoSProfile
 
 from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.sensors.kind import SensorKind
-from fulmar_core.robots.sensors.table import SENSORS
 from fulmar_core.wires.reading import BACK_NS, Reading
 from fulmar_core.wires.robot_name import PLAIN, Frames
 from fulmar_core.wires.wire import Wire
 from fulmar_ros.convert import OdometryWriter, stamp_of
 from fulmar_ros.frame_wires import OdometryTransform
-from fulmar_ros.message_class import message_class
+from fulmar_ros.message_class import needed_class
 
 Encode = Callable[[Reading, int], Any]  # a reading and its stamp [ns] to a message, or to its bytes
 ODOMETRY = "odometry"
@@ -35,7 +34,7 @@ class ReadingWriter:
             frames: Of the robot.
         """
         assert kind.message is not None
-        self._message = message_class(kind.wire)()
+        self._message = needed_class(kind.wire)()
         self._spec, self._values = spec, kind.message.write
         self._message.header.frame_id = frames.named(kind.frame)
         self._fields: list[tuple[Any, str]] = []
@@ -66,6 +65,7 @@ class SensorWires:
         publish: Callable[[Publisher, Any], None],
         *,
         odometry: bool,
+        lockstep: bool = False,
         transform: OdometryTransform | None = None,
     ) -> None:
         """Create the publishers.
@@ -77,18 +77,20 @@ class SensorWires:
             qos: Quality of service of a wire.
             publish: Publishes a message, or its bytes.
             odometry: Whether to publish the odometry; if not, another node does.
+            lockstep: Whether the odometry goes last; else it goes first, since the controller waits for it.
             transform: Publishes each odometry as a transform, too.
         """
-        self._transform = transform
+        self._transform, self._lockstep = transform, lockstep
         self._publish = publish
         self._made: dict[str, Publisher] = {}
         self._encode: dict[str, Encode] = {}
         self._newest_ns: dict[str, int] = {}  # newest stamp of a sensor that stamps its own readings
-        for name, spec in robot.sensors.specs.items():
+        specs = robot.sensors.specs
+        for name, kind in robot.sensors.kinds.items():
             if name != ODOMETRY or odometry:
-                wire = SENSORS[name].wire
-                self._made[name] = node.create_publisher(message_class(wire), wire.name, qos(wire))
-                self._encode[name] = _encoder(name, spec, frames)
+                wire = kind.wire
+                self._made[name] = node.create_publisher(needed_class(wire), wire.name, qos(wire))
+                self._encode[name] = _encoder(name, kind, specs[name], frames)
 
     @property
     def publishers(self) -> list[Publisher]:
@@ -108,12 +110,16 @@ class SensorWires:
             readings: By the sensors' names.
             sample_ns: Time of the sample [ns].
         """
-        self.publish_odometry(readings, sample_ns)
-        if self._transform is not None and ODOMETRY in readings:
-            self._transform.publish(readings[ODOMETRY].value, sample_ns)
+        # In lock step the odometry asks for an answer: what belongs to it is under way before it.
+        if not self._lockstep:
+            self.publish_odometry(readings, sample_ns)
         for name in self._made:
             if name in readings and name != ODOMETRY:
                 self._publish_if_new(name, readings[name], sample_ns)
+        if self._lockstep:
+            self.publish_odometry(readings, sample_ns)
+        if self._transform is not None and ODOMETRY in readings:
+            self._transform.publish(readings[ODOMETRY].value, sample_ns)
 
     def publish_odometry(self, readings: Mapping[str, Reading], sample_ns: int) -> None:
         """Publish the odometry of a sample, subscribed or not; arguments as of `publish`."""
@@ -136,8 +142,8 @@ class SensorWires:
         self._publish(self._made[name], self._encode[name](reading, reading.stamp(sample_ns)))
 
 
-def _encoder(name: str, spec: Any, frames: Frames) -> Encode:
+def _encoder(name: str, kind: SensorKind, spec: Any, frames: Frames) -> Encode:
     if name == ODOMETRY:  # on the path of control, where a message costs more than its bytes
         writer = OdometryWriter(spec, frame=frames.odom, child_frame=frames.base)
         return lambda reading, time_ns: writer.raw(reading.value, time_ns)
-    return ReadingWriter(SENSORS[name], spec, frames).write
+    return ReadingWriter(kind, spec, frames).write

@@ -40,6 +40,7 @@ class AttitudeLaw(Law):
     """A law for satellites that reaction wheels turn; without measured speeds wheels count as at rest."""
 
     gains: AttitudeGains
+    readings: tuple[str, ...] = (WHEELS,)
 
     def bind(self) -> None:
         """See `Law.bind`."""

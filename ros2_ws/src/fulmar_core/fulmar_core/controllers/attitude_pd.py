@@ -52,6 +52,7 @@ class AdaptiveAttitude(AttitudePd):
 
     law = "adaptive"
     title = "PD of the attitude with the estimated inertia"
+    readings = (*AttitudeLaw.readings, INERTIA)
 
     def inertia_of(self, inputs: Inputs) -> np.ndarray:
         """The estimate, each entry no farther from the file's than `stray` allows."""

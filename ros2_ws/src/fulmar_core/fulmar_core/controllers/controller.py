@@ -31,8 +31,9 @@ class Inputs(Generic[S]):
     estimates: ActuatorEstimate | None  # of an estimator that the controller asks for; None without one
     stamp_ns: int  # when the state was measured, on the plant's clock [ns]
     dt: float  # time of one control step [s]
-    # What else is measured or estimated, by the name of its sensor or estimator: `wheels`, speeds of reaction wheels,
-    # shape (n, count) [rad/s]; `inertia`, see `INERTIA`. What is not measured, or is too old, is not there.
+    # Of what the controller names in `readings`, the newest, by the name of its sensor or estimator, shape (n, k): of
+    # `wheels` the speeds of reaction wheels [rad/s]; `inertia`, see `INERTIA`. What is not measured, or is too old, is
+    # not there.
     readings: Readings = field(default_factory=dict)
 
 
@@ -43,11 +44,13 @@ class Controller(Protocol):
         name: Under which it was chosen.
         control_hz: How often it is asked [Hz].
         estimator: Settings of the actuator estimator whose estimate it wants among its inputs; None for none.
+        readings: What it wants to find in `Inputs.readings`: names of sensors of the robot, and of what estimators say.
     """
 
     name: str
     control_hz: float
     estimator: HealthSettings | None
+    readings: tuple[str, ...]
 
     def reset(self) -> None:
         """Forget everything about the past: a new goal, a new episode, or time jumped."""

@@ -22,6 +22,7 @@ class Law(ABC):
 
     Attributes:
         estimator: See `Controller`.
+        readings: See `Controller`.
         seeds: Of the noise of a law that draws any, in turns among craft side by side.
     """
 
@@ -29,6 +30,7 @@ class Law(ABC):
     title: ClassVar[str]  # for lists
 
     seeds: tuple[int, ...] = ()
+    readings: tuple[str, ...] = ()
 
     def __init__(
         self,

@@ -10,6 +10,7 @@ import numpy as np
 
 from fulmar_core.dynamics.actuators.actuation import ActuationState
 from fulmar_core.dynamics.actuators.flight_actuation import FlightActuation
+from fulmar_core.dynamics.actuators.tank_actuation import TankActuation
 from fulmar_core.dynamics.actuators.wheel_actuation import WheelActuation
 from fulmar_core.dynamics.free_body import Wrench, free_body_step
 from fulmar_core.dynamics.rolling import rolling_step
@@ -18,7 +19,7 @@ from fulmar_core.robots.actuators.pushing import Pushing
 from fulmar_core.robots.actuators.reaction_wheels import ReactionWheels
 from fulmar_core.robots.actuators.rolling import Rolling
 from fulmar_core.robots.robot import Robot
-from fulmar_core.robots.sensors import surfaces, wheels
+from fulmar_core.robots.sensors import supply, surfaces, wheels
 from fulmar_core.states.arrays import array_namespace
 from fulmar_core.states.planar import PlanarState
 from fulmar_core.states.rotation import Array
@@ -34,6 +35,7 @@ def actuation_of(
     latest_s: float = 0.0,
     step_s: float = math.inf,
     changes: bool = False,
+    world: World | None = None,
 ) -> ActuationState:
     """The actuators of a robot in their safe state.
 
@@ -44,6 +46,7 @@ def actuation_of(
         latest_s: As of `longest_delay` [s].
         step_s: Least time between two commands [s].
         changes: Whether a part may stick or the supply may fall within an episode.
+        world: Says how full tanks are; None: they never empty, which costs less.
     """
     response = robot.actuators.response
     if isinstance(robot.actuators, Rolling):
@@ -63,6 +66,8 @@ def actuation_of(
         return FlightActuation(robot.actuators, safe, delay_ticks=delay_ticks, parts=parts)
     if isinstance(robot.actuators, ReactionWheels):
         return WheelActuation(response, count=robot.actuators.count, **usual)
+    if world is not None and robot.actuators.tank is not None:
+        return TankActuation(robot.actuators, robot.actuators.tank, world, response, **usual)
     return ActuationState(response, **usual)
 
 
@@ -75,6 +80,8 @@ def truths_of(robot: Robot, actuation: ActuationState) -> dict[str, Any]:
     if isinstance(actuation, FlightActuation):
         positions = np.asarray(actuation.applied[:, 0], dtype=float)
         return {surfaces.NAME: surfaces.SurfacePositions(robot.actuators.names, positions)}
+    if isinstance(actuation, TankActuation):
+        return {supply.NAME: float(actuation.pressure[0])}
     return {}
 
 

@@ -21,6 +21,7 @@ from fulmar_core.estimators.motion.settings import (
     PlanarMotionSettings,
     SpatialMotionSettings,
 )
+from fulmar_core.estimators.readings import READINGS, readings_of
 from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.sensors.repetition import without_noise
 from fulmar_core.robots.topics import (
@@ -174,27 +175,21 @@ KINDS: dict[str, EstimatorKind] = {
 }
 
 
-# What a user's own estimator may take, by name.
-READINGS: Mapping[str, Wire] = {
-    "mocap": MOCAP,
-    "rate": RATE,
-    "events": EVENTS,
-    "events_2": EVENTS_2,
-    **{name: wire for name, wire in SENSOR_WIRES.items() if wire != ODOMETRY},
-}
-
-
-def _own_kind(path: str) -> EstimatorKind:
-    """The row of a user's own estimator, which says where a robot is."""
+def _own_kind(path: str, robot: Robot | None) -> EstimatorKind:
+    """The row of a user's own estimator, which says where a robot is; without a robot, less sensors of one's own."""
     from fulmar_core.estimators.own_estimator import OwnEstimator, own_takes
 
-    takes, more = (own_takes(path, attribute, READINGS) for attribute in ("takes", "takes_if_there"))
+    known = READINGS if robot is None else readings_of(robot)
+    takes, more = (
+        own_takes(path, attribute, known, strict=robot is not None)
+        for attribute in ("takes", "takes_if_there")
+    )
     return EstimatorKind(
         EstimatorSettings,
         lambda _settings, robot: OwnEstimator(path, robot),
-        takes={name: READINGS[name] for name in takes},
+        takes={name: known[name].wire for name in takes},
         publishes=(ODOMETRY,),
-        takes_if_there={name: READINGS[name] for name in more},
+        takes_if_there={name: known[name].wire for name in more},
     )
 
 
@@ -212,14 +207,18 @@ def estimator_path(name: str) -> Path:
     return Path(name) if name.endswith(".yaml") else config_path("estimators", name)
 
 
-def estimator_kind(name: str) -> EstimatorKind:
-    """The row of an estimator's file; `name` as of `load_estimator`.
+def estimator_kind(name: str, robot: Robot | None = None) -> EstimatorKind:
+    """The row of an estimator's file; `name` as in `load_estimator`.
+
+    Args:
+        name: Of the file, or the dotted path of a class.
+        robot: Whose sensors a class may take; without one, sensors of one's own are left out.
 
     Raises:
         ConfigError: No such file, kind or class, or the file is not YAML.
     """
     if is_own(name):
-        return _own_kind(name)
+        return _own_kind(name, robot)
     path = estimator_path(name)
     kind = load_config(dict[str, Any], path).get("kind", DEFAULT_KIND)
     if kind not in KINDS:
@@ -252,7 +251,7 @@ def check_estimator(name: str, robot: Robot) -> None:
         ConfigError: As of `load_estimator`, or the robot is of the other space.
     """
     load_estimator(name)
-    kind = estimator_kind(name)
+    kind = estimator_kind(name, robot)
     if is_own(name):
         return
     form = kind.form

@@ -48,14 +48,22 @@ def own_settings(path: str) -> EstimatorSettings:
         raise ConfigError(f"estimator '{path}': {error}") from None
 
 
-def own_takes(path: str, attribute: str, known: Iterable[str]) -> tuple[str, ...]:
+def own_takes(path: str, attribute: str, known: Iterable[str], *, strict: bool = True) -> tuple[str, ...]:
     """Names of readings that a class lists in `takes` or `takes_if_there`.
+
+    Args:
+        path: Dotted path of the class.
+        attribute: `takes` or `takes_if_there`.
+        known: Names that there are.
+        strict: Whether to refuse others, which are left out else.
 
     Raises:
         ConfigError: One is not known.
     """
     given, known = getattr(own_class(path), attribute, ()), tuple(known)
     names = (given,) if isinstance(given, str) else tuple(given)
+    if not strict:
+        return tuple(name for name in names if name in known)
     for name in names:
         if name not in known:
             raise ConfigError(

@@ -98,6 +98,11 @@ class ControllerSwitch(Generic[T]):
         self._next: T | None = None
 
     @property
+    def known(self) -> tuple[T, ...]:
+        """Those that act or may take over by themselves."""
+        return (self.current, *((self._fallback,) if self._fallback is not None else ()))
+
+    @property
     def rejections(self) -> int:
         """Refused commands so far, of any controller."""
         return self._past_rejections + self._rejections.total

@@ -11,8 +11,8 @@ import numpy as np
 from fulmar_core.controllers.controller import Controller, Readings
 from fulmar_core.dynamics.things import Poses
 from fulmar_core.loop.control_loop import ControlLoop
+from fulmar_core.loop.newest_readings import NewestReadings
 from fulmar_core.robots.robot import Robot
-from fulmar_core.robots.sensors.wheels import NAME as WHEELS
 from fulmar_core.simulation.backend import Backend, Sample
 from fulmar_core.simulation.episode import draw_episodes, episode_steps
 from fulmar_core.simulation.metrics import TargetCounter, Trajectories, TrajectoryLog, join
@@ -139,9 +139,7 @@ def roll_out_in_backends(
                 backend.reset(drawn[i], seed=seed, number=each)
                 for i, (backend, each) in enumerate(zip(backends, numbers, strict=False))
             ]
-            worlds = _Backends(
-                backends, samples, robot.timing.substeps(controller.control_hz), task.state_type
-            )
+            worlds = _Backends(backends, samples, controller, task.state_type)
             runs.append(_roll_out(controller, robot, task, worlds, drawn.goal, further))
     return join(runs)
 
@@ -196,13 +194,18 @@ class _Backends:
     """Simulators that are stepped side by side."""
 
     def __init__(
-        self, backends: list[Backend], samples: list[Sample], substeps: int, form: type[State]
+        self, backends: list[Backend], samples: list[Sample], controller: Controller, form: type[State]
     ) -> None:
-        self._backends, self._substeps, self._form = backends, substeps, form
+        self._backends, self._form, self._ns = backends, form, 0
+        robot = backends[0].robot
+        self._substeps = robot.timing.substeps(controller.control_hz)
+        self._step_ns = round(1e9 * self._substeps * robot.timing.physics_dt)
+        self._newest = [NewestReadings(robot, controller.readings, in_step=True) for _ in samples]
         self._take(samples)
 
     def move(self, command: Array) -> None:
         """Apply commands for one control step."""
+        self._ns += self._step_ns
         stepped = zip(self._backends, command, strict=False)
         self._take([backend.step(each, self._substeps) for backend, each in stepped])
 
@@ -211,5 +214,13 @@ class _Backends:
         self.measured = form.stack([form.from_rigid(sample.measured) for sample in samples])
         self.truth = form.stack([form.from_rigid(each.truth) for each in samples if each.truth is not None])
         self.things = {name: np.stack([each.things[name] for each in samples]) for name in samples[0].things}
-        speeds = [each.readings[WHEELS].value.speeds for each in samples if WHEELS in each.readings]
-        self.readings = {WHEELS: np.stack(speeds)} if speeds else {}
+        for newest, sample in zip(self._newest, samples, strict=True):
+            for name in newest.kinds.keys() & sample.readings.keys():
+                reading = sample.readings[name]
+                newest.take(name, reading, reading.stamp(self._ns))
+        each = [newest.at(self._ns) for newest in self._newest]
+        self.readings = {
+            name: np.concatenate([one[name] for one in each])
+            for name in each[0]
+            if all(name in one for one in each)
+        }

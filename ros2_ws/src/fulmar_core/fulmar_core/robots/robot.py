@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated, Any, ClassVar, TypeVar
 
 import numpy as np
@@ -19,8 +19,10 @@ from fulmar_core.robots.kinds import kind_of
 from fulmar_core.robots.kinds.kind import Kind
 from fulmar_core.robots.sensors.event_camera import EventCamera
 from fulmar_core.robots.sensors.imu import ImuSpec
+from fulmar_core.robots.sensors.kind import SensorKind
 from fulmar_core.robots.sensors.odometer import OdometrySpec
-from fulmar_core.robots.sensors.table import SENSORS
+from fulmar_core.robots.sensors.own_sensor import OwnSensorSpec
+from fulmar_core.robots.sensors.table import SENSORS, sensor_kind
 from fulmar_core.states.planar import PlanarState
 from fulmar_core.states.state import State
 
@@ -182,15 +184,33 @@ def _with_every_sensor(cls: Class) -> Class:
 @dataclass(frozen=True)
 @_with_every_sensor
 class Sensors:
-    """What the robot measures: two that every robot has, and by name any other row of `SENSORS`."""
+    """What the robot measures: two that every robot has, by name any other row of `SENSORS`, and users' own."""
 
     odometry: OdometrySpec
     imu: ImuSpec
+    own: dict[str, OwnSensorSpec] = field(default_factory=dict, hash=False)  # by a name that no row has
 
     @property
     def specs(self) -> dict[str, Any]:
         """The robot's sensors by name, in the order of the table."""
-        return {name: spec for name in SENSORS if (spec := getattr(self, name)) is not None}
+        return {name: spec for name in SENSORS if (spec := getattr(self, name)) is not None} | self.own
+
+    @property
+    def kinds(self) -> dict[str, SensorKind]:
+        """Their rows; a user's own class is loaded here.
+
+        Raises:
+            ConfigError: Such a class cannot be loaded.
+        """
+        return {name: sensor_kind(name, spec) for name, spec in self.specs.items()}
+
+    def __post_init__(self) -> None:
+        for name in self.own:
+            if name in SENSORS or not name.isidentifier():
+                raise ValueError(
+                    f"'own' has a sensor '{name}': a name of letters, digits and _ is needed that is none of "
+                    f"{', '.join(SENSORS)}."
+                )
 
 
 @dataclass(frozen=True)

@@ -224,6 +224,17 @@ WIRES: tuple[Wire, ...] = (
     RATE_STATUS, PERIOD, ANSWER,
 )  # fmt: skip
 
+
+def own_wires(robot: Robot) -> tuple[Wire, ...]:
+    """Where the sensors of the user's own of a robot are published, beside `WIRES`.
+
+    Raises:
+        ConfigError: A class cannot be loaded.
+    """
+    kinds = robot.sensors.kinds if robot.sensors.own else {}
+    return tuple(kinds[name].wire for name in robot.sensors.own)
+
+
 GOAL_WIRES: dict[str, Wire] = {wire.name: wire for wire in (GOAL_POSE, GOAL_POINT, GOAL_PATH, GOAL_VELOCITY)}
 
 

@@ -107,6 +107,9 @@ class BatchSimulation(MutableState, Generic[S]):
         )
         safe = np.tile(robot.actuators.safe_command[:, None], (1, worlds))
         self._safe = self._real(safe)
+        self.command: Array = self._safe.T
+        self._upcoming = UpcomingEpisodes(self._draw, worlds)
+        self.truth, self.goal, self.world = self._draw_parts(np.arange(worlds), np.zeros(worlds, dtype=int))
         self._actuation = actuation_of(
             robot,
             self._safe,
@@ -114,10 +117,8 @@ class BatchSimulation(MutableState, Generic[S]):
             latest_s=self._latest_s,
             step_s=self.control_dt,
             changes=scenario.actuation.changes,
+            world=self.world if scenario.actuation.supply.tank < 1.0 else None,
         )
-        self.command: Array = self._safe.T
-        self._upcoming = UpcomingEpisodes(self._draw, worlds)
-        self.truth, self.goal, self.world = self._draw_parts(np.arange(worlds), np.zeros(worlds, dtype=int))
         self._measure()
 
     @property

@@ -155,12 +155,19 @@ class Supply:
     left: float = 1.0  # share that is left in the end; what actuators do falls by it [-]
     from_s: float = 0.0  # when it begins to fall [s]
     over_s: float = 1.0  # how long it falls [s]
+    # Of robots with a tank in their file: its pressure at the start, by that of the full one. In batches tanks empty
+    # only where this is below 1; in simulators, which run for longer, they always do [-].
+    tank: float = 1.0
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.left <= 1.0:
             raise ValueError(f"'left' = {self.left:g} must lie in [0, 1], a share of the full supply.")
         if self.from_s < 0.0 or self.over_s <= 0.0:
             raise ValueError("'from_s' must not be negative, and 'over_s' must be greater than 0.")
+        if not 0.0 <= self.tank <= 1.0:
+            raise ValueError(
+                f"'tank' = {self.tank:g} must lie in [0, 1], a share of the full tank's pressure."
+            )
 
 
 @dataclass(frozen=True)

@@ -71,6 +71,7 @@ class SpatialWorld(Drawn):
     supply_left: Array  # share of the supply that is left in the end; 1: it does not fall [-]
     supply_from: Array  # when it begins to fall [s]
     supply_over: Array  # how long it falls [s]
+    tank_fill: Array  # pressure of the tank at the start, by that of the full one [-]
 
 
 def push_in_world(world: SpatialWorld, time_s: Array, control_dt: float) -> Vector:

@@ -37,6 +37,7 @@ def draw_changes(robot: Robot, actuation: Actuation, draws: Draws) -> dict[str, 
         "supply_left": zero + supply.left,
         "supply_from": zero + supply.from_s,
         "supply_over": zero + supply.over_s,
+        "tank_fill": zero + supply.tank,
     }
 
 

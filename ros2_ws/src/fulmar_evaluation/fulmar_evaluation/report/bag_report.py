@@ -15,13 +15,23 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from fulmar_bags.contents import Bag
-from fulmar_bags.decode import TWIST, Odometries, Vectors, joint_vectors, odometries, twist_vectors
+from fulmar_bags.contents import Bag, Topic
+from fulmar_bags.decode import (
+    TWIST,
+    Odometries,
+    Vectors,
+    joint_vectors,
+    messages,
+    odometries,
+    stamp_of,
+    twist_vectors,
+)
 from fulmar_bags.figures import describe
 from fulmar_core.robots.topics import SENSOR_WIRES
 from fulmar_evaluation.report.page import Part, Plot, cells, html_page, table
 from fulmar_evaluation.report.space_plot import SIDES
 from fulmar_evaluation.report.style import CONTROLLER_COLOURS, legend, quiet_grid
+from fulmar_evaluation.report.supply_plot import draw_pressure
 from fulmar_evaluation.report.writer import write_document
 
 WIDTH = 6.2  # [inch]
@@ -130,12 +140,27 @@ def _drawings(bag: Bag, seen: Odometries) -> list[Drawing]:
             vectors = joint_vectors(topic, "position") if measured else COMMANDS[topic.type](topic)
             if len(vectors) and 0 < len(vectors.names) <= MOST_ACTUATORS:
                 found.append(_actuators(topic.name, vectors, _seconds(vectors, seen, topic.type == TWIST)))
+        if topic.type == SENSOR_WIRES["supply"].type and len(topic):
+            found.append(_pressure(topic, seen))
     found.append(
         Drawing(
             "How late the odometry came", "Recorded minus stamped, beyond the quickest message.", 2.0, delay
         )
     )
     return found
+
+
+def _pressure(topic: Topic, seen: Odometries) -> Drawing:
+    """Any topic of pressures, such as that of the gas supply."""
+    read = [message for _, message in messages(topic)]
+    stamp_ns = np.array([stamp_of(message) for message in read], dtype=np.int64)
+    pascal = np.array([message.fluid_pressure for message in read], dtype=float)
+    begin_ns = seen.stamp_ns[0] if len(seen) else stamp_ns.min(initial=0)
+
+    def draw(axes: Axes) -> None:
+        draw_pressure(axes, (stamp_ns - begin_ns) / 1e9, pascal, COLOUR)
+
+    return Drawing(f"Pressure: {topic.name}", "As the gauge reports it.", 2.0, draw)
 
 
 def _leaves_the_plane(seen: Odometries) -> bool:

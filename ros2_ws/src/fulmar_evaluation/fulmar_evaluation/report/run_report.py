@@ -28,6 +28,7 @@ from fulmar_evaluation.report.page import Part, Plot, cells, faint, html_page, t
 from fulmar_evaluation.report.run_view import View, evaluated, in_space, result_of, rule, table_rows, views
 from fulmar_evaluation.report.space_plot import draw_space, space_height
 from fulmar_evaluation.report.style import legend, quiet_grid
+from fulmar_evaluation.report.supply_plot import TITLE, draw_supply
 from fulmar_evaluation.report.trajectory_plot import draw_close_up, draw_trajectory, has_place
 from fulmar_evaluation.report.writer import write_document
 
@@ -84,7 +85,8 @@ def _parts(runs: Sequence[View]) -> list[Part]:
     if flies(runs):
         path = (_flight_path, _progress, _flight, _motion)
     use = (_surfaces,) if flies(runs) else (_actuators, _use)
-    plots = (*path, *use, _latency) if evaluated(runs) else ()
+    gauge = (_supply,) if any(len(run.record.supply) for run in runs) else ()
+    plots = (*path, *use, *gauge, _latency) if evaluated(runs) else ()
     return [
         *faint(_subtitle(runs)),
         f'<div class="results">{"".join(map(_result, runs))}</div>',
@@ -351,6 +353,16 @@ def _use(runs: Sequence[View]) -> Plot:
     Shares of full command of all actuators, added up over time: two at half command for one second count as one
     second. A flat line means that the robot rests or rolls on."""
     return Plot("Effort spent", caption, figure)
+
+
+def _supply(runs: Sequence[View]) -> Plot:
+    figure = Figure(figsize=(WIDTH, 2.1), layout="constrained")
+    axes = figure.subplots()
+    draw_supply(axes, runs)
+    legend(axes, loc="lower left", ncols=len(runs))
+    caption = """
+    As the gauge of the tank reports it. Below the dashed line, the pressure of the regulator, thrust falls with it."""
+    return Plot(TITLE, caption, figure)
 
 
 def _latency(runs: Sequence[View]) -> Plot:

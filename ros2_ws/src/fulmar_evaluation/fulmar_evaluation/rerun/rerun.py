@@ -6,6 +6,7 @@ record, not from the new answer. So one different command does not make everythi
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -21,6 +22,7 @@ from fulmar_core.estimators.actuator_health.applied import AppliedHistory
 from fulmar_core.loop.control_loop import unknown_inputs
 from fulmar_core.loop.fallback import ControllerSwitch, Standby, warm_up
 from fulmar_core.loop.guarded_loop import GuardedLoop
+from fulmar_core.loop.newest_readings import NewestReadings
 from fulmar_core.safety.input_gate import InputGate, Measurement
 from fulmar_core.states.rotation import rotate
 from fulmar_core.states.state import RigidBodyState
@@ -127,6 +129,9 @@ class _Rerun:
             gate=InputGate(course.robot.limits, frozen_after=0),
             applied=self._history if len(course.applied) else None,
         )
+        names = [name for each in self._guard.switch.known for name in each.controller.readings]
+        self._readings = NewestReadings(course.robot, names, in_step=course.settings.lockstep)
+        self._to_read = {name: deque(course.readings(kind)) for name, kind in self._readings.kinds.items()}
         # Of a robot without a bearing, and in a bag that says nothing of it, there is none to wait for.
         self._guard.take_bearing(not course.bearing or bool(course.bearing[0].value))
         self._guard.activate()
@@ -187,6 +192,7 @@ class _Rerun:
         )
         self._feed_odometry(step)
         self._feed_applied(stamp)
+        self._feed_readings(stamp, log_ns)
         self._estop.recorded = recorded
         sample = int(course.sample[step])
         state = self._states[sample] if sample != ABSENT else None
@@ -241,6 +247,15 @@ class _Rerun:
             index = self._states_fed
             self._states_fed += 1
             self._history.add(int(states.stamp_ns[index]), states.values[index])
+
+    def _feed_readings(self, stamp_ns: int, log_ns: int) -> None:
+        """Take what else was measured up to a step: in lock step it waited for that, in real time it had come [ns]."""
+        lockstep = self._course.settings.lockstep
+        for name, waiting in self._to_read.items():
+            while waiting and (waiting[0].stamp_ns <= stamp_ns if lockstep else waiting[0].log_ns <= log_ns):
+                received = waiting.popleft()
+                self._readings.take(name, received.value, received.stamp_ns)
+        self._guard.readings = self._readings.at(stamp_ns)
 
     def _goalless(self) -> BagError:
         what, task = self._guard.mission.lacking, self._course.task.name

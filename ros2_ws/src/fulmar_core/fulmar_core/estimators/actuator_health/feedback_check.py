@@ -13,6 +13,7 @@ from fulmar_core.estimators.actuator_health.motion_feedback import (
     DriveFeedback,
     PropellerFeedback,
 )
+from fulmar_core.estimators.actuator_health.supply_check import SupplyCheck
 from fulmar_core.robots.actuators.ackermann import Ackermann
 from fulmar_core.robots.actuators.control_surfaces import ControlSurfaces
 from fulmar_core.robots.actuators.differential_drive import DifferentialDrive
@@ -102,11 +103,13 @@ class ActuatorFeedback:
 
     Attributes:
         findings: Parts that do not do what is applied to them.
+        supply: What feeds them.
     """
 
     def __init__(self, robot: Robot, *, moves: bool) -> None:
         """Begin without findings; `moves`: whether the backend's odometry is the one that is published."""
         self._joints, self._motion = JointCheck(robot), MotionCheck(robot) if moves else None
+        self.supply = SupplyCheck(robot)
         self._vital = robot.actuators.names[: robot.actuators.positions] if robot.flies else ()
         self.findings: tuple[Finding, ...] = ()
 
@@ -119,12 +122,14 @@ class ActuatorFeedback:
         """Begin anew, with an episode."""
         self.findings = ()
         self._joints.reset()
+        self.supply.reset()
         if self._motion is not None:
             self._motion.reset()
 
     def see(self, command: np.ndarray, seconds: float, sample: Sample) -> None:
         """Take a command that was applied, shape (n,), for how long [s], and the sample at the end."""
         self._joints.see(command, seconds, sample.readings)
+        self.supply.see(seconds, sample.readings)
         if self._motion is None:
             self.findings = self._joints.findings
             return

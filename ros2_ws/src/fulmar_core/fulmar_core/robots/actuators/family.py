@@ -18,6 +18,7 @@ from fulmar_core.robots.actuators.excitation import Excitation
 from fulmar_core.robots.actuators.parts import MovingParts
 from fulmar_core.robots.actuators.refuge import Refuge, StopAtOnce
 from fulmar_core.robots.actuators.response import Response
+from fulmar_core.robots.actuators.tank import Tank
 from fulmar_core.states.rotation import Array
 
 
@@ -27,6 +28,7 @@ class Actuators(ABC):
     Attributes:
         kind: Name of the family: the key `kind` of the YAML.
         response: How fast actuators follow their commands.
+        tank: What feeds thrusters; None: their supply never falls by itself.
         law: Name of the classical law that drives the family (`controllers/classical.py`); empty for none.
         excitation: Random commands that identify it; None: the controller `excite` rejects the family.
         one_way: Commands go from 0 to `scale`; else from -scale to scale.
@@ -39,6 +41,7 @@ class Actuators(ABC):
 
     kind: str
     response: Response
+    tank: Tank | None = None
     __dataclass_fields__: ClassVar[dict[str, Field[Any]]]  # every family is a frozen dataclass
 
     law: ClassVar[str] = ""
@@ -98,6 +101,21 @@ class Actuators(ABC):
     def refuge(self) -> Refuge:
         """What is applied when commands end."""
         return StopAtOnce(self.safe_command)
+
+    def total_thrust(self, applied: Array) -> Array:
+        """What a tank feeds: thrust of all nozzles together at its full pressure, 0 of a family that has none [N].
+
+        Args:
+            applied: What each actuator does, shape (n, ...).
+
+        Returns:
+            Shape (...,).
+        """
+        return 0.0 * applied.sum(0)
+
+    def supply_warning(self, pressure: float) -> str:
+        """What is wrong with a pressure of the tank [Pa]; empty where nothing is, or no tank is described."""
+        return "" if self.tank is None else self.tank.warning(pressure, float(self.total_thrust(self.scale)))
 
     @property
     def recipe(self) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 
 from fulmar_core.robots.actuators.pushing import Mount, Push, Pushing
 from fulmar_core.robots.actuators.response import Response
+from fulmar_core.robots.actuators.tank import Tank
 from fulmar_core.states.arrays import array_namespace, clip
 from fulmar_core.states.attitude import Vector
 from fulmar_core.states.rotation import Array
@@ -38,6 +39,7 @@ class Thrusters(Pushing):
     nozzles: tuple[Nozzle, ...]
     continuous: bool = False  # valves open by degrees
     response: Response = Response()
+    tank: Tank | None = None  # that feeds them; None: the supply never falls by itself
 
     law = "lqr"
     one_way = True
@@ -102,6 +104,11 @@ class Thrusters(Pushing):
         if not self.shared_pressure:
             return self.thrust * command
         return self.thrust * command / clip(command.sum(-1)[..., None], 1.0, None)
+
+    def total_thrust(self, applied: Array) -> Array:
+        """Thrust of all nozzles together at the full pressure; see `Actuators.total_thrust`."""
+        opened = self._opening(applied).sum(0)
+        return self.thrust * (clip(opened, None, 1.0) if self.shared_pressure else opened)
 
     def _opening(self, applied: Array) -> Array:
         """How far valves are open: whatever errors add, a valve does not suck."""

@@ -12,7 +12,7 @@ import numpy as np
 from fulmar_core.config.plausible_ranges import Plausible
 from fulmar_core.robots.sensors.kind import MessageFields, SensorKind, Truth
 from fulmar_core.robots.sensors.odometer import Channel, largest_reading
-from fulmar_core.robots.sensors.ranges import named_problem
+from fulmar_core.robots.sensors.ranges import in_order, named_problem
 from fulmar_core.robots.sensors.sampling import Sampling, sensor_rng
 from fulmar_core.wires.reading import Reading
 from fulmar_core.wires.wire import Wire
@@ -127,6 +127,7 @@ KIND = SensorKind(
     message=MessageFields(paths=("name", "position"), write=_write, read=_read),
     simulate=AirProbes,
     problem=_problem,
+    numbers=lambda reading, robot: in_order(reading.value.names, reading.value.values, robot.sensors.specs[NAME].names),
     plausible=(
         Plausible("airspeed.std", "m/s", (0.0, 20.0), (0.0, 3.0), "pitot tubes"),
         Plausible("alpha.std", "rad", (0.0, 0.5), (0.0, 0.1), "vanes"),

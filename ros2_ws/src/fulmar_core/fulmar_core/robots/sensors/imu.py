@@ -233,4 +233,5 @@ KIND = SensorKind(
     message=MessageFields(PATHS, _write, _read),
     simulate=SimulatedImu,
     problem=_problem,
+    numbers=lambda reading, _robot: np.concatenate((reading.value.specific_force, reading.value.angular_velocity)),
 )  # fmt: skip

@@ -68,3 +68,7 @@ class SensorKind:
     # Why a reading cannot come from the device of a robot (`fulmar_core.robots.robot.Robot`); empty if it can.
     problem: Callable[[Reading, Any], str] = lambda _reading, _robot: ""
     plausible: tuple[Plausible, ...] = ()  # ranges of the spec's numbers; keys relative to the spec
+    # A reading of a robot to the numbers that a controller gets, shape (k,).
+    numbers: Callable[[Reading, Any], np.ndarray] = lambda reading, _robot: np.asarray(
+        reading.value, dtype=float
+    )

@@ -31,6 +31,12 @@ def named_problem(what: str, names: Sequence[str], values: np.ndarray, ranges: M
     return size_problem((f"{what} {name}", by_name[name], most) for name, most in ranges.items())
 
 
+def in_order(names: Sequence[str], values: np.ndarray, wanted: Sequence[str]) -> np.ndarray:
+    """Those of some named values that are wanted, in that order."""
+    by_name = dict(zip(names, values.tolist(), strict=True))
+    return np.array([by_name[name] for name in wanted], dtype=float)
+
+
 def size_problem(values: Iterable[tuple[str, float, float]]) -> str:
     """Why numbers, each with its name and its largest size, lie outside of what a device can say."""
     for name, value, most in values:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from fulmar_core.robots.sensors.kind import SimulatedSensor, Truth
-from fulmar_core.robots.sensors.table import SENSORS
+from fulmar_core.robots.sensors.table import sensor_kind
 from fulmar_core.wires.reading import Reading
 
 
@@ -22,7 +22,7 @@ class SimulatedSensors:
         """
         self._sensors: dict[str, SimulatedSensor] = {}
         for name, spec in specs.items():
-            simulate = SENSORS[name].simulate
+            simulate = sensor_kind(name, spec).simulate
             if simulate is not None:
                 self._sensors[name] = simulate(spec, noisy)
 

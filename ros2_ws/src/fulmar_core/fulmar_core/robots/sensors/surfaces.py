@@ -12,7 +12,7 @@ from fulmar_core.config.plausible_ranges import Plausible
 from fulmar_core.robots.actuators.control_surfaces import is_throttle
 from fulmar_core.robots.sensors.joints import JointSensors, JointSpec
 from fulmar_core.robots.sensors.kind import MessageFields, SensorKind, Truth
-from fulmar_core.robots.sensors.ranges import named_problem
+from fulmar_core.robots.sensors.ranges import in_order, named_problem
 from fulmar_core.wires.reading import Reading
 from fulmar_core.wires.wire import Wire
 
@@ -74,6 +74,7 @@ KIND = SensorKind(
     message=MessageFields(paths=("name", "position"), write=_write, read=_read),
     simulate=ServoSensors,
     problem=_problem,
+    numbers=lambda reading, robot: in_order(reading.value.names, reading.value.positions, robot.actuators.names),
     plausible=(
         Plausible("std", "rad", (0.0, 0.5), (0.0, 0.05), "potentiometers of servos"),
         Plausible("quantum", "rad", (0.0, 0.2), (0.0, 0.02), "magnetic encoders: 12 bit a turn"),

@@ -11,7 +11,7 @@ import numpy as np
 from fulmar_core.config.plausible_ranges import Plausible
 from fulmar_core.robots.sensors.joints import JointSensors, JointSpec
 from fulmar_core.robots.sensors.kind import MessageFields, SensorKind, Truth
-from fulmar_core.robots.sensors.ranges import named_problem
+from fulmar_core.robots.sensors.ranges import in_order, named_problem
 from fulmar_core.wires.reading import Reading
 from fulmar_core.wires.wire import Wire
 
@@ -72,6 +72,7 @@ KIND = SensorKind(
     message=MessageFields(paths=("name", "velocity"), write=_write, read=_read),
     simulate=Tachometers,
     problem=_problem,
+    numbers=lambda reading, robot: in_order(reading.value.names, reading.value.speeds, robot.actuators.wheel_names),
     plausible=(
         Plausible("std", "rad/s", (0.0, 100.0), (0.0, 2.0), "tachometers: a thousandth of the speed"),
         Plausible("rate_hz", "Hz", (0.05, 1e4), (0.5, 1000.0), "wheel electronics"),

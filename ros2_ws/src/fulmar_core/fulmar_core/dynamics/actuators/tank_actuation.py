@@ -1,0 +1,54 @@
+"""Between commands and what thrusters do that a tank feeds: as every actuator, with the gas that is gone as memory."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fulmar_core.dynamics.actuators.actuation import ActuationState
+from fulmar_core.robots.actuators.family import Actuators
+from fulmar_core.robots.actuators.tank import Tank
+from fulmar_core.states.arrays import array_namespace, clip
+from fulmar_core.states.rotation import Array
+from fulmar_core.worlds.world import World
+
+
+class TankActuation(ActuationState):
+    """What the valves of a batch of worlds do now; thrust follows the pressure at the beginning of a control step."""
+
+    MUTABLE = (*ActuationState.MUTABLE, "_filled", "_fallen", "_share")
+
+    def __init__(self, actuators: Actuators, tank: Tank, world: World, *args: Any, **kwargs: Any) -> None:
+        """Begin with full tanks, or with less as the worlds say; the rest as in `ActuationState`."""
+        super().__init__(*args, **kwargs)
+        self._actuators, self._tank = actuators, tank
+        self._filled: Array = world.tank_fill
+        self._fallen: Array = array_namespace(self.applied).zeros_like(
+            self.applied[0]
+        )  # since the start [Pa]
+        self._share = self._tank.share(self.pressure)
+
+    @property
+    def pressure(self) -> Array:
+        """In each tank, shape (worlds,) [Pa]."""
+        return clip(self._tank.pressure * self._filled - self._fallen, 0.0, None)
+
+    def reset(self, which: Array, safe: Array) -> None:
+        """Bring some worlds back to the safe state, with fresh tanks; arguments as in `ActuationState.reset`."""
+        super().reset(which, safe)
+        fallen = array_namespace(safe).asarray(self._fallen, copy=True)
+        fallen[which] = 0.0
+        self._fallen = fallen
+
+    def begin(self, command: Array, world: World, noise: Array | None) -> None:
+        """Take a new command; see `ActuationState.begin`."""
+        super().begin(command, world, noise)
+        self._filled = world.tank_fill
+        self._share = self._tank.share(self.pressure)
+        self.gain = self.gain * self._share
+
+    def advance(self, dt: float, *, latest_s: float) -> Array:
+        """Let time pass, and gas flow; see `ActuationState.advance`."""
+        applied = super().advance(dt, latest_s=latest_s)
+        thrust = self._actuators.total_thrust(applied) * self._share
+        self._fallen = self._fallen + self._tank.fall(thrust) * dt
+        return applied
