@@ -30,6 +30,7 @@ class OwnController:
     Attributes:
         estimator: The user's own `estimator`, where the class has one; see `Controller`.
         readings: The user's own `readings`, where the class has them; see `Controller`.
+        observer: The user's own `observer`, likewise.
     """
 
     def __init__(self, path: str, robot: Robot, task: Task, control_hz: float) -> None:
@@ -59,6 +60,7 @@ class OwnController:
                 "it must be a HealthSettings or None."
             )
         self.estimator: HealthSettings | None = estimator
+        self.observer = getattr(self._own, "observer", None)
         self.readings = _readings(path, getattr(self._own, "readings", ()), robot)
 
     def reset(self) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 import onnxruntime
 
 from fulmar_core.config.errors import BundleError
-from fulmar_core.controllers.controller import Inputs
+from fulmar_core.controllers.controller import Inputs, StateObserver
 from fulmar_core.controllers.disturbance_inputs import ESTIMATOR, with_disturbances
 from fulmar_core.loop.bundle_signature import verify_bundle
 from fulmar_core.loop.policy_bundle import (
@@ -69,6 +69,7 @@ class Policy:
         self._observer = Observer(robot, task)
         self.estimator = ESTIMATOR if takes_disturbances(self.passport.observation_names, robot) else None
         self.readings: tuple[str, ...] = ()
+        self.observer: StateObserver[Any] | None = None
         self._session = _open(bundle)
         self._memory: np.ndarray | None = None
         _check_shapes(self._session, self.passport, folder)

@@ -162,7 +162,7 @@ def test_a_controller_forgets_at_a_pause_as_in_the_node():
 
     class Forgetful:
         name, control_hz, estimator = "forgetful", 5.0, None
-        readings = ()
+        readings, observer = (), None
 
         def reset(self):
             seen.append("reset")

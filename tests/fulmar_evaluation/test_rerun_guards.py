@@ -138,7 +138,7 @@ class Refused:
     """Says what no actuator can do, from some step on."""
 
     name, control_hz, estimator = "refused", 5.0, None
-    readings = ()
+    readings, observer = (), None
 
     def __init__(self, course: ControlSteps, *, after: int, raises: bool = False) -> None:
         self._left, self._raises = after, raises

@@ -155,7 +155,7 @@ class Swaying:
     """Commands that depend on the episode alone, so that every simulator gets the same ones."""
 
     name, estimator = "swaying", None
-    readings = ()
+    readings, observer = (), None
 
     def __init__(self, robot):
         self.robot, self.control_hz = robot, robot.timing.control_hz

@@ -144,7 +144,7 @@ class Recorder:
     """Stands, and keeps the targets that it is shown."""
 
     name, estimator = "recorder", None
-    readings = ()
+    readings, observer = (), None
 
     def __init__(self, robot):
         self.control_hz, self.targets = robot.timing.control_hz, []

@@ -26,7 +26,7 @@ class Random:
     """Opens valves at random, and keeps what a network would be shown."""
 
     name, control_hz, estimator = "random", ROBOT.timing.control_hz, ESTIMATOR
-    readings = ()
+    readings, observer = (), None
 
     def __init__(self):
         self._rng, self._observer = np.random.default_rng(1), Observer(ROBOT, TASK)

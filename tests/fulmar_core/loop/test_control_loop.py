@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -27,7 +29,7 @@ class Scripted:
     """Answers with what it is given, and counts resets."""
 
     name, estimator = "scripted", None
-    readings = ()
+    readings, observer = (), None
 
     def __init__(self, answer=GENTLE, *, robot=BASE, estimator=None):
         self.control_hz, self.estimator = robot.timing.control_hz, estimator
@@ -253,3 +255,29 @@ def test_a_controller_without_an_estimator_gets_no_estimate():
     assert loop.controller is other
     assert other.inputs.estimates is None
     assert loop.estimate is None
+
+
+class Smoothed:
+    """An observer: halves of the state before and of the measured one."""
+
+    def __init__(self):
+        self.past = None
+
+    def reset(self):
+        self.past = None
+
+    def update(self, measured, previous):
+        x = measured.x if self.past is None else 0.5 * (self.past + measured.x)
+        self.past = x
+        return replace(measured, x=x)
+
+
+def test_a_controller_acts_on_what_its_observer_believes_until_it_forgets():
+    controller = Scripted()
+    controller.observer = Smoothed()
+    loop = loop_of(controller)
+    seen = [loop.inputs(at(x), {}, stamp) for x, stamp in ((0.0, 0), (1.0, PERIOD_NS))]
+    assert [inputs.believed.x[0] for inputs in seen] == [0.0, 0.5]
+    assert seen[1].state.x[0] == 1.0
+    loop.reset()
+    assert loop.inputs(at(1.0), {}, 2 * PERIOD_NS).believed.x[0] == 1.0

@@ -31,7 +31,7 @@ class Habit:
 
     name = "habit"
     estimator = None
-    readings = ()
+    readings, observer = (), None
 
     def __init__(self, robot, task, *, boldness=0.3):
         self.control_hz = robot.timing.control_hz
@@ -101,7 +101,7 @@ class Restless:
     """Opens one valve after the other, and keeps the estimates that it gets."""
 
     name, control_hz, estimator = "restless", 5.0, HealthSettings(retry_s=0.0)
-    readings = ()
+    readings, observer = (), None
 
     def reset(self):
         self.estimates = []

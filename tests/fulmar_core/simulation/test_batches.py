@@ -20,7 +20,7 @@ class Eager:
 
     name = "eager"
     estimator = None
-    readings = ()
+    readings, observer = (), None
 
     def __init__(self, robot, task):
         self.control_hz = robot.timing.control_hz

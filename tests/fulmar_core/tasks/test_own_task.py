@@ -73,7 +73,7 @@ class Still:
     """Stands where it is."""
 
     name, control_hz, estimator = "still", 10.0, None
-    readings = ()
+    readings, observer = (), None
 
     def reset(self):
         pass

@@ -144,6 +144,7 @@ class ControllerNode(LifecycleNode):
             on_swap=self._on_swap,
             on_applied=self._on_applied,
             on_bearing=self._on_bearing if self.settings.has_bearing(self.robot) else None,
+            believes=any(each.controller.observer is not None for each in switch.known),
             lockstep=self.settings.lockstep,
         )
         self.wires.publish_metadata(switch.current.metadata)
@@ -342,6 +343,7 @@ class ControllerNode(LifecycleNode):
         self._status.steps += 1
         if step is not None:
             self.wires.publish_reasoning(step.observation[0], step.action.ravel(), stamp)
+            self._publish_believed(inputs, stamp)
             self._publish_estimate(stamp)
         self._watch_actuators(measurement, decision)
         if step is not None and guard.note(step.refusal):
@@ -364,6 +366,11 @@ class ControllerNode(LifecycleNode):
             if activated:
                 publish()
             return activated
+
+    def _publish_believed(self, inputs: Inputs | None, stamp: int) -> None:
+        """Publish the state that the controller acted on, where it has an observer of its own."""
+        if inputs is not None and inputs.believed is not None and self.wires.believed_wanted:
+            self.wires.publish_believed(inputs.believed[0].to_rigid(), stamp)
 
     def _publish_estimate(self, stamp: int) -> None:
         """Publish the estimate of valves and push that the controller received."""

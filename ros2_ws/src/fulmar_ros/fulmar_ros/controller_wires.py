@@ -23,6 +23,7 @@ from fulmar_core.robots.topics import (
     ACTUATORS_HEALTH,
     ACTUATORS_STATE,
     AIR_BEARING,
+    BELIEVED,
     ESTOP,
     ESTOP_RELEASED,
     METADATA,
@@ -36,8 +37,9 @@ from fulmar_core.robots.topics import (
     command_wire,
     goal_wires,
 )
+from fulmar_core.states.state import RigidBodyState
 from fulmar_core.tasks import Task
-from fulmar_ros.convert import TwistWriter, VectorWriter
+from fulmar_ros.convert import OdometryWriter, TwistWriter, VectorWriter
 from fulmar_ros.goal_messages import TYPES, GoalMessage
 from fulmar_ros.health import Health
 from fulmar_ros.operator_subscription import destroy_all, subscribe_every
@@ -66,6 +68,7 @@ class ControllerWires:
         on_swap: Callable[[String], None],
         on_applied: Callable[[bytes], None],
         on_bearing: Callable[[Bool], None] | None,
+        believes: bool,
         lockstep: bool,
     ) -> None:
         """Create every endpoint.
@@ -84,6 +87,7 @@ class ControllerWires:
             on_swap: Receives the folder of the policy that shall take over.
             on_applied: Receives what the actuators do, serialised.
             on_bearing: Receives whether the air bearing is on; None where there is none.
+            believes: Whether a controller has an observer whose state is published.
             lockstep: Ask for lost odometry again, since the plant waits, and wait for readers that lag behind.
         """
         wire = command_wire(robot)
@@ -98,11 +102,12 @@ class ControllerWires:
         self._health = None
         if can_estimate_health(robot):
             self._health = node.create_publisher(JointState, ACTUATORS_HEALTH.name, qos(ACTUATORS_HEALTH))
+        self._believed = node.create_publisher(Odometry, BELIEVED.name, qos(BELIEVED)) if believes else None
         self._metadata = node.create_publisher(String, METADATA.name, publisher_qos(METADATA))
         status = node.create_publisher(DiagnosticArray, STATUS.name, publisher_qos(STATUS))
         self.health = Health(node, f"{name_of(node, robot)}: controller", status)
         self._actuators, self._frames = robot.actuators, own_frames(node, robot)
-        streams = (self._command, self._observation, self._action, self._health)
+        streams = (self._command, self._observation, self._action, self._health, self._believed)
         self._streams = [publisher for publisher in streams if publisher is not None]
         self._publishers = (*self._streams, self._metadata, *self.health.publishers)
         self._write_command = self._command_writer()
@@ -110,6 +115,7 @@ class ControllerWires:
         self._action_size = len(robot.actuators.names)
         self._write_action = VectorWriter(robot.actuators.names)
         self._write_health = VectorWriter(robot.actuators.names)
+        self._write_believed = OdometryWriter(None, frame=self._frames.odom, child_frame=self._frames.base)
         self._write_observation = VectorWriter(observation_names, "position")
         odometry_qos = subscriber_qos(ODOMETRY, reliable=lockstep)
         self._node = node
@@ -212,6 +218,16 @@ class ControllerWires:
         """Publish the estimated effectiveness of each actuator, where `health_wanted`."""
         assert self._health is not None
         self._publish(self._health, self._write_health.raw(effectiveness, stamp))
+
+    @property
+    def believed_wanted(self) -> bool:
+        """Whether the state that the controller believes has a subscriber."""
+        return self._believed is not None and bool(self._believed.get_subscription_count())
+
+    def publish_believed(self, state: RigidBodyState, stamp: int) -> None:
+        """Publish the state that the controller acted on, where `believed_wanted`."""
+        assert self._believed is not None
+        self._publish(self._believed, self._write_believed.raw(state, stamp))
 
     def publish_metadata(self, text: str) -> None:
         """Publish the metadata of the controller that acts: a JSON object."""

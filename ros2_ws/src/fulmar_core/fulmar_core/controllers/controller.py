@@ -35,6 +35,24 @@ class Inputs(Generic[S]):
     # `wheels` the speeds of reaction wheels [rad/s]; `inertia`, see `INERTIA`. What is not measured, or is too old, is
     # not there.
     readings: Readings = field(default_factory=dict)
+    believed: S | None = None  # of the controller's `observer`; None without one
+
+
+class StateObserver(Protocol[S]):
+    """What a controller believes of the state, from what is measured and what it commanded."""
+
+    def reset(self) -> None:
+        """Forget the past."""
+        ...
+
+    def update(self, measured: S, previous: np.ndarray) -> S:
+        """The believed state after a measurement.
+
+        Args:
+            measured: State of n robots, shapes (n,).
+            previous: Command of the step before, shape (n, m).
+        """
+        ...
 
 
 class Controller(Protocol):
@@ -44,6 +62,8 @@ class Controller(Protocol):
         name: Under which it was chosen.
         control_hz: How often it is asked [Hz].
         estimator: Settings of the actuator estimator whose estimate it wants among its inputs; None for none.
+        observer: Makes the believed state that it acts on; None: it acts on the measured one. The control loop runs it,
+            and its node publishes what it says.
         readings: What it wants to find in `Inputs.readings`: names of sensors of the robot, and of what estimators say.
     """
 
@@ -51,6 +71,7 @@ class Controller(Protocol):
     control_hz: float
     estimator: HealthSettings | None
     readings: tuple[str, ...]
+    observer: StateObserver[Any] | None
 
     def reset(self) -> None:
         """Forget everything about the past: a new goal, a new episode, or time jumped."""

@@ -33,7 +33,7 @@ class FlightLaw(Law):
 
     def believe(self, noise: ObserverNoise | None, *, any_heading: bool = False) -> None:
         """Believe states as of a `FlightObserver`, whose arguments these are, or, without noise, as measured."""
-        self._observer = (
+        self.observer = (
             None if noise is None else FlightObserver(self.robot, noise, self._dt, any_heading=any_heading)
         )
 
@@ -45,14 +45,14 @@ class FlightLaw(Law):
     def reset(self) -> None:
         """Forget the past."""
         super().reset()
-        if self._observer is not None:
-            self._observer.reset()
+        if self.observer is not None:
+            self.observer.reset()
 
     def believed(self, inputs: Inputs) -> SpatialState:
         """The believed state of n craft."""
-        state = inputs.state
+        state = inputs.state if inputs.believed is None else inputs.believed
         assert isinstance(state, SpatialState)
-        return state if self._observer is None else self._observer.update(state, inputs)
+        return state
 
     def saturated(self, command: np.ndarray) -> np.ndarray:
         """Whether limits cut commands (n, m) of ailerons, elevators and motors, shape (n, 3): integrals rest there."""

@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_core.controllers.controller import Inputs
 from fulmar_core.controllers.lqr import regulator
 from fulmar_core.dynamics.flight_dynamics import FlightDynamics
 from fulmar_core.dynamics.flight_schedule import MOTION, RATE, SPEED, flight_model
@@ -84,14 +83,14 @@ class FlightObserver:
         """Forget the past."""
         self._state: SpatialState | None = None
 
-    def update(self, measured: SpatialState, inputs: Inputs) -> SpatialState:
-        """The believed state after a measurement, shapes (n,); the step before was commanded `inputs.previous`."""
+    def update(self, measured: SpatialState, previous: np.ndarray) -> SpatialState:
+        """See `StateObserver.update`."""
         if self._state is None or len(self._state.x) != len(measured.x):
             self._state = measured
             self._world: Any = still_air(self._robot, len(measured.x))
-            self._actuation = actuation_of(self._robot, inputs.previous.T.copy())
+            self._actuation = actuation_of(self._robot, previous.T.copy())
             return measured
-        self._actuation.begin(inputs.previous.T, self._world, None)
+        self._actuation.begin(previous.T, self._world, None)
         ahead = self._dynamics.move(
             self._state,
             self._actuation,

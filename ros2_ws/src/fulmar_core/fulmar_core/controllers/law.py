@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from fulmar_core.controllers.controller import Inputs
+from fulmar_core.controllers.controller import Inputs, StateObserver
 from fulmar_core.estimators.actuator_health.filters import HealthSettings
 from fulmar_core.robots.robot import Robot
 from fulmar_core.tasks import Task
@@ -23,6 +23,7 @@ class Law(ABC):
     Attributes:
         estimator: See `Controller`.
         readings: See `Controller`.
+        observer: See `Controller`.
         seeds: Of the noise of a law that draws any, in turns among craft side by side.
     """
 
@@ -31,6 +32,7 @@ class Law(ABC):
 
     seeds: tuple[int, ...] = ()
     readings: tuple[str, ...] = ()
+    observer: StateObserver[Any] | None = None
 
     def __init__(
         self,

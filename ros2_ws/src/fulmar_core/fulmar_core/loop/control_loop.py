@@ -93,6 +93,8 @@ class ControlLoop:
     def reset(self) -> None:
         """Let controller and estimator forget the past: a new goal or episode, or time or place jumped."""
         self._controller.reset()
+        if self._controller.observer is not None:
+            self._controller.observer.reset()
         self._forget_estimates()
 
     def step(self, measured: State, readings: Readings, stamp_ns: int) -> Step:
@@ -126,6 +128,7 @@ class ControlLoop:
             stamp_ns,
             self.dt,
             readings,
+            self._believed(state),
         )
 
     def act(self, inputs: Inputs) -> Step:
@@ -162,6 +165,11 @@ class ControlLoop:
             self.goal = self.task.advance(self.goal, state, time_s)
         assert self.goal is not None
         return self.goal
+
+    def _believed(self, state: Any) -> Any:
+        """What the controller's observer makes of a measurement; None without one."""
+        observer = self._controller.observer
+        return None if observer is None else observer.update(state, self.previous)
 
     def _estimator_for(self, controller: Controller) -> ActuatorEstimator | None:
         return (

@@ -88,6 +88,12 @@ OBSERVATION = Wire(
     "input vector of the controller; names are its terms",
     unit="of each term, see [observations.md](observations.md)", frame="of each term",
 )  # fmt: skip
+BELIEVED = Wire(
+    "controller/believed", "nav_msgs/msg/Odometry", "controller", "stream",
+    "control rate, from a controller with an observer",
+    "state that the controller acts on, where that is not the measured one, stamped as that", unit="m, m/s, rad/s",
+    frame="`odom`; twist in `base_link`",
+)  # fmt: skip
 ACTION = Wire(
     "controller/action", "sensor_msgs/msg/JointState", "controller", "stream", "control rate",
     "output vector of the controller, before limits", unit=EFFORT_UNIT,
@@ -218,7 +224,7 @@ DESCRIPTION = Wire(
 
 WIRES: tuple[Wire, ...] = (
     *SENSOR_WIRES.values(), MOCAP, TRUTH, ACTUATORS_STATE, ACTUATORS_HEALTH, CLOCK, COMMAND, VELOCITY_COMMAND,
-    OBSERVATION, ACTION, METADATA, STATUS, DIAGNOSTICS, GOAL_POSE, GOAL_POINT, GOAL_PATH, GOAL_POSES,
+    OBSERVATION, ACTION, BELIEVED, METADATA, STATUS, DIAGNOSTICS, GOAL_POSE, GOAL_POINT, GOAL_PATH, GOAL_POSES,
     GOAL_VELOCITY, OBSTACLES, MARKERS, BLOCK, AIR_BEARING, DEVICE_STATE, ESTOP, ESTOP_RELEASED, TELEOP, JOY, SWAP,
     TRANSFORMS, STATIC_TRANSFORMS, DESCRIPTION, INERTIA, INERTIA_COVARIANCE, INERTIA_STATUS, EVENTS, EVENTS_2, RATE,
     RATE_STATUS, PERIOD, ANSWER,
