@@ -45,12 +45,11 @@ class KobukiDriver(DeviceDriver):
         Raises:
             DeviceError: Nothing is there, or it does not speak Kobuki's protocol.
         """
-        assert isinstance(robot.actuators, DifferentialDrive)  # settings refuse any other
-        self._wheels, self._wiring = robot.actuators, settings.wiring
+        self._wheels, self._wiring = robot.actuated_by(DifferentialDrive), settings.wiring
         self._feedback = Feedback(f"Kobuki base at {settings.port}", settings.silent_s)
         self._decoder, self._time = Decoder(), DeviceTime(WRAP_MS)
         self._odometry = WheelOdometry(COUNT * WHEEL_RADIUS)
-        self._fastest = robot.limits.speed + 0.5 * robot.actuators.track * robot.limits.yaw_rate  # rim [m/s]
+        self._fastest = robot.limits.speed + 0.5 * self._wheels.track * robot.limits.yaw_rate  # rim [m/s]
         self._jumps = 0
         self._standing = StalledWheels()
         self._begin: tuple[float, float, float] | None = None

@@ -56,8 +56,7 @@ class XPlaneDriver(DeviceDriver):
         Raises:
             DeviceError: Nothing answers.
         """
-        assert isinstance(robot.actuators, ControlSurfaces)  # as of `settings.FITS`
-        self._robot, self._actuators, self._settings = robot, robot.actuators, settings
+        self._robot, self._actuators, self._settings = robot, robot.actuated_by(ControlSurfaces), settings
         self._feedback = Feedback(f"X-Plane at {settings.port}", settings.silent_s, hint=HINT)
         origin = settings.origin
         self._frame = LocalFrame(origin.latitude, origin.longitude) if origin else None

@@ -55,8 +55,7 @@ def _function(name: str, body: Node) -> Node:
 
 def aircraft_xml(robot: Robot) -> str:
     """The model of an aircraft; see `write_aircraft` for other robots."""
-    frame, craft = robot.airframe, robot.actuators
-    assert frame is not None and isinstance(craft, ControlSurfaces)  # as of `write_aircraft`
+    frame, craft = robot.wings, robot.actuated_by(ControlSurfaces)
     root = _node("fdm_config", name=robot.name, version="2.0", release="BETA")
     about = f"{robot.title}; written by Fulmar from configs/robots/{robot.name}.yaml"
     root.append(_node("fileheader", _node("author", text="Fulmar"), _node("description", text=about)))
@@ -283,7 +282,7 @@ def write_aircraft(robot: Robot, folder: Path) -> Path:
     """
     from fulmar_core.config.errors import ConfigError
 
-    if not robot.flies:
+    if robot.airframe is None:
         raise ConfigError(f"'{robot.name}' is no aircraft, and JSBSim flies nothing else.")
     path = folder / robot.name / f"{robot.name}.xml"
     path.parent.mkdir(parents=True, exist_ok=True)

@@ -60,8 +60,7 @@ class OwnCraft:
         Raises:
             ConfigError: JSBSim has no such model or cannot run it; a surface does not move; no level flight.
         """
-        frame, craft = robot.airframe, robot.actuators
-        assert frame is not None and isinstance(craft, ControlSurfaces)  # as of `jsbsim_model`
+        frame, craft = robot.wings, robot.actuated_by(ControlSurfaces)
         self._robot, self._name = robot, name
         self._folder = tempfile.TemporaryDirectory(prefix="fulmar-jsbsim-")
         _copy_model(name, Path(self._folder.name))

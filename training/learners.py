@@ -81,7 +81,7 @@ def first_action(robot: Robot, task: Task) -> np.ndarray | None:
 
     An aircraft begins in trim: without thrust every craft would be in the water before it has learned anything.
     """
-    if not robot.flies or robot.airframe is None:
+    if robot.airframe is None:
         return None
     start, goal = task.draw(Draws.of_episode(0, 0), robot, training=True)
     # Where targets are no places, the height is that of the start.

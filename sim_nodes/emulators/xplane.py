@@ -47,8 +47,7 @@ class XPlaneEmulator:
             clock: Simulated time, which stands still while `paused` [s].
             port: 0 takes any free one.
         """
-        assert isinstance(robot.actuators, ControlSurfaces)
-        self._actuators, self._clock = robot.actuators, clock
+        self._actuators, self._clock = robot.actuated_by(ControlSurfaces), clock
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.bind(("127.0.0.1", port))
         self._socket.setblocking(False)

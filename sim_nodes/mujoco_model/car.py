@@ -22,8 +22,7 @@ class Car(Chassis):
     """Every wheel has a motor that turns it at the speed of rolling without slip, all with the same largest force."""
 
     def __init__(self, robot: Robot) -> None:
-        assert isinstance(robot.actuators, Ackermann)
-        self._car = robot.actuators
+        self._car = robot.actuated_by(Ackermann)
         super().__init__(
             robot,
             wheel_radius=self._car.wheel_radius,

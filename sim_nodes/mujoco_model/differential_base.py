@@ -18,8 +18,7 @@ class DifferentialBase(Chassis):
     """Wheels that follow their speeds with the lag of the YAML, as hard as `wheel_force` allows."""
 
     def __init__(self, robot: Robot) -> None:
-        assert isinstance(robot.actuators, DifferentialDrive)
-        self._drive = robot.actuators
+        self._drive = robot.actuated_by(DifferentialDrive)
         super().__init__(
             robot,
             wheel_radius=self._drive.wheel_radius,

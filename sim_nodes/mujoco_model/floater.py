@@ -37,13 +37,12 @@ class Floater:
         return self.water is None
 
     def __init__(self, robot: Robot) -> None:
-        assert isinstance(robot.actuators, Pushing)  # `robot_model_of` has others for wheels
-        self._robot, self._actuators = robot, robot.actuators
+        self._robot, self._actuators = robot, robot.actuated_by(Pushing)
         self._body = 0
         self._planar, self._swims = robot.body.planar, robot.hydrodynamics is not None
         self.water: Water | None = None
         if robot.hydrodynamics is not None:
-            pushes = robot.actuators.pushes
+            pushes = self._actuators.pushes
             places = np.array([push.position for push in pushes])
             self.water = Water(robot.hydrodynamics, places, np.array([push.direction for push in pushes]))
 

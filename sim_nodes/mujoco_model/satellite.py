@@ -31,8 +31,7 @@ class Satellite:
     rest_height = 0.0
 
     def __init__(self, robot: Robot) -> None:
-        assert isinstance(robot.actuators, ReactionWheels)  # as of `robot_model_of`
-        self._robot, self._wheels = robot, robot.actuators
+        self._robot, self._wheels = robot, robot.actuated_by(ReactionWheels)
         self._body = 0
         self._spins = np.zeros(0, dtype=int)
         unloading = self._wheels.unloading

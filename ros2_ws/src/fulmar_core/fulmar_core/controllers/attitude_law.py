@@ -44,9 +44,7 @@ class AttitudeLaw(Law):
 
     def bind(self) -> None:
         """See `Law.bind`."""
-        if not isinstance(self.robot.actuators, ReactionWheels):
-            raise ValueError("the law turns satellites by reaction wheels; this robot has none.")
-        self._wheels = self.robot.actuators
+        self._wheels = self.robot.actuated_by(ReactionWheels)
         if np.linalg.matrix_rank(self._wheels.axes) < 3:
             raise ValueError("the axes of its wheels lie in one plane: about one axis it cannot turn.")
         self.frame = SpaceFrame(self.task)

@@ -74,8 +74,7 @@ def attitude_pd_gains(robot: Robot) -> AttitudePdGains:
 
 def attitude_bandwidth(robot: Robot) -> tuple[float, float]:
     """Bandwidth of the closed loop, and turn rate of slews [rad/s]."""
-    wheels = robot.actuators
-    assert isinstance(wheels, ReactionWheels)
+    wheels = robot.actuated_by(ReactionWheels)
     largest = float(np.linalg.eigvalsh(robot.body.inertia_matrix)[-1])
     bandwidth = min(BANDWIDTH, math.sqrt(wheels.torque / (PRECISION * largest)))
     return bandwidth, min(robot.performance.yaw_rate, MOMENTUM * wheels.top_momentum / largest)

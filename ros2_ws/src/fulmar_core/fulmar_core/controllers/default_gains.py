@@ -48,8 +48,7 @@ def lqr_weights(robot: Robot) -> LqrWeights:
     Raises:
         ValueError: They do not push in every direction, or do not turn it both ways.
     """
-    thrusters = robot.actuators
-    assert isinstance(thrusters, Pushing)
+    thrusters = robot.actuated_by(Pushing)
     force = _least(thrusters, [0, 1], DIRECTIONS)
     torque = _least(thrusters, [5], np.array([[1.0], [-1.0]]))
     strongest = float(thrusters.full_thrust.max())
@@ -116,8 +115,7 @@ def _health_settings(robot: Robot, thrusters: Pushing) -> HealthSettings:
 
 def polar_gains(robot: Robot) -> PolarGains:
     """Gains of the polar law: turning is as fast as wheels and body follow, driving a third of that."""
-    drive = robot.actuators
-    assert isinstance(drive, DifferentialDrive)
+    drive = robot.actuated_by(DifferentialDrive)
     slew = drive.response.slew or (math.inf, math.inf)
     acceleration = min(slew[0], 2.0 * drive.wheel_force / robot.body.mass)
     angular = min(slew[1], drive.wheel_force * drive.track / robot.body.inertia[2])
@@ -138,8 +136,7 @@ def polar_gains(robot: Robot) -> PolarGains:
 
 def line_of_sight_gains(robot: Robot) -> LineOfSightGains:
     """Gains of the line of sight: the heading is as fast as propellers and hull follow, the rest in proportion."""
-    propellers, water = robot.actuators, robot.hydrodynamics
-    assert isinstance(propellers, Propellers)
+    propellers, water = robot.actuated_by(Propellers), robot.hydrodynamics
     arms, (astern, ahead) = propellers.lever_arms, (-propellers.curve[0], propellers.curve[-1])
     if not np.ptp(arms) > 0.0:
         raise ValueError("the propellers are not side by side, so they do not turn the boat.")
@@ -187,8 +184,7 @@ def _terminal(robot: Robot, axis: int, effort: float) -> float:
 
 def pure_pursuit_gains(robot: Robot) -> PurePursuitGains:
     """Gains of pure pursuit: look as far ahead as the tightest circle is wide, brake as hard as the wheels do."""
-    car = robot.actuators
-    assert isinstance(car, Ackermann)
+    car = robot.actuated_by(Ackermann)
     slew = car.response.slew[:1] or (math.inf,)
     return PurePursuitGains(
         look_ahead=1.4 * car.wheelbase / math.tan(car.max_steering),

@@ -43,8 +43,7 @@ class ExciteWheels(Law):
 
     def bind(self) -> None:
         """See `Law.bind`."""
-        wheels, how = self.robot.actuators, self.gains
-        assert isinstance(wheels, ReactionWheels)  # as of `excite.excite_of`
+        wheels, how = self.robot.actuated_by(ReactionWheels), self.gains
         gain = gain_of(self.robot.name, wheels)
         self.profile = profile_of(how.profile, wheels, gain=gain, seed=how.seed, saturate=how.saturate)
         self._unloading = len(wheels.names) - wheels.count

@@ -25,10 +25,8 @@ class FlightLaw(Law):
         Raises:
             ValueError: The robot is no aircraft.
         """
-        if not isinstance(self.robot.actuators, ControlSurfaces) or self.robot.airframe is None:
-            raise ValueError("the law flies aircraft; this robot is none.")
-        self._craft = self.robot.actuators
-        self._speed = self.robot.airframe.speed
+        self._craft = self.robot.actuated_by(ControlSurfaces)
+        self._speed = self.robot.wings.speed
         self._dt = self.robot.timing.substeps(self.control_hz) * self.robot.timing.physics_dt
 
     def believe(self, noise: ObserverNoise | None, *, any_heading: bool = False) -> None:

@@ -189,8 +189,7 @@ class FlightLqr(FlightLqi):
 
 def flight_lqi_weights(robot: Robot) -> FlightWeights:
     """Weights of an aircraft without a file: those of airship_v7, of the place in proportion to the span."""
-    assert robot.airframe is not None
-    size = robot.airframe.span / 5.0
+    size = robot.wings.span / 5.0
     noise = ObserverNoise() if robot.sensors.odometry.position.std > 0.0 else None
     return FlightWeights(
         height=200.0 / size**2,

@@ -61,11 +61,10 @@ class FlightObserver:
         Raises:
             ConfigError: The craft has no trim at its speed.
         """
-        assert robot.airframe is not None
         self._robot, self._dt, self._any_heading = robot, dt, any_heading
         self._dynamics = FlightDynamics(robot, turbulent=False)
         self._substeps = robot.timing.substeps(1.0 / dt)
-        model = flight_model(robot, find_trim(robot, robot.airframe.speed, 0.5 * robot.airframe.span), dt)
+        model = flight_model(robot, find_trim(robot, robot.wings.speed, 0.5 * robot.wings.span), dt)
         its = robot.sensors.odometry
         spread = np.repeat(
             [max(c.std, LEAST) for c in (its.position, its.heading, its.velocity, its.yaw_rate)], (2, 3, 3, 3)

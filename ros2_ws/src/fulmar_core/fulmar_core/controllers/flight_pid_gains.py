@@ -48,8 +48,7 @@ class _Loops:
     """The loops of one craft, and the modes that it has with them."""
 
     def __init__(self, robot: Robot) -> None:
-        craft, frame = robot.actuators, robot.airframe
-        assert isinstance(craft, ControlSurfaces) and frame is not None  # as of `FlightLaw.fly`
+        craft, frame = robot.actuated_by(ControlSurfaces), robot.wings
         self._robot, self._craft, self._frame = robot, craft, frame
         trim = find_trim(robot, frame.speed, 0.5 * frame.span)
         self._rates, self._effects = continuous_model(robot, trim)

@@ -58,12 +58,11 @@ class FlightRollouts:
             step_s: Time step [s].
             share: Of the law's answer to departures that they follow; 0: commands of level flight alone [-].
         """
-        assert robot.airframe is not None  # as of `FlightLaw.fly`
         timing = replace(robot.timing, physics_dt=step_s, control_hz=1.0 / step_s)
         self._robot = replace(robot, timing=timing)
         self._dynamics = FlightDynamics(self._robot, turbulent=False)
         self._law, self._cost, self._dt, self._share = law, cost, step_s, share
-        self._speed, self._lowest = robot.airframe.speed, -robot.hull_span[0]
+        self._speed, self._lowest = robot.wings.speed, -robot.hull_span[0]
         most = cost.alpha_deg
         self._alphas_deg = loss_angles(robot) if most is None else (-most, most)
         self._world: Any = still_air(self._robot, 1)
@@ -132,8 +131,7 @@ def loss_angles(robot: Robot) -> tuple[float, float]:
 
     They are the ends of what the coefficients are for, where these lie within most of the stall angle either way.
     """
-    assert robot.airframe is not None
-    coefficients, stall = robot.airframe.aerodynamics, 0.75 * robot.airframe.stall_deg
+    coefficients, stall = robot.wings.aerodynamics, 0.75 * robot.wings.stall_deg
     if coefficients.alpha_range is None:
         return -stall, stall
     low, high = (end if coefficients.unit == "deg" else math.degrees(end) for end in coefficients.alpha_range)

@@ -65,8 +65,7 @@ class LineOfSight(PlanarLaw):
 
     def prepare(self) -> None:
         """Prepare the allocation."""
-        propellers = self.robot.actuators
-        assert isinstance(propellers, Propellers)
+        propellers = self.robot.actuated_by(Propellers)
         self._allocation = PropellerAllocation(propellers, least=self.gains.least_thrust)
 
     def command(self, inputs: Inputs) -> np.ndarray:

@@ -104,9 +104,7 @@ class Lqr(PlanarLaw):
 
     def prepare(self) -> None:
         """Solve for the gain and list the valve combinations."""
-        robot, gains = self.robot, self.gains
-        if not isinstance(robot.actuators, Pushing):
-            raise ValueError("the LQR allocates valves or fans; this robot has neither.")
+        robot, gains, actuators = self.robot, self.gains, self.robot.actuated_by(Pushing)
         self._most_turn = np.deg2rad(gains.heading_error_limit_deg)
         dt = 1.0 / self.control_hz
         model = linearise_wrench(robot, at_rest(*np.zeros(3)), np.zeros(3), dt)
@@ -120,11 +118,11 @@ class Lqr(PlanarLaw):
         best = regulator(a, b, dt * np.diag(q[used]), r)
         self.cost_to_go, self.gain = best.cost_to_go, best.gain
         self._hessian = hessian = best.hessian
-        self.authority = ForceAuthority(robot.actuators)
+        self.authority = ForceAuthority(actuators)
         # How far from the goal the law asks for 1 m/s [s].
         self.lead = 1.0 if self.frame.tracks else float(self.gain[0, used.index(3)] / self.gain[0, 0])
         self.estimator = gains.observer
-        self.allocation = allocation_of(robot.actuators, weight=hessian, cost=dt * gains.open_valve)
+        self.allocation = allocation_of(actuators, weight=hessian, cost=dt * gains.open_valve)
 
     def reset(self) -> None:
         """Forget the past."""

@@ -79,9 +79,9 @@ class LqrDrift(PlanarLaw):
 
     def prepare(self) -> None:
         """Check the valves."""
-        if not isinstance(self.robot.actuators, Thrusters) or self.robot.actuators.continuous:
+        if not self.robot.actuators.binary:
             raise ValueError("DRIFT's LQR opens and closes valves; this robot has none of that kind.")
-        self._valves = self.robot.actuators
+        self._valves = self.robot.actuated_by(Thrusters)
         self._world = nominal_worlds(self.robot, 1)
         self._known: dict[tuple[int, int], np.ndarray] = {}
 

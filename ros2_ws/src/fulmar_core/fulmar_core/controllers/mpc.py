@@ -19,7 +19,6 @@ from fulmar_core.controllers.controller import Inputs
 from fulmar_core.controllers.lqr import Lqr, LqrWeights
 from fulmar_core.controllers.planar_law import PlanarLaw
 from fulmar_core.controllers.valve_allocation import ValveAllocation
-from fulmar_core.robots.actuators.thrusters import Thrusters
 
 
 @dataclass(frozen=True)
@@ -55,7 +54,7 @@ class Mpc(PlanarLaw):
     def prepare(self) -> None:
         """Build the model."""
         robot, gains = self.robot, self.gains
-        if not isinstance(robot.actuators, Thrusters) or robot.actuators.continuous:
+        if not robot.actuators.binary:
             raise ValueError("the MPC opens and closes valves; this robot has none of that kind.")
         base = LqrWeights(**{field.name: getattr(gains, field.name) for field in fields(LqrWeights)})
         self._base = Lqr(robot, self.task, base, control_hz=self.control_hz)

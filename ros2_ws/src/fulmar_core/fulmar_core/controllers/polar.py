@@ -102,9 +102,7 @@ class Polar(PlanarLaw):
 
     @property
     def _drive(self) -> DifferentialDrive:
-        drive = self.robot.actuators
-        assert isinstance(drive, DifferentialDrive)
-        return drive
+        return self.robot.actuated_by(DifferentialDrive)
 
     @property
     def _braking(self) -> float:

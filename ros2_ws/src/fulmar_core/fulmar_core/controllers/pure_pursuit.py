@@ -105,9 +105,7 @@ class PurePursuit(PlanarLaw):
 
     @property
     def _car(self) -> Ackermann:
-        car = self.robot.actuators
-        assert isinstance(car, Ackermann)
-        return car
+        return self.robot.actuated_by(Ackermann)
 
     @property
     def _tightest(self) -> float:

@@ -103,8 +103,7 @@ def _ability(robot: Robot) -> _Ability:
     Raises:
         ValueError: Its actuators do not push in every direction, or do not turn it about every axis.
     """
-    actuators, step = robot.actuators, robot.timing.control_s
-    assert isinstance(actuators, Pushing)
+    actuators, step = robot.actuated_by(Pushing), robot.timing.control_s
     full = actuators.full_thrust[:, None] * actuators.wrench_per_newton
     force, torque = (_weakest(part, shared=actuators.shared_pressure) for part in (full[:, :3], full[:, 3:]))
     strongest = float(actuators.full_thrust.max())

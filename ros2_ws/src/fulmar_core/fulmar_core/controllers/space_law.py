@@ -47,8 +47,6 @@ class SpaceLaw(Law):
 
     def bind(self) -> None:
         """See `Law.bind`."""
-        if not isinstance(self.robot.actuators, Pushing):
-            raise ValueError("the law allocates valves or fans; this robot has neither.")
         self.frame = SpaceFrame(self.task)
         self._modulation: DeltaSigma | None = None
         can = self.robot.performance
@@ -65,8 +63,7 @@ class SpaceLaw(Law):
             lead: How far from the goal the law asks for 1 m/s [s].
             turn_lead: How far from the attitude it asks for 1 rad/s [s].
         """
-        gains, actuators = self.gains, self.robot.actuators
-        assert isinstance(actuators, Pushing)
+        gains, actuators = self.gains, self.robot.actuated_by(Pushing)
         self._lead, self._turn_lead = lead, turn_lead
         cost = gains.open_valve / self.control_hz
         self.allocation = allocation_of(actuators, weight=weight, cost=cost)

@@ -54,13 +54,14 @@ class WrenchChoice:
         Raises:
             ValueError: It has no on/off valves.
         """
-        if not isinstance(robot.actuators, Thrusters) or not robot.actuators.binary:
+        if not robot.actuators.binary:
             raise ValueError(f"'{robot.name}' has no on/off valves, so there is nothing to choose.")
-        _, wrench, _ = ValveAllocation(robot.actuators, weight=np.eye(WRENCH), valve_cost=0.0).every
+        thrusters = robot.actuated_by(Thrusters)
+        _, wrench, _ = ValveAllocation(thrusters, weight=np.eye(WRENCH), valve_cost=0.0).every
         force, torque = np.max(np.hypot(wrench[:, 0], wrench[:, 1])), np.max(np.abs(wrench[:, 2]))
         unit = np.array([force, force, torque / math.sqrt(TORQUE_WEIGHT)])
         cost = valve_cost * VALVE_COST
-        table = ValveAllocation(robot.actuators, weight=np.diag(unit**-2.0), valve_cost=cost)
+        table = ValveAllocation(thrusters, weight=np.diag(unit**-2.0), valve_cost=cost)
         commands, wrench, offset = table.every
         order = ORDER_COST * np.arange(len(commands))
         slope = 2.0 * FULL_SHARE * (wrench / unit).T

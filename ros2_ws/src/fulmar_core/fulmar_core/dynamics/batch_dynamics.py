@@ -238,8 +238,7 @@ class SpatialDynamics(Dynamics[SpatialWorld, SpatialState]):
         off_centre: bool,
     ) -> SpatialState:
         """See `Dynamics.move`."""
-        dt, actuators = self.robot.timing.physics_dt, self.robot.actuators
-        assert isinstance(actuators, Pushing)  # as of `dynamics_of`
+        dt, actuators = self.robot.timing.physics_dt, self.robot.actuated_by(Pushing)
         inertia = inertia_of(tuple(world.inertia)[: 6 if self._full else 3])
         com: Vector = (world.com[0], world.com[1], world.com[2])
         if off_centre:
@@ -271,8 +270,7 @@ class GyrostatDynamics(SpatialDynamics):
     def __init__(self, robot: Robot) -> None:
         """Prepare; every world may have an orbit."""
         super().__init__(robot)
-        assert isinstance(robot.actuators, ReactionWheels)  # as of `dynamics_of`
-        self._wheels = robot.actuators
+        self._wheels = robot.actuated_by(ReactionWheels)
         self._flywheels = Flywheels(self._wheels.axes, self._wheels.spin_inertia)
         unloading = self._wheels.unloading
         self._magnetic = unloading is not None and unloading.kind == "magnetic"

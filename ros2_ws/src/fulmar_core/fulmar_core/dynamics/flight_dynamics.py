@@ -58,10 +58,8 @@ class FlightDynamics(SpatialDynamics):
     def __init__(self, robot: Robot, *, turbulent: bool = True) -> None:
         """Prepare; `turbulent`: some world may have turbulence."""
         super().__init__(robot, orbits=False)
-        assert (
-            isinstance(robot.actuators, ControlSurfaces) and robot.airframe is not None
-        )  # as of `dynamics_of`
-        self._craft, self.airframe, self._turbulent = robot.actuators, robot.airframe, turbulent
+        self._craft, self.airframe = robot.actuated_by(ControlSurfaces), robot.wings
+        self._turbulent = turbulent
 
     def draw_world(self, scenario: Scenario, draws: Draws) -> FlightWorld:
         """See `Dynamics.draw_world`."""

@@ -36,8 +36,7 @@ def flight_model(robot: Robot, trim: Trim, dt: float) -> FlightModel:
     """The model of an aircraft about a trim, servos and motors included; `dt` of a control step [s]."""
     from scipy.linalg import expm
 
-    craft = robot.actuators
-    assert isinstance(craft, ControlSurfaces)  # as of `find_trim`
+    craft = robot.actuated_by(ControlSurfaces)
     rates, effects = continuous_model(robot, trim)
     # Departures are in the trim's own body frame; here place and velocity are in the world.
     axes = np.stack([turn(trim.state.quat, tuple(np.eye(3)[i])) for i in range(3)], axis=-1)
@@ -85,9 +84,9 @@ class Schedule:
         Raises:
             ConfigError: There is no trim at this speed.
         """
-        assert robot.airframe is not None
-        above = 1.1 * max(0.0, -robot.hull_span[0] - robot.airframe.span * HEIGHTS[0] / 1.1)
-        self.heights = above + robot.airframe.span * np.array(HEIGHTS)
+        span = robot.wings.span
+        above = 1.1 * max(0.0, -robot.hull_span[0] - span * HEIGHTS[0] / 1.1)
+        self.heights = above + span * np.array(HEIGHTS)
         self.models = models or tuple(
             flight_model(robot, find_trim(robot, speed, float(height)), dt) for height in self.heights
         )

@@ -58,8 +58,7 @@ def still_air(robot: Robot, count: int, altitude: float = 0.0) -> FlightWorld:
 
 def free_air(robot: Robot) -> Robot:
     """The same aircraft without ground effect, as high up."""
-    assert robot.airframe is not None
-    return replace(robot, airframe=replace(robot.airframe, ground_effect=None))
+    return replace(robot, airframe=replace(robot.wings, ground_effect=None))
 
 
 def find_trim(robot: Robot, speed: float, height: float | None = None, altitude: float = 0.0) -> Trim:
@@ -74,7 +73,7 @@ def find_trim(robot: Robot, speed: float, height: float | None = None, altitude:
     Raises:
         ConfigError: The robot is no aircraft, a number is impossible, or there is no trim within the limits.
     """
-    if not robot.flies or robot.airframe is None:
+    if robot.airframe is None:
         raise ConfigError(
             f"'{robot.name}' is no aircraft, so it has no trim. `fulmar list robots` shows others."
         )
@@ -104,10 +103,9 @@ def find_trim(robot: Robot, speed: float, height: float | None = None, altitude:
 
 def flying_at(robot: Robot, pose: np.ndarray) -> SpatialState:
     """An aircraft at cruising speed at a pose of 7 numbers, on a level path along its heading, shapes ()."""
-    assert robot.airframe is not None  # as of `Robot.flies`
     state = SpatialState.resting(np.asarray(pose, dtype=float))
     heading = float(euler_of(state.quat)[2])
-    ahead = robot.airframe.speed * np.array([math.cos(heading), math.sin(heading)])
+    ahead = robot.wings.speed * np.array([math.cos(heading), math.sin(heading)])
     return replace(state, vx=np.asarray(ahead[0]), vy=np.asarray(ahead[1]))
 
 
@@ -123,7 +121,7 @@ class _Problem:
         self._surfaces = actuators.positions
         # Without a rudder the sideslip is free, with one it is 0.
         self._free_beta = "rudder" not in actuators.names
-        lost = math.radians(robot.airframe.lost_deg)  # type: ignore[union-attr]
+        lost = math.radians(robot.wings.lost_deg)
         tilt = [0.5] * (2 if self._free_beta else 1)
         most = list(actuators.scale[: self._surfaces])
         self.bounds = (

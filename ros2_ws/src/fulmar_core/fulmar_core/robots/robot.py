@@ -29,6 +29,7 @@ from fulmar_core.states.state import State
 Range = tuple[float, float]
 Vector3 = tuple[float, float, float]
 Class = TypeVar("Class", bound=type)
+Family = TypeVar("Family", bound=Actuators)
 
 
 @dataclass(frozen=True)
@@ -249,6 +250,28 @@ class Robot:
     def kind(self) -> Kind:
         """What it has in common with others."""
         return kind_of(self.actuators, planar=self.body.planar, swims=self.hydrodynamics is not None)
+
+    def actuated_by(self, family: type[Family]) -> Family:
+        """Its actuators, for callers that are about one family, or one base of families.
+
+        Raises:
+            ValueError: It has others.
+        """
+        if not isinstance(self.actuators, family):
+            fitting = " or ".join(name for name, each in FAMILIES.items() if issubclass(each, family))
+            raise ValueError(f"'{self.name}' has {self.actuators.kind}; this is for {fitting}.")
+        return self.actuators
+
+    @property
+    def wings(self) -> Airframe:
+        """The airframe, for callers that are about aircraft.
+
+        Raises:
+            ValueError: It is none.
+        """
+        if self.airframe is None:
+            raise ValueError(f"'{self.name}' is no aircraft: its file has no 'airframe'.")
+        return self.airframe
 
     @property
     def state_type(self) -> type[State]:

@@ -14,9 +14,8 @@ from fulmar_core.states.spatial import SpatialState
 
 def is_lost(state: SpatialState, robot: Robot) -> Array:
     """Whether the hull touches the water, or the craft is stalled beyond recovery or nowhere, shape (...,)."""
-    assert robot.airframe is not None  # as of `Robot.flies`
     xp = array_namespace(state.x)
-    stalled = xp.abs(angle_of_attack(state)) > math.radians(robot.airframe.lost_deg)
+    stalled = xp.abs(angle_of_attack(state)) > math.radians(robot.wings.lost_deg)
     return (state.z + robot.hull_span[0] <= 0.0) | stalled | ~xp.isfinite(state.z)
 
 

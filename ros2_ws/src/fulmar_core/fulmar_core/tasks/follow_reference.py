@@ -122,17 +122,16 @@ class FollowReference(Task[SpatialState]):
 
     def draw(self, draws: Draws, robot: Robot, *, training: bool) -> tuple[SpatialState, Goal]:
         """Draw starts and goals; see `Task.draw`."""
-        assert robot.airframe is not None  # as of `check`
         held = draws.uniform(*self.height)
         low, high = self.start.training_height if training else self.start.height
         above, aside = draws.uniform(low, high), draws.uniform(-self.start.side, self.start.side)
         tilt = draws.uniform(*self.start.tilt_deg)
         about = uniform_direction(draws.uniform(0.0, 1.0), draws.uniform(0.0, 1.0))
         xp = array_namespace(held)
-        goal = self._goal(held, robot.airframe.speed)
+        goal = self._goal(held, robot.wings.speed)
         first = goal.targets[:, 0]
         mean = float(xp.mean(first[:, 2]))
-        trim = find_trim(robot, robot.airframe.speed, max(mean, 0.1 * robot.airframe.span)).state
+        trim = find_trim(robot, robot.wings.speed, max(mean, 0.1 * robot.wings.span)).state
         zero = xp.zeros_like(held)
         level = trim.mapped(lambda part: zero + float(part))
         turned = exponential(scaled(math.pi / 180.0 * tilt, about))

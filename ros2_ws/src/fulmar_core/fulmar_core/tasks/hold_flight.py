@@ -105,8 +105,7 @@ class _HoldFlight(Task[SpatialState]):
 
     def draw(self, draws: Draws, robot: Robot, *, training: bool) -> tuple[SpatialState, Goal]:
         """Draw starts and goals; see `Task.draw`."""
-        assert robot.airframe is not None  # as of `check`
-        trim = find_trim(robot, robot.airframe.speed, None)
+        trim = find_trim(robot, robot.wings.speed, None)
         height = draws.uniform(*self.start.height)
         tilt = math.pi / 180.0 * draws.uniform(*self.start.tilt_deg)
         about = uniform_direction(draws.uniform(0.0, 1.0), draws.uniform(0.0, 1.0))

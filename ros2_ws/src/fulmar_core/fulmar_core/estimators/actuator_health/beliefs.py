@@ -65,8 +65,8 @@ class BeliefReader:
     """Finds what is wrong in the estimated health of one robot."""
 
     def __init__(self, robot: Robot) -> None:
-        assert isinstance(robot.actuators, Thrusters)
-        self._names, self._reach = robot.actuators.names, ForceAuthority(robot.actuators)
+        thrusters = robot.actuated_by(Thrusters)
+        self._names, self._reach = thrusters.names, ForceAuthority(thrusters)
         self._torque = robot.performance.torque
 
     def read(self, health: Health) -> Beliefs:

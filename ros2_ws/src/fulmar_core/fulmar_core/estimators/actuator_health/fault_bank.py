@@ -299,8 +299,8 @@ def _corrected(gains: Gains, state: np.ndarray, pose: np.ndarray, velocity: np.n
 
 def _one_actuator(robot: Robot) -> tuple[float, float]:
     """Largest force and moment of one actuator along axes in which the body moves [N, N·m]."""
-    assert isinstance(robot.actuators, Pushing)
-    wrench = robot.actuators.full_thrust[:, None] * robot.actuators.wrench_per_newton
+    actuators = robot.actuated_by(Pushing)
+    wrench = actuators.full_thrust[:, None] * actuators.wrench_per_newton
     axes = [[0, 1], [5]] if robot.body.planar else [[0, 1, 2], [3, 4, 5]]
     force, moment = (float(np.linalg.norm(wrench[:, part], axis=1).max()) for part in axes)
     return force, moment

@@ -55,8 +55,7 @@ class Hypotheses:
 
     def __init__(self, robot: Robot) -> None:
         """List them; the robot is one of `can_monitor`."""
-        assert isinstance(robot.actuators, Pushing)
-        self._actuators = robot.actuators
+        self._actuators = robot.actuated_by(Pushing)
         count = len(robot.actuators.names)
         levels = (OPEN,) if robot.actuators.binary else (HALF_OPEN, OPEN)
         pairs = list(itertools.combinations(range(count), 2))

@@ -9,7 +9,7 @@ import numpy as np
 from fulmar_core.estimators.actuator_health.failed_part import Finding, dead, stuck, unresponsive
 from fulmar_core.estimators.actuator_health.modelled_response import ModelledResponse
 from fulmar_core.estimators.actuator_health.response_bank import ResponseBank
-from fulmar_core.robots.actuators.control_surfaces import ControlSurfaces, is_throttle
+from fulmar_core.robots.actuators.control_surfaces import is_throttle
 from fulmar_core.robots.actuators.reaction_wheels import ReactionWheels
 from fulmar_core.robots.robot import Robot
 
@@ -33,9 +33,8 @@ class SurfaceFeedback:
 
     def __init__(self, robot: Robot) -> None:
         """Begin without findings."""
-        actuators, sensor = robot.actuators, robot.sensors.specs["surfaces"]
-        assert isinstance(actuators, ControlSurfaces)
-        self._names, self._scale = actuators.names, actuators.scale
+        sensor = robot.sensors.specs["surfaces"]
+        self._names, self._scale = robot.actuators.names, robot.actuators.scale
         noise = NOISE * (sensor.std + sensor.quantum)
         self._off = MODEL * self._scale + noise
         self._stands = STANDS * self._scale + noise
@@ -120,18 +119,15 @@ class ReactionWheelFeedback:
 
     def __init__(self, robot: Robot) -> None:
         """Begin without findings."""
-        assert isinstance(robot.actuators, ReactionWheels)
-        self._wheels, sensor = robot.actuators, robot.sensors.specs["wheels"]
-        self._std = np.array(
-            [np.sqrt(2.0) * max(sensor.std + sensor.quantum, 1e-6 * robot.actuators.top_speed)]
-        )
+        self._wheels, sensor = robot.actuated_by(ReactionWheels), robot.sensors.specs["wheels"]
+        self._std = np.array([np.sqrt(2.0) * max(sensor.std + sensor.quantum, 1e-6 * self._wheels.top_speed)])
         self._model = ModelledResponse(robot)
-        most = np.array([robot.actuators.torque / robot.actuators.spin_inertia])
+        most = np.array([self._wheels.torque / self._wheels.spin_inertia])
         self._banks = [
             ResponseBank(
                 1, offsets=most, pushes=FRICTION * most, changes=CHANGES * most, sticks=False, adds_up=True
             )
-            for _ in robot.actuators.wheels
+            for _ in self._wheels.wheels
         ]
         self.reset()
 

@@ -37,13 +37,12 @@ class DriveFeedback:
 
     def __init__(self, robot: Robot) -> None:
         """Begin without findings."""
-        assert isinstance(robot.actuators, DifferentialDrive)
-        self._drive, self._model = robot.actuators, ModelledResponse(robot)
-        self._names, half = robot.actuators.parts.names, 0.5 * robot.actuators.track
+        self._drive, self._model = robot.actuated_by(DifferentialDrive), ModelledResponse(robot)
+        self._names, half = self._drive.parts.names, 0.5 * self._drive.track
         speed, rate = standard_deviations(robot)
         self._std = float(np.hypot(speed, half * rate))
         self._to_rims = np.array([[1.0, -half], [1.0, half]])
-        self._bank = ResponseBank(2, offsets=np.full(2, robot.actuators.max_speed), together=True)
+        self._bank = ResponseBank(2, offsets=np.full(2, self._drive.max_speed), together=True)
         self.reset()
 
     def reset(self) -> None:
@@ -83,8 +82,7 @@ class CarFeedback:
 
     def __init__(self, robot: Robot) -> None:
         """Begin without findings."""
-        assert isinstance(robot.actuators, Ackermann)
-        self._car, self._model = robot.actuators, ModelledResponse(robot)
+        self._car, self._model = robot.actuated_by(Ackermann), ModelledResponse(robot)
         self._std = standard_deviations(robot)
         self._rolls = ROLLS * robot.performance.top_speed
         most = self._car.scale
@@ -134,8 +132,7 @@ class PropellerFeedback:
 
     def __init__(self, robot: Robot) -> None:
         """Begin without findings."""
-        assert isinstance(robot.actuators, Propellers)
-        self._robot, self._propellers = robot, robot.actuators
+        self._robot, self._propellers = robot, robot.actuated_by(Propellers)
         self._model, self._world = ModelledResponse(robot), nominal_worlds(robot, 1)
         self._std = np.array(standard_deviations(robot))
         added = robot.hydrodynamics.planar_added_mass if robot.hydrodynamics is not None else (0.0, 0.0, 0.0)
@@ -143,7 +140,7 @@ class PropellerFeedback:
         able = np.array([robot.performance.force, robot.performance.torque])
         count, slew = len(robot.actuators.names), robot.actuators.response.slew
         fades_s = FADES / min(slew) if slew else 0.0
-        most = np.full(count, np.abs(robot.actuators.curve).max())
+        most = np.full(count, np.abs(self._propellers.curve).max())
         self._bank = ResponseBank(
             count,
             offsets=most,

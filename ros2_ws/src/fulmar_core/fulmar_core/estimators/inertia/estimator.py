@@ -38,8 +38,7 @@ class InertiaEstimator:
 
     def __init__(self, settings: InertiaSettings, robot: Robot) -> None:
         """Begin with the inertia of the robot's file as the guess of the recursive methods."""
-        assert isinstance(robot.actuators, ReactionWheels)  # as of `kinds.check_estimator`
-        self._settings, self._wheels = settings, robot.actuators
+        self._settings, self._wheels = settings, robot.actuated_by(ReactionWheels)
         self._guess = settings.guess * numbers_of(robot.body.inertia_matrix, settings.count)
         self._limit = 2.0 * robot.limits.yaw_rate
         self._sensors, self._tick_s = robot.sensors, robot.timing.physics_dt

@@ -49,11 +49,10 @@ class AttitudeEstimator:
 
     def __init__(self, settings: AttitudeSettings, robot: Robot) -> None:
         """Begin without an estimate."""
-        assert isinstance(robot.actuators, ReactionWheels)  # as of `kinds.check_estimator`
-        self._settings, self._wheels, self._limits = settings, robot.actuators, robot.limits
+        self._settings, self._wheels, self._limits = settings, robot.actuated_by(ReactionWheels), robot.limits
         self._inertia = robot.body.inertia_matrix
         self._lightness = np.linalg.inv(self._inertia)
-        self._names = robot.actuators.wheel_names
+        self._names = self._wheels.wheel_names
         self._gyroscope_range = robot.sensors.imu.gyroscope_range
         self._sensors, self._tick_s = robot.sensors, robot.timing.physics_dt
         self.reset()
