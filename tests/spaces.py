@@ -27,21 +27,12 @@ def shared_space(robots: Mapping[str, Any], tasks: Mapping[str, Any]) -> list[tu
         robots: By name.
         tasks: Same.
     """
-    return [
-        (robot, task)
-        for robot in robots
-        for task in tasks
-        if robots[robot].state_type is tasks[task].state_type
-        and robots[robot].actuators.turns_only is tasks[task].turns_only
-        and robots[robot].flies is tasks[task].flies
-    ]
+    return [(robot, task) for robot in robots for task in tasks if robots[robot].kind in tasks[task].kinds]
 
 
 def robot_for(task: Task, in_plane: Robot, in_space: Robot = SPACECRAFT) -> Robot:
     """The one of two robots that moves in the space of a task, a satellite or an aircraft where it is for them."""
-    if task.turns_only or task.flies:
-        return SATELLITE if task.turns_only else AIRCRAFT
-    return in_plane if task.state_type is PlanarState else in_space
+    return next(robot for robot in (in_plane, in_space, SATELLITE, AIRCRAFT) if robot.kind in task.kinds)
 
 
 def task_for(robot: Robot, name: str) -> Task:

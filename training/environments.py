@@ -11,22 +11,11 @@ from typing import Any
 import gymnasium
 
 from fulmar_core.config.paths import config_names
-from fulmar_core.robots.kinds.aircraft import AIRCRAFT
-from fulmar_core.robots.kinds.free_flyer import FREE_FLYER
-from fulmar_core.robots.kinds.planar import PLANAR
 from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.robot_file import load_robot
-from fulmar_core.states.planar import PlanarState
-from fulmar_core.states.spatial import SpatialState
-from fulmar_core.states.state import State
 from fulmar_core.tasks import Task, load_task
 from fulmar_core.worlds.scenario import Scenario, load_scenario
 from training.gym_env import TaskEnv, TaskVectorEnv
-
-DEFAULT_ROBOTS: dict[type[State], str] = {
-    PlanarState: PLANAR.usual_robot,
-    SpatialState: FREE_FLYER.usual_robot,
-}
 
 
 def task_env(task: str, robot: str | None = None, scenario: str | None = None, **options: Any) -> TaskEnv:
@@ -34,7 +23,7 @@ def task_env(task: str, robot: str | None = None, scenario: str | None = None, *
 
     Args:
         task: Name that `fulmar list tasks` shows.
-        robot: Name that `fulmar list robots` shows; of `DEFAULT_ROBOTS` by default.
+        robot: Name that `fulmar list robots` shows; the usual one of the task's kind by default.
         scenario: Name that `fulmar list scenarios` shows; randomised by default, of aircraft nominal.
         **options: `seed` and `training` of `TaskEnv`.
 
@@ -53,8 +42,7 @@ def task_vector_env(
 
 def _parts(task: str, robot: str | None, scenario: str | None) -> tuple[Robot, Task, Scenario]:
     the_task = load_task(task)
-    usual = AIRCRAFT.usual_robot if the_task.flies else DEFAULT_ROBOTS[the_task.state_type]
-    the_robot = load_robot(robot or usual)
+    the_robot = load_robot(robot or the_task.kinds[0].usual_robot)
     the_task.check(the_robot)
     return the_robot, the_task, load_scenario(scenario or the_robot.kind.usual_scenario)
 

@@ -9,6 +9,7 @@ import pytest
 
 from fulmar_core.config.paths import config_names
 from fulmar_core.controllers.disturbance_inputs import PUSH_TERMS, disturbance_terms
+from fulmar_core.robots.kinds.aircraft import AIRCRAFT
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.simulation.simulation import BatchSimulation
 from fulmar_core.states.attitude import exponential
@@ -73,7 +74,7 @@ def test_the_table_has_exactly_the_terms_of_all_tasks(terms):
 
 @pytest.mark.parametrize("task", TASKS)
 def test_values_stay_in_the_stated_range(terms, task):
-    flies, rounding = load_task(task).flies, 1e-5
+    flies, rounding = AIRCRAFT in load_task(task).kinds, 1e-5
     robot = load_robot("airship_v7") if flies else ROBOT_OF[load_task(task).state_type]
     scenario = load_scenario("randomised")
     worlds = BatchSimulation(robot, load_task(task), scenario, worlds=64, seed=1)
@@ -124,7 +125,7 @@ def in_space(task, side):
     return {name: float(observed(turn)[name][0]) for name, turn in shown.items()}
 
 
-@pytest.mark.parametrize("task", [task for task in TASKS if not load_task(task).flies])
+@pytest.mark.parametrize("task", [task for task in TASKS if AIRCRAFT not in load_task(task).kinds])
 def test_signs_are_the_stated_ones(terms, task):
     left, right = (terms_on_one_side(load_task(task), side) for side in (1.0, -1.0))
     for name, value in left.items():

@@ -79,10 +79,10 @@ def test_a_box_reaches_the_controller(plan):
         ({"goal": (0.0, math.inf, 0.0)}, "must be finite"),
         (
             {"guards": {"estimator": "mocap_imu"}},
-            "moves in space. Use 'mocap_imu_3d' of configs/estimators, or leave it out.",
+            "pushed in space. Use 'mocap_imu_3d' of configs/estimators, or leave it out.",
         ),
-        ({"task": "go_to_pose"}, "task 'go_to_pose' is about motion in the plane"),
-        ({"robot": "floating_platform"}, "task 'go_to_pose_3d' is about motion in space"),
+        ({"task": "go_to_pose"}, "task 'go_to_pose' is for robots that are pushed in the plane"),
+        ({"robot": "floating_platform"}, "task 'go_to_pose_3d' is for bodies that are pushed in space"),
         (
             {"controller": STILL, "guards": {"area": (-1.0, 1.0, -1.0, 1.0)}},
             "moves in space, where an area has 6",
@@ -96,7 +96,7 @@ def test_what_cannot_be_is_refused(change, words, plan):
 
 
 def test_an_estimator_in_space_is_refused_in_the_plane_with_the_one_to_use(plan):
-    with pytest.raises(ConfigError, match=r"moves in the plane\. Use 'mocap_imu' of configs/estimators"):
+    with pytest.raises(ConfigError, match=r"in the plane\. Use 'mocap_imu' of configs/estimators"):
         plan(guards={"estimator": "mocap_imu_3d"})
 
 

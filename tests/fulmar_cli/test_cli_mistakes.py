@@ -56,8 +56,8 @@ def broken_configs(tmp_path, monkeypatch):
         ),
         (
             ["evaluate", "spacecraft_16", "go_to_pose", "--controller", "pd"],
-            "'go_to_pose' is about motion in the plane, and robot 'spacecraft_16' moves in space. Did you mean "
-            "'go_to_pose_3d'?",
+            "'go_to_pose' is for robots that are pushed in the plane and robots on wheels; 'spacecraft_16' is one of "
+            "the bodies that are pushed in space. Did you mean 'go_to_pose_3d'?",
         ),
         (
             ["evaluate", "spacecraft_16", "track_velocities_3d", "--controller", "excite"],

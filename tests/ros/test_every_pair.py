@@ -125,7 +125,7 @@ def nodes(
 
 
 def _lasts_s(robot: Robot, task: Task) -> float:
-    if task.turns_only:
+    if not robot.kind.goes_anywhere:
         return TURNS_S
     return LASTS_S.get(task.name, FLIES_S if robot.flies else BRIEFLY_S)
 
@@ -159,8 +159,8 @@ def check_pair(robot: Robot, task: Task, make: Callable[[Robot, Task], Controlle
             seed=SEED,
         )
     for number, way in enumerate(map(np.array, ways)):
-        moved = way[:, 3:4] if task.turns_only else way[:, :2]
-        assert np.ptp(moved, axis=0).max() > (0.001 if task.turns_only else 0.02), (
+        moved = way[:, :2] if robot.kind.goes_anywhere else way[:, 3:4]
+        assert np.ptp(moved, axis=0).max() > (0.02 if robot.kind.goes_anywhere else 0.001), (
             "it stood still: this shows nothing"
         )
         np.testing.assert_allclose(way[:, 0], alone.x[number, :steps], atol=1e-4)

@@ -149,13 +149,25 @@ def test_a_run_through_sixteen_emulated_valves_meets_its_goal_by_motion_capture_
 @pytest.mark.parametrize(
     ("command", "words"),
     [
-        ("run spacecraft_16 --task go_to_pose --lockstep", "moves in space. Did you mean 'go_to_pose_3d'?"),
+        ("run spacecraft_16 --task go_to_pose --lockstep", "pushed in space. Did you mean 'go_to_pose_3d'?"),
         ("run floating_platform --task go_to_pose_3d", "in the plane. Did you mean 'go_to_pose'?"),
-        ("evaluate spacecraft_16 go_to_pose", "moves in space. Did you mean 'go_to_pose_3d'?"),
-        ("evaluate spacecraft_16 push_block --controller lqr", "`fulmar list tasks` shows others."),
-        ("evaluate floating_platform go_to_pose_3d", "'floating_platform' moves in the plane"),
-        ("train spacecraft_16 go_to_position", "robot 'spacecraft_16' moves in space"),
-        ("up mujoco_lqr --robot spacecraft_16 --controller external", "task 'go_to_pose' is about motion in"),
+        ("evaluate spacecraft_16 go_to_pose", "pushed in space. Did you mean 'go_to_pose_3d'?"),
+        (
+            "evaluate spacecraft_16 push_block --controller lqr",
+            "shows others, such as go_to_pose_3d.",
+        ),
+        (
+            "evaluate floating_platform go_to_pose_3d",
+            "'floating_platform' is one of the robots that are pushed",
+        ),
+        (
+            "train spacecraft_16 go_to_position",
+            "'spacecraft_16' is one of the bodies that are pushed in space",
+        ),
+        (
+            "up mujoco_lqr --robot spacecraft_16 --controller external",
+            "task 'go_to_pose' is for robots that are",
+        ),
         (
             "goals --robot spacecraft_16 --pose 1,2",
             "moves in space: 3 (x,y,z) or 6 (x,y,z,roll,pitch,yaw) are needed",

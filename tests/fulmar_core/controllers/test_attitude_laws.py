@@ -112,11 +112,12 @@ class TestAdaptive:
 
 def test_a_task_that_moves_a_body_is_refused_for_a_satellite_and_the_other_way_round():
     with pytest.raises(
-        ConfigError, match=r"'go_to_pose_3d' is for a robot that moves.*'cubesat_wheels' only turn it"
+        ConfigError,
+        match=r"'go_to_pose_3d' is for bodies that are pushed .*'cubesat_wheels' is one of the satellites",
     ):
         load_task("go_to_pose_3d").check(CUBESAT)
     with pytest.raises(
-        ConfigError, match=r"'slew' is for a robot that only turns.*'spacecraft_16' also push it"
+        ConfigError, match=r"'slew' is for satellites .*'spacecraft_16' is one of the bodies that are pushed"
     ):
         load_task("slew").check(load_robot("spacecraft_16"))
     with pytest.raises(ConfigError, match="controller 'adaptive' is for robots with reaction_wheels"):

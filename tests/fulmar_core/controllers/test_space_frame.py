@@ -9,6 +9,7 @@ import pytest
 
 from fulmar_core.config.paths import config_names
 from fulmar_core.controllers.space_frame import SpaceFrame
+from fulmar_core.robots.kinds.free_flyer import FREE_FLYER
 from fulmar_core.simulation.simulation import BatchSimulation
 from fulmar_core.states.attitude import first_rows, length, normalised
 from fulmar_core.states.spatial import SpatialState
@@ -21,7 +22,7 @@ from tests.spaces import SPACECRAFT
 TASKS = {
     name: task
     for name, task in ((name, load_task(name)) for name in config_names("tasks"))
-    if task.state_type is SpatialState and not (task.turns_only or task.flies)
+    if FREE_FLYER in task.kinds
 }
 COUNT = 30
 

@@ -231,16 +231,17 @@ def test_a_jump_of_time_begins_a_new_epoch():
 
 def test_estimators_of_satellites_are_refused_for_other_robots_and_the_other_way_round():
     with pytest.raises(
-        ConfigError, match=r"'attitude' is of the attitude of a satellite.*Use 'mocap_imu_3d'"
+        ConfigError, match=r"'attitude' is for satellites .*'spacecraft_16' is one of .*Use 'mocap_imu_3d'"
     ):
         check_estimator("attitude", load_robot("spacecraft_16"))
     with pytest.raises(
-        ConfigError, match=r"'mocap_imu_3d' is of the place of a robot that moves.*Use 'attitude'"
+        ConfigError,
+        match=r"'mocap_imu_3d' is for bodies that are pushed .*'cubesat_wheels' is one of .*Use 'attitude'",
     ):
         check_estimator("mocap_imu_3d", CUBESAT)
     with pytest.raises(ConfigError, match=r"takes the events of a camera, and 'microsat' has none"):
         check_estimator("event_rate", load_robot("microsat"))
-    assert KINDS["inertia"].turns_only
+    assert KINDS["inertia"].kinds == (CUBESAT.kind,)
 
 
 def test_settings_without_meaning_are_refused():

@@ -39,7 +39,7 @@ class Counting:
 @pytest.mark.parametrize("task", config_names("tasks"))
 def test_it_is_asked_for_commands_of_its_task_and_begins_anew(task):
     controller = Counting()
-    warm_up(controller, AIRCRAFT if load_task(task).flies else ROBOT, load_task(task))
+    warm_up(controller, ROBOT if ROBOT.kind in load_task(task).kinds else AIRCRAFT, load_task(task))
     assert len(controller.seen) == WARM_UP
     assert np.isfinite(controller.seen).all()
     assert controller.since_reset == 0

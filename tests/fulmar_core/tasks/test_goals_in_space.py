@@ -7,6 +7,7 @@ import pytest
 
 from fulmar_core.config.errors import ConfigError
 from fulmar_core.config.paths import config_directory, config_names
+from fulmar_core.robots.kinds import GOING
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.states.planar import PlanarState
 from fulmar_core.states.spatial import SpatialState
@@ -108,13 +109,13 @@ def test_a_single_goal_says_what_it_is():
     ("robot", "task"), [("spacecraft_16", "go_to_pose"), ("floating_platform", "go_to_pose_3d")]
 )
 def test_a_task_of_the_other_space_is_refused(robot, task):
-    with pytest.raises(ConfigError, match=f"task '{task}' is about motion in .* robot '{robot}' moves in"):
+    with pytest.raises(ConfigError, match=f"task '{task}' is for .*; '{robot}' is one of the .* pushed"):
         load_task(task).check(load_robot(robot))
 
 
 def test_names_of_tasks_end_as_their_state_type_says():
-    tasks = {name: load_task(name) for name in config_names("tasks")}
-    found = {name: task.state_type for name, task in tasks.items() if not (task.turns_only or task.flies)}
+    tasks = [load_task(name) for name in config_names("tasks")]
+    found = {task.name: task.state_type for task in tasks if task.kinds in GOING.values()}
     assert SpatialState in found.values()
     for name, form in found.items():
         assert name.endswith("_3d") == (form is SpatialState)
@@ -128,7 +129,7 @@ def test_a_task_in_space_of_any_name_is_not_proposed_for_itself(tmp_path, monkey
     (tmp_path / "tasks" / "arrive.yaml").write_text(text.replace("name: go_to_pose_3d", "name: arrive"))
     monkeypatch.setenv("FULMAR_CONFIGS", str(tmp_path))
     with pytest.raises(
-        ConfigError, match=r"shows others\. Names of tasks that move a body in space end in _3d\.$"
+        ConfigError, match=r"in the plane\. `fulmar list tasks` shows others, such as go_to_pose\.$"
     ):
         load_task("arrive").check(load_robot("floating_platform"))
     with pytest.raises(

@@ -383,7 +383,8 @@ def test_a_task_in_space_learns_and_is_evaluated_as_the_shipped_ones(own):
     assert found.position_error.shape == (2, 20)
     assert (found.position_error[:, -1] > 0.9).all()
     with pytest.raises(
-        ConfigError, match="is about motion in space, and robot 'turtlebot2' moves in the plane"
+        ConfigError,
+        match="is for bodies that are pushed in space; 'turtlebot2' is one of the robots on wheels",
     ):
         task.check(ROBOT)
 

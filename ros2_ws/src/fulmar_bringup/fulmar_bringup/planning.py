@@ -188,7 +188,7 @@ def plan_run(
         # Where a robot stands is where its odometry begins.
         start = start or whole_pose((0.0,) * the_robot.state_type.AXES, the_robot, "--start")
         # References of aircraft begin where the craft is, and no single goal holds one.
-        if goal is None and goals is None and not goals_later and not the_task.flies:
+        if goal is None and goals is None and not goals_later and the_robot.kind.stops:
             raise ConfigError("a real robot goes nowhere by chance: say where with --goal or --goals.")
     if goals is not None and goal is not None:
         raise ConfigError("--goals brings its own goals; it takes no --goal.")

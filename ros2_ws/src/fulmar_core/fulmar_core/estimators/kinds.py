@@ -22,6 +22,13 @@ from fulmar_core.estimators.motion.settings import (
     SpatialMotionSettings,
 )
 from fulmar_core.estimators.readings import READINGS, readings_of
+from fulmar_core.robots.kinds import KINDS as ROBOT_KINDS
+from fulmar_core.robots.kinds.aircraft import AIRCRAFT
+from fulmar_core.robots.kinds.free_flyer import FREE_FLYER
+from fulmar_core.robots.kinds.kind import Kind
+from fulmar_core.robots.kinds.planar import PLANAR
+from fulmar_core.robots.kinds.rolling import ROLLING
+from fulmar_core.robots.kinds.satellite import SATELLITE
 from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.sensors.repetition import without_noise
 from fulmar_core.robots.topics import (
@@ -38,9 +45,6 @@ from fulmar_core.robots.topics import (
     SENSOR_WIRES,
     Wire,
 )
-from fulmar_core.states.planar import PlanarState
-from fulmar_core.states.spatial import SpatialState
-from fulmar_core.states.state import State
 
 Motion = TypeVar("Motion", bound=MotionSettings)
 
@@ -58,8 +62,7 @@ class EstimatorKind:
     publishes: tuple[Wire, ...]  # each from the same estimate
     takes_if_there: Mapping[str, Wire] = field(default_factory=dict)  # readings that improve the estimate
     needs: tuple[str, ...] = ()  # modules of extras
-    form: type[State] = PlanarState  # state type of the robots whose motion it estimates
-    turns_only: bool = False  # of robots that reaction wheels turn, whose place it does not estimate
+    kinds: tuple[Kind, ...] = tuple(ROBOT_KINDS.values())  # of robots that it is for
     every_s: float = 0.0  # time between two estimates that are published, at least [s]
     status: Wire | None = None  # where its `status()` is published
     node: str = "estimator"  # name of the node that runs it
@@ -130,6 +133,7 @@ KINDS: dict[str, EstimatorKind] = {
         takes={"mocap": MOCAP, "imu": IMU},
         publishes=(ODOMETRY,),
         takes_if_there={"star_tracker": SENSOR_WIRES["star_tracker"]},
+        kinds=(PLANAR, ROLLING),
         needs=("filterpy",),
     ),
     "spatial_motion": EstimatorKind(
@@ -138,7 +142,7 @@ KINDS: dict[str, EstimatorKind] = {
         takes={"mocap": MOCAP, "imu": IMU},
         publishes=(ODOMETRY,),
         takes_if_there={"star_tracker": SENSOR_WIRES["star_tracker"]},
-        form=SpatialState,
+        kinds=(FREE_FLYER, AIRCRAFT),
         needs=("filterpy",),
     ),
     "attitude": EstimatorKind(
@@ -147,16 +151,14 @@ KINDS: dict[str, EstimatorKind] = {
         takes={"star_tracker": SENSOR_WIRES["star_tracker"]},
         publishes=(ODOMETRY,),
         takes_if_there={"imu": IMU, "wheels": SENSOR_WIRES["wheels"], "rate": RATE},
-        form=SpatialState,
-        turns_only=True,
+        kinds=(SATELLITE,),
     ),
     "inertia": EstimatorKind(
         InertiaSettings,
         _inertia,
         takes={"imu": IMU, "wheels": SENSOR_WIRES["wheels"]},
         publishes=(INERTIA, INERTIA_COVARIANCE),
-        form=SpatialState,
-        turns_only=True,
+        kinds=(SATELLITE,),
         every_s=1.0,
         status=INERTIA_STATUS,
         node="inertia_estimator",
@@ -167,8 +169,7 @@ KINDS: dict[str, EstimatorKind] = {
         takes={"events": EVENTS},
         publishes=(RATE,),
         takes_if_there={"events_2": EVENTS_2},
-        form=SpatialState,
-        turns_only=True,
+        kinds=(SATELLITE,),
         status=RATE_STATUS,
         node="rate_estimator",
     ),
@@ -248,28 +249,16 @@ def check_estimator(name: str, robot: Robot) -> None:
     """Refuse a file that cannot be read, and an estimator that does not estimate how a robot moves.
 
     Raises:
-        ConfigError: As of `load_estimator`, or the robot is of the other space.
+        ConfigError: As of `load_estimator`, or the estimator is for other kinds of robots.
     """
     load_estimator(name)
     kind = estimator_kind(name, robot)
-    if is_own(name):
-        return
-    form = kind.form
-    if kind.turns_only is not robot.actuators.turns_only:
-        what = "the attitude of a satellite" if kind.turns_only else "the place of a robot that moves"
-        raise ConfigError(
-            f"estimator '{name}' is of {what}, and '{robot.name}' has {robot.actuators.kind}. "
-            f"Use '{default_estimator(robot)}' of configs/estimators, or leave it out."
-        )
+    otherwise = f"Use '{default_estimator(robot)}' of configs/estimators, or leave it out."
+    robot.check_kind(f"estimator '{name}'", kind.kinds, otherwise)
     if kind.takes.get("events") and not robot.event_cameras:
         raise ConfigError(
             f"estimator '{name}' takes the events of a camera, and '{robot.name}' has none: add 'event_cameras' to its "
             "file."
-        )
-    if robot.state_type is not form:
-        raise ConfigError(
-            f"estimator '{name}' is of motion in {form.WORLD}, and robot '{robot.name}' moves in "
-            f"{robot.state_type.WORLD}. Use '{default_estimator(robot)}' of configs/estimators, or leave it out."
         )
 
 

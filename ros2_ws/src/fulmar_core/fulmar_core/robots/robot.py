@@ -8,6 +8,7 @@ from typing import Annotated, Any, ClassVar, TypeVar
 
 import numpy as np
 
+from fulmar_core.config.errors import ConfigError
 from fulmar_core.config.strict_yaml import Kinds
 from fulmar_core.robots.actuators.families import FAMILIES
 from fulmar_core.robots.actuators.family import Actuators
@@ -261,6 +262,23 @@ class Robot:
             fitting = " or ".join(name for name, each in FAMILIES.items() if issubclass(each, family))
             raise ValueError(f"'{self.name}' has {self.actuators.kind}; this is for {fitting}.")
         return self.actuators
+
+    def check_kind(self, what: str, kinds: tuple[Kind, ...], otherwise: str) -> None:
+        """Refuse what is not for this kind of robot.
+
+        Args:
+            what: A task or an estimator, in words.
+            kinds: That it is for.
+            otherwise: What to do instead.
+
+        Raises:
+            ConfigError: The robot is of none of the kinds.
+        """
+        if self.kind not in kinds:
+            fitting = " and ".join(kind.plural for kind in kinds)
+            raise ConfigError(
+                f"{what} is for {fitting}; '{self.name}' is one of the {self.kind.plural}. {otherwise}"
+            )
 
     @property
     def wings(self) -> Airframe:

@@ -10,6 +10,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from fulmar_core.dynamics.flight_trim import find_trim
+from fulmar_core.robots.kinds.aircraft import AIRCRAFT
 from fulmar_core.robots.robot import Robot
 from fulmar_core.states.arrays import array_namespace, clip
 from fulmar_core.states.attitude import euler_of, exponential, length, product, scaled, uniform_direction
@@ -88,7 +89,7 @@ class FollowReference(Task[SpatialState]):
 
     goal_topic: ClassVar[str] = "goal_path"
     state_type = SpatialState
-    flies: ClassVar[bool] = True
+    kinds = (AIRCRAFT,)
     observation_names: ClassVar[tuple[str, ...]] = TERMS
 
     def __post_init__(self) -> None:

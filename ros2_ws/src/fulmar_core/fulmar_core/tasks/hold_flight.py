@@ -10,6 +10,7 @@ from typing import ClassVar, Literal, Self
 import numpy as np
 
 from fulmar_core.dynamics.flight_trim import Trim, find_trim
+from fulmar_core.robots.kinds.aircraft import AIRCRAFT
 from fulmar_core.robots.robot import Robot
 from fulmar_core.states.arrays import array_namespace, clip
 from fulmar_core.states.attitude import (
@@ -81,7 +82,7 @@ class _HoldFlight(Task[SpatialState]):
     reward_weights: HoldReward
 
     state_type = SpatialState
-    flies: ClassVar[bool] = True
+    kinds = (AIRCRAFT,)
     scale: ClassVar[float]  # of errors in the reward [rad or m/s]
 
     cruise: float = 0.0  # speed of the craft, as of `fitted`; 0 in a file [m/s]

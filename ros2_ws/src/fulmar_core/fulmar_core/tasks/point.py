@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import ClassVar, Literal
 
+from fulmar_core.robots.kinds.satellite import SATELLITE
 from fulmar_core.robots.robot import Robot
 from fulmar_core.states.arrays import array_namespace
 from fulmar_core.states.attitude import (
@@ -85,7 +86,7 @@ class Point(Task[SpatialState]):
 
     goal_topic: ClassVar[str] = "goal_pose"
     state_type = SpatialState
-    turns_only: ClassVar[bool] = True
+    kinds = (SATELLITE,)
     observation_names: ClassVar[tuple[str, ...]] = (
         *ATTITUDE_TERMS,
         *FINE_ATTITUDE_TERMS,

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING, ClassVar, Generic, Self
+from typing import TYPE_CHECKING, Generic, Self
 
-from fulmar_core.config.errors import ConfigError
 from fulmar_core.config.paths import config_names
 from fulmar_core.dynamics.things import Thing
+from fulmar_core.robots.kinds import GOING
+from fulmar_core.robots.kinds.kind import Kind
 from fulmar_core.robots.robot import Robot
 from fulmar_core.states.counter_rng import Draws
 from fulmar_core.states.planar import PlanarState
@@ -30,8 +31,6 @@ class Task(ABC, Generic[S]):
         tolerance: What counts as success.
         required: Targets that make an episode a success; None where a closing window does.
         state_type: Form of the states that its methods take.
-        turns_only: It is for robots that turn and push nowhere; all others are for robots that move.
-        flies: It is for aircraft, and no other one is.
     """
 
     kind: str
@@ -41,8 +40,6 @@ class Task(ABC, Generic[S]):
     tolerance: Tolerance
     required: int | None = None
     state_type: type[State] = PlanarState
-    turns_only: ClassVar[bool] = False
-    flies: ClassVar[bool] = False
 
     # A class, a property or a field has these two: dataclasses would take a property of this class for a default.
     if TYPE_CHECKING:
@@ -54,6 +51,11 @@ class Task(ABC, Generic[S]):
         @property
         def observation_names(self) -> tuple[str, ...]:
             """Of the terms of `observe`, in their order."""
+
+    @property
+    def kinds(self) -> tuple[Kind, ...]:
+        """Of robots that it is for."""
+        return GOING[self.state_type]
 
     @property
     def sees_obstacles(self) -> bool:
@@ -89,34 +91,17 @@ class Task(ABC, Generic[S]):
         """Refuse a task that does not work with a robot, before anything moves.
 
         Raises:
-            ConfigError: The task is of the other space, or moves a robot that only turns, or the other way round.
+            ConfigError: The task is for other kinds of robots.
             TaskError: A member of a user's own task raises, or returns what no task returns.
         """
-        if robot.state_type is not self.state_type:
-            mine, its = self.state_type.SUFFIX, robot.state_type.SUFFIX
-            other = self.name.removesuffix(mine) + its
-            hint = (
-                f"Did you mean '{other}'?"
-                if other != self.name and other in config_names("tasks")
-                else "`fulmar list tasks` shows others."
-            )
-            raise ConfigError(
-                f"task '{self.name}' is about motion in {self.state_type.WORLD}, and robot '{robot.name}' moves in "
-                f"{robot.state_type.WORLD}. {hint} Names of tasks that move a body in space end in {mine or its}."
-            )
-        if robot.flies is not self.flies:
-            what = "is for aircraft" if self.flies else "is not for aircraft, which cannot stop"
-            raise ConfigError(
-                f"task '{self.name}' {what}, and '{robot.name}' has {robot.actuators.kind}. `fulmar list tasks` shows "
-                "others; those whose names begin with fly_ are for aircraft."
-            )
-        if robot.actuators.turns_only is not self.turns_only:
-            what = "only turns" if self.turns_only else "moves"
-            able = "only turn it" if robot.actuators.turns_only else "also push it"
-            raise ConfigError(
-                f"task '{self.name}' is for a robot that {what}, and {robot.actuators.kind} of '{robot.name}' {able}. "
-                "`fulmar list tasks` shows others; point, point_inertial and slew are for satellites."
-            )
+        self.check_kind(robot)
+
+    def check_kind(self, robot: Robot) -> None:
+        """The quick part of `check`, which looks at the robot's kind alone."""
+        same = self.name.removesuffix(self.state_type.SUFFIX) + robot.state_type.SUFFIX
+        meant = f"Did you mean '{same}'? " if same != self.name and same in config_names("tasks") else ""
+        others = f"{meant}`fulmar list tasks` shows others, such as {robot.kind.usual_task}."
+        robot.check_kind(f"task '{self.name}'", self.kinds, others)
 
     def goal_of(self, targets: Array) -> Goal:
         """The goal of one robot from targets that were received.

@@ -88,7 +88,7 @@ class Hypotheses:
             self._obeys[row, list(each.stuck)] = 0.0
             self._stuck[row, list(each.stuck)] = each.level
         gain = robot.actuators.response.gain or np.ones(count)
-        self._wrench = np.asarray(gain)[:, None] * robot.actuators.wrench_per_newton
+        self._wrench = np.asarray(gain)[:, None] * self._actuators.wrench_per_newton
         # Torque about the centre of mass.
         self._wrench[:, 3:] -= np.cross(np.array(robot.body.com), self._wrench[:, :3])
 

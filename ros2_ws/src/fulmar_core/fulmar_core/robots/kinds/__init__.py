@@ -14,8 +14,13 @@ from fulmar_core.robots.kinds.kind import Kind
 from fulmar_core.robots.kinds.planar import PLANAR
 from fulmar_core.robots.kinds.rolling import ROLLING
 from fulmar_core.robots.kinds.satellite import SATELLITE
+from fulmar_core.states.planar import PlanarState
+from fulmar_core.states.spatial import SpatialState
+from fulmar_core.states.state import State
 
 KINDS: dict[str, Kind] = {kind.name: kind for kind in (PLANAR, ROLLING, FREE_FLYER, SATELLITE, AIRCRAFT)}
+# Kinds that go to places and stop there, by the form of their states: what most tasks are for.
+GOING: dict[type[State], tuple[Kind, ...]] = {PlanarState: (PLANAR, ROLLING), SpatialState: (FREE_FLYER,)}
 
 
 def kind_of(actuators: Actuators, *, planar: bool, swims: bool) -> Kind:

@@ -7,6 +7,7 @@ from fulmar_core.states.spatial import SpatialState
 
 AIRCRAFT = Kind(
     name="aircraft",
+    plural="aircraft",
     state_type=SpatialState,
     usual_robot="airship_v7",
     usual_task="fly_hold",

@@ -7,6 +7,7 @@ from fulmar_core.states.spatial import SpatialState
 
 FREE_FLYER = Kind(
     name="free_flyer",
+    plural="bodies that are pushed in space",
     state_type=SpatialState,
     usual_robot="spacecraft_16",
     usual_task="go_to_pose_3d",

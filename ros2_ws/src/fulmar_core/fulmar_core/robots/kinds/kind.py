@@ -14,6 +14,7 @@ class Kind:
     """One kind of vehicle. Poses are as people write them, see `State.NUMBERS` [m, deg]."""
 
     name: str
+    plural: str  # its robots, in words
     state_type: type[State]
     usual_robot: str  # that a task of this kind is tried with
     usual_task: str  # what it does where nothing else is asked for

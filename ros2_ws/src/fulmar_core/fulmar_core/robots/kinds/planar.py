@@ -7,6 +7,7 @@ from fulmar_core.states.planar import PlanarState
 
 PLANAR = Kind(
     name="planar",
+    plural="robots that are pushed in the plane",
     state_type=PlanarState,
     usual_robot="floating_platform",
     usual_task="go_to_pose",

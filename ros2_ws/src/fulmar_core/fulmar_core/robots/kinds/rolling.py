@@ -7,6 +7,7 @@ from fulmar_core.states.planar import PlanarState
 
 ROLLING = Kind(
     name="rolling",
+    plural="robots on wheels",
     state_type=PlanarState,
     usual_robot="turtlebot2",
     usual_task="go_to_pose",

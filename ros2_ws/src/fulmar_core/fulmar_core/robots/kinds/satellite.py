@@ -7,6 +7,7 @@ from fulmar_core.states.spatial import SpatialState
 
 SATELLITE = Kind(
     name="satellite",
+    plural="satellites that only turn",
     state_type=SpatialState,
     usual_robot="cubesat_wheels",
     usual_task="point",
