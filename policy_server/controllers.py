@@ -10,12 +10,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from fulmar_core.config.errors import BundleError, ConfigError, UnknownNameError
 from fulmar_core.config.own_class import is_own, load_class
-from fulmar_core.controllers.classical import LAWS, check_pair, families_of, load_classical
+from fulmar_core.controllers.by_kind import LAWS, exciting
+from fulmar_core.controllers.classical import check_pair, load_classical
 from fulmar_core.controllers.controller import Controller
-from fulmar_core.controllers.excite import Excite, excite_of, excite_tasks
+from fulmar_core.controllers.excite import Excite
 from fulmar_core.loop.policy_bundle import PASSPORT, read_passport
 from fulmar_core.robots.robot import Robot
 from fulmar_core.tasks import Task
@@ -80,16 +82,12 @@ def _law(title: str, law: str | None, *, draws: bool = False) -> ControllerEntry
 
 
 def _load_excite(robot: Robot, task: Task, choice: Choice) -> Controller:
-    torques = load_torques(choice.excitation) if choice.excitation else None
-    return excite_of(robot, task, control_hz=choice.control_hz, torques=torques)
+    torques: Any = load_torques(choice.excitation) if choice.excitation else None
+    return exciting(robot)(robot, task, torques, control_hz=choice.control_hz)
 
 
 def _check_excite(robot: Robot, task: Task) -> None:
-    tasks = excite_tasks(robot)
-    if not tasks:
-        raise ConfigError(
-            f"controller 'excite' is not for {robot.kind.name} such as '{robot.name}': random commands crash it."
-        )
+    tasks = exciting(robot).TASKS
     if task.kind not in tasks:
         raise ConfigError(
             f"controller 'excite' stays around one place, '{task.name}' has none. "
@@ -112,7 +110,7 @@ def _check_own(name: str, robot: Robot, task: Task) -> None:
     load_class(name, members=MEMBERS, what="controller")
 
 
-_LAWS = ", ".join(f"{entry.law.title} ({', '.join(families_of(law))})" for law, entry in LAWS.items())
+_USUAL = [next(iter(laws.values())).law.title for families in LAWS.values() for laws in families.values()]
 CONTROLLERS = {
     "policy": ControllerEntry(
         "a learned policy bundle", _load_policy, _any_pair, ("onnxruntime",), runs_bundle=True
@@ -125,7 +123,7 @@ CONTROLLERS = {
     "adaptive": _law("control of a satellite's attitude with its estimated inertia", "adaptive"),
     "mpc": _law("predictive control that tries combinations of valves", "mpc"),
     "lqr_drift": _law("the published LQR of DRIFT, to compare with", "lqr_drift"),
-    "classical": _law(f"the law of the robot's family: {_LAWS}", None),
+    "classical": _law(f"the law of the robot's family: {'; '.join(dict.fromkeys(_USUAL))}", None),
     "excite": ControllerEntry(Excite.title, _load_excite, _check_excite, strives=False),
     EXTERNAL: ControllerEntry(
         "any node that publishes commands, started by you", _load_external, _any_pair, is_external=True

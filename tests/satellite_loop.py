@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from fulmar_core.controllers.by_kind import exciting
 from fulmar_core.controllers.classical import load_classical
-from fulmar_core.controllers.excite import excite_of
 from fulmar_core.estimators.kinds import make_estimator
 from fulmar_core.estimators.readings import reading_problem
 from fulmar_core.loop.control_loop import ControlLoop
@@ -89,7 +89,7 @@ def fly(
     sensors.reset(seed, 0)
     estimator = make_estimator("attitude", robot, exact_sensors=not the_scenario.sensor_noise)
     excites = law == "excite"
-    controller = excite_of(robot, the_task) if excites else load_classical(robot, the_task, law=law)
+    controller = exciting(robot)(robot, the_task) if excites else load_classical(robot, the_task, law=law)
     loop = ControlLoop(robot, the_task, controller)
     loop.begin(simulation.goal)
     command = robot.actuators.safe_command

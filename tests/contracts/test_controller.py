@@ -13,11 +13,12 @@ import pytest
 
 from fulmar_core.config.errors import ConfigError
 from fulmar_core.config.paths import config_names
-from fulmar_core.controllers.classical import LAWS, families_of
+from fulmar_core.controllers.by_kind import LAWS, laws_of
 from fulmar_core.estimators.actuator_health.filters import HealthSettings
 from fulmar_core.loop.control_loop import ControlLoop
 from fulmar_core.loop.policy_bundle import read_passport
 from fulmar_core.robots.actuators.families import FAMILIES
+from fulmar_core.robots.kinds import KINDS
 from fulmar_core.simulation.simulation import BatchSimulation
 from fulmar_core.states.planar import at_rest
 from fulmar_core.states.spatial import SpatialState, position_of, quat_of
@@ -217,18 +218,20 @@ def test_pairs_without_a_law_are_refused_with_what_to_use_instead(name):
     lacking = [(r, t) for r in ROBOTS.values() for t in TASKS.values() if not has_one(name, r, t)]
     assert lacking
     for robot, task in lacking:
-        if name == "lqr" and robot.actuators.kind not in families_of("lqr"):
-            families = "thrusters or fans or reaction_wheels or control_surfaces"
-            expected = rf"'lqr' is for robots with {families}; '{robot.name}' .*Use --controller classical"
-        elif task.state_type is robot.state_type:
+        if name == "lqr" and "lqr" not in laws_of(robot):
+            expected = (
+                rf"'lqr' is for .* with thrusters or fans, .*; '{robot.name}' .*Use --controller classical"
+            )
+        elif robot.kind in task.kinds:
             expected = (
                 rf"on '{robot.name}' .*there is one for: (go_to_|point|follow_).*Use --controller policy"
             )
         else:
-            expected = rf"'{robot.name}' moves in .*'{task.name}' is a task in .*Choose one of: (go_to_|point|follow_)"
+            expected = rf"task '{task.name}' is for .*; '{robot.name}' is one of the .*`fulmar list tasks` shows others"
         with pytest.raises(ConfigError, match=expected):
             load_controller(name, robot, task, Choice(robot.timing.control_hz))
 
 
 def test_every_law_drives_a_family_and_every_family_names_a_law():
-    assert {family.law for family in FAMILIES.values()} == set(LAWS)
+    assert {family for families in LAWS.values() for family in families} == set(FAMILIES)
+    assert set(LAWS) == set(KINDS)

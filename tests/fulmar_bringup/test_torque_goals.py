@@ -14,8 +14,8 @@ from fulmar_bringup.node_table import controller_spec
 from fulmar_bringup.task_choice import task_of_run
 from fulmar_core.config.errors import ConfigError
 from fulmar_core.config.paths import config_names
+from fulmar_core.controllers.by_kind import exciting
 from fulmar_core.controllers.controller import Inputs
-from fulmar_core.controllers.excite import excite_of
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.simulation.simulation import BatchSimulation
 from fulmar_core.tasks import load_task
@@ -98,7 +98,7 @@ def test_our_own_profile_uses_the_wheels_and_saturates_none(name):
 def fastest(robot, goals, seconds):
     """Largest speed of a wheel while the controller plays, by the momentum that the body lacks [rad/s]."""
     task, hz = load_task("point_inertial"), robot.timing.control_hz
-    controller = excite_of(robot, task, torques=load_torques(goals))
+    controller = exciting(robot)(robot, task, load_torques(goals))
     simulation = BatchSimulation(robot, task, load_scenario("nominal"), worlds=1, seed=0)
     largest, previous = 0.0, np.zeros((1, len(robot.actuators.names)))
     for k in range(round(seconds * hz)):

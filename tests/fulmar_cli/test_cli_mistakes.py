@@ -43,7 +43,7 @@ def broken_configs(tmp_path, monkeypatch):
             ["run", "turtlebot2", "--task", "race_waypoints", "--controller", "classical", "--goal", "1,2,0"],
             "the targets of task 'race_waypoints' do not fit into one --goal",
         ),
-        (["run", "leatherback", "--controller", "lqr"], "controller 'lqr' is for robots with thrusters"),
+        (["run", "leatherback", "--controller", "lqr"], "controller 'lqr' is for robots that are pushed in the plane"),
         (
             [*RUN, "--controller", "fuzzy"],
             "unknown controller 'fuzzy'. Known: adaptive, classical, excite, external, lqi, lqr, lqr_drift, mpc, "
@@ -51,8 +51,8 @@ def broken_configs(tmp_path, monkeypatch):
         ),
         (
             ["evaluate", "floating_platform", "go_to_pose", "--controller", "pd"],
-            "'pd' is for robots with thrusters or fans or reaction_wheels in space; 'floating_platform' moves in "
-            "the plane",
+            "'pd' is for bodies that are pushed in space with thrusters or fans, satellites that only turn with "
+            "reaction_wheels; 'floating_platform' is one of the robots that are pushed in the plane",
         ),
         (
             ["evaluate", "spacecraft_16", "go_to_pose", "--controller", "pd"],
@@ -286,7 +286,7 @@ def test_a_run_folder_is_never_trained_into(fulmar, tmp_path):
 
 @pytest.mark.parametrize(
     ("words", "advice"),
-    [([*CRAFT, "--controller", "mpc"], "Use --controller lqr or pd."),
+    [([*CRAFT, "--controller", "mpc"], "Use --controller classical."),
      (["run", "leatherback", "--controller", "lqr"], "Use --controller classical.")],
 )  # fmt: skip
 def test_a_controller_of_another_kind_of_robot_gets_one_advice(fulmar, words, advice):

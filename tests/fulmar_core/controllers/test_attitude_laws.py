@@ -120,7 +120,7 @@ def test_a_task_that_moves_a_body_is_refused_for_a_satellite_and_the_other_way_r
         ConfigError, match=r"'slew' is for satellites .*'spacecraft_16' is one of the bodies that are pushed"
     ):
         load_task("slew").check(load_robot("spacecraft_16"))
-    with pytest.raises(ConfigError, match="controller 'adaptive' is for robots with reaction_wheels"):
+    with pytest.raises(ConfigError, match="'adaptive' is for satellites that only turn with reaction_wheels"):
         check_pair(load_robot("spacecraft_16"), load_task("go_to_pose_3d"), law="adaptive")
 
 

@@ -11,7 +11,8 @@ import pytest
 from fulmar_core.config.errors import ConfigError
 from fulmar_core.config.paths import config_names, config_path
 from fulmar_core.config.strict_yaml import load_config
-from fulmar_core.controllers.classical import LAWS, OTHERS, SPACE_LAWS, check_pair, has_law, load_classical
+from fulmar_core.controllers.by_kind import LAWS, laws_of
+from fulmar_core.controllers.classical import check_pair, entry_of, has_law, load_classical
 from fulmar_core.controllers.excite import Excite
 from fulmar_core.controllers.guidance import way_to_face
 from fulmar_core.loop.rollout import roll_out_in_batch
@@ -48,7 +49,9 @@ def command(robot, task, state, *targets, previous=None):
 
 # Robots of a family take turns at its tasks.
 QUICK = {
-    pair for law in LAWS for pair in covering((r.name, t.name) for r, t in PAIRS if r.actuators.law == law)
+    pair
+    for law in {entry_of(robot, None).law for robot, _ in PAIRS}
+    for pair in covering((r.name, t.name) for r, t in PAIRS if entry_of(r, None).law is law)
 } - {("cubesat_wheels", "point")}  # ten minutes of an orbit
 QUICK = {(robot, task) for robot, task in QUICK if not ROBOTS[robot].flies}  # a minute at 100 Hz each
 
@@ -186,13 +189,13 @@ def test_a_boat_goes_astern_to_a_pose_that_looks_away_from_it():
 NUMBERS = [
     (robot, field.name)
     for robot in (ROBOTS["turtlebot2"], BOAT, ROBOTS["leatherback"])
-    for field in fields(LAWS[robot.actuators.law].gains)
+    for field in fields(entry_of(robot, None).gains)
 ]
 
 
 @pytest.mark.parametrize(("robot", "name"), NUMBERS, ids=lambda value: getattr(value, "name", value))
 def test_the_metadata_hash_changes_with_every_gain(robot, name):
-    entry = LAWS[robot.actuators.law]
+    entry = entry_of(robot, None)
     gains = load_config(entry.gains, config_path("controllers", f"{robot.name}_{entry.law.law}"))
     task, other = TASKS["go_to_position"], replace(gains, **{name: 1.01 * getattr(gains, name)})
     metadata = entry.law(robot, task, other).metadata()
@@ -214,30 +217,21 @@ def test_a_heading_gain_that_would_not_be_stable_is_refused():
 
 def test_docs_state_of_every_law_and_of_every_task_that_one_does():
     text = (Path(__file__).parents[3] / "docs/controllers.md").read_text(encoding="utf-8")
-    entries = {**LAWS, **{law: entry for law, (_, entry) in OTHERS.items()}}
-    names = set(entries) | {entry.law.law for entry in entries.values()} | set(SPACE_LAWS)
-    tasks = {
-        task
-        for entry in (*entries.values(), *SPACE_LAWS.values())
-        for task in entry.tasks
-        if task != "track_velocities"
-    }
+    kinds = ("planar", "rolling", "free_flyer")
+    entries = {law: entry for kind in kinds for laws in LAWS[kind].values() for law, entry in laws.items()}
+    names = set(entries) | {entry.law.law for entry in entries.values()}
+    tasks = {task for entry in entries.values() for task in entry.tasks if task != "track_velocities"}
     assert {name for name in names | tasks if f"`{name}`" not in text} == set()
 
 
 def test_every_file_of_gains_belongs_to_a_robot_and_its_law():
     # Bodies in space do with default gains.
     in_plane = [robot for robot in ROBOTS.values() if robot.state_type is PlanarState]
-    every = {f"{robot.name}_{LAWS[robot.actuators.law].law.law}" for robot in in_plane}
-    others = {
-        f"{robot.name}_{law}"
-        for law, (family, _) in OTHERS.items()
-        for robot in ROBOTS.values()
-        if robot.actuators.kind == family
-    }
+    every = {f"{robot.name}_{entry_of(robot, None).law.law}" for robot in in_plane}
+    others = {f"{robot.name}_{law}" for robot in in_plane for law in laws_of(robot)} - every
     found = set(config_names("controllers"))
     assert every <= found <= every | others
-    assert {name.removeprefix("floating_platform_") for name in found & others} == set(OTHERS)
+    assert {name.removeprefix("floating_platform_") for name in found & others} == {"mpc", "lqr_drift"}
 
 
 @dataclass(frozen=True)
@@ -258,7 +252,8 @@ def test_a_family_without_a_law_or_an_excitation_is_named_in_one_line():
     object.__setattr__(robot, "actuators", Sails())
     assert not has_law(robot, task)
     with pytest.raises(
-        ConfigError, match=r"no classical law is for 'turtlebot2' \(sails\); there is one for: "
+        ConfigError,
+        match=r"no classical law is for 'turtlebot2' \(sails\); of robots on wheels there is one for: ",
     ):
         check_pair(robot, task)
     with pytest.raises(ValueError, match=r"'excite' drives thrusters, .*; 'turtlebot2' has sails"):

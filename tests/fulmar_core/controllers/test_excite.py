@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from fulmar_core.config.paths import config_names
-from fulmar_core.controllers.excite import Excite, excite_of
+from fulmar_core.controllers.by_kind import exciting
+from fulmar_core.controllers.excite import Excite
 from fulmar_core.robots.actuators.reaction_wheels import ReactionWheels
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.simulation.simulation import BatchSimulation
@@ -25,7 +26,7 @@ def commands_of(name, *, seconds=90.0, worlds=4):
     robot = load_robot(name)
     task = load_task("point_inertial" if robot.actuators.turns_only else TASKS[robot.state_type])
     simulation = BatchSimulation(robot, task, load_scenario("nominal"), worlds=worlds, seed=3)
-    controller = excite_of(robot, task)
+    controller = exciting(robot)(robot, task)
     commands, far = [], 0.0
     for step in range(round(seconds * controller.control_hz)):
         stamp = 1_000_000_000 + round(1e9 * step / controller.control_hz)
@@ -62,7 +63,7 @@ def test_a_spacecraft_turns_about_every_axis_by_less_than_a_quarter_turn_a_step_
     """What identification needs: between two poses, 0.2 s apart, the shorter way round is the true one."""
     robot, task = load_robot("spacecraft_16"), load_task("go_to_pose_3d")
     simulation = BatchSimulation(robot, task, load_scenario("nominal"), worlds=4, seed=3, training=True)
-    controller, rates, far = excite_of(robot, task), [], []
+    controller, rates, far = exciting(robot)(robot, task), [], []
     for _ in range(round(180.0 * controller.control_hz)):
         simulation.step(controller.act(inputs_of(simulation)))
         rates.append(np.stack(simulation.truth.rate, axis=-1))
@@ -77,5 +78,5 @@ def test_a_row_in_space_does_not_depend_on_its_neighbours():
     robot, task = load_robot("spacecraft_16"), load_task("go_to_pose_3d")
     simulation = BatchSimulation(robot, task, load_scenario("nominal"), worlds=3, seed=3)
     inputs = inputs_of(simulation)
-    together = excite_of(robot, task).act(inputs)
-    assert np.array_equal(excite_of(robot, task).act(some_of(inputs, slice(1, 2))), together[1:2])
+    together = exciting(robot)(robot, task).act(inputs)
+    assert np.array_equal(exciting(robot)(robot, task).act(some_of(inputs, slice(1, 2))), together[1:2])

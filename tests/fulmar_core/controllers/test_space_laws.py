@@ -10,7 +10,8 @@ from scipy.spatial.transform import Rotation
 
 from fulmar_core.config.errors import ConfigError
 from fulmar_core.config.paths import config_names
-from fulmar_core.controllers.classical import SPACE_LAWS, check_pair, gains_of, has_law, load_classical
+from fulmar_core.controllers.by_kind import laws_of
+from fulmar_core.controllers.classical import check_pair, gains_of, has_law, load_classical
 from fulmar_core.controllers.space_frame import SpaceFrame
 from fulmar_core.estimators.actuator_health.actuator_estimator import ActuatorEstimate
 from fulmar_core.loop.rollout import roll_out_in_batch
@@ -25,6 +26,7 @@ from tests.inputs import inputs_at, some_of
 ROBOT = load_robot("spacecraft_16")
 TASKS = [load_task(name) for name in config_names("tasks") if load_task(name).kind.endswith("_3d")]
 POSE = load_task("go_to_pose_3d")
+SPACE_LAWS = laws_of(ROBOT)
 LAWS = pytest.mark.parametrize("law", SPACE_LAWS)
 UNEVEN = replace(ROBOT, body=replace(ROBOT.body, inertia=(0.20, 0.26, 0.33, 0.02, -0.03, 0.04)))
 
@@ -198,17 +200,27 @@ def test_gains_that_cannot_be_are_refused():
             "floating_platform",
             "go_to_pose",
             "pd",
-            "'pd' is for robots with thrusters or fans or reaction_wheels in space",
+            "'pd' is for bodies that are pushed in space with thrusters or fans, satellites that only turn",
         ),
-        ("turtlebot2", "go_to_pose", "pd", "'turtlebot2' moves in the plane. Use --controller classical"),
+        (
+            "turtlebot2",
+            "go_to_pose",
+            "pd",
+            "'turtlebot2' is one of the robots on wheels with differential_drive. Use",
+        ),
         (
             "spacecraft_16",
             "go_to_pose_3d",
             "mpc",
-            "'spacecraft_16' floats in space. Use --controller lqr or pd",
+            "'spacecraft_16' is one of the bodies that are pushed in space with thrusters. Use --controller classical",
         ),
-        ("spacecraft_16", "go_to_pose", "lqr", "'go_to_pose' is a task in the plane"),
-        ("floating_platform", "go_to_pose_3d", "lqr", "'go_to_pose_3d' is a task in space"),
+        ("spacecraft_16", "go_to_pose", "lqr", "'go_to_pose' is for robots that are pushed in the plane"),
+        (
+            "floating_platform",
+            "go_to_pose_3d",
+            "lqr",
+            "'go_to_pose_3d' is for bodies that are pushed in space",
+        ),
     ],
 )
 def test_a_law_or_a_task_of_the_other_space_is_one_line(robot, task, law, said):

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from fulmar_benchmarks.falcon.published import BESIDE
-from fulmar_core.controllers.classical import FLIGHT_LAWS, gains_of
+from fulmar_core.controllers.by_kind import LAWS
+from fulmar_core.controllers.classical import gains_of
 from fulmar_core.controllers.controller import Controller
 from fulmar_core.loop.rollout import roll_out_in_batch
 from fulmar_core.robots.robot import Robot
@@ -27,6 +28,7 @@ from policy_server.controllers import Choice, load_controller, usual_hz
 TASKS = ("hold", *PATHS)
 CONTROLLERS = ("lqi", "lqr", "mppi", "pid", "policy")
 # Controllers that draw: flights with exact state differ by their seeds.
+FLIGHT_LAWS = LAWS["aircraft"]["control_surfaces"]
 RANDOM = tuple(name for name, entry in FLIGHT_LAWS.items() if entry.draws)
 LATE_S = 0.02  # delay of measurements in `delay` and `all`, of commands in `late`
 NOISY = 2.0  # times the noise of the sensors: the mild row of FALCON-S

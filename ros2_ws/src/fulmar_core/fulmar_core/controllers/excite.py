@@ -14,13 +14,10 @@ import numpy as np
 
 from fulmar_core.controllers.body_frame import BodyFrame
 from fulmar_core.controllers.controller import Inputs
-from fulmar_core.controllers.excite_wheels import TASKS as TURNING
-from fulmar_core.controllers.excite_wheels import ExciteWheels
 from fulmar_core.controllers.law import Law
-from fulmar_core.dynamics.actuators.actuation import ActuationState
 from fulmar_core.dynamics.by_kind import dynamics_of
 from fulmar_core.dynamics.linear_model import calm, nominal_worlds
-from fulmar_core.dynamics.motion import actuation_of, move
+from fulmar_core.dynamics.motion import actuation_of
 from fulmar_core.robots.actuators.excitation import Excitation
 from fulmar_core.robots.actuators.families import FAMILIES
 from fulmar_core.robots.robot import Robot
@@ -29,23 +26,14 @@ from fulmar_core.states.planar import PlanarState
 from fulmar_core.states.spatial import SpatialState, position_of
 from fulmar_core.states.state import State
 from fulmar_core.tasks import Task
-from fulmar_core.tasks.excitation import Torques
 
-IN_PLANE, IN_SPACE = ("go_to_position", "go_to_pose"), ("go_to_position_3d", "go_to_pose_3d")
-# Tasks with one place to stay around, by the kind of robot; no other kind is excited.
-TASKS = {"planar": IN_PLANE, "rolling": IN_PLANE, "free_flyer": IN_SPACE, "satellite": TURNING}
 SEED = 5  # of the commands: any number
-
-
-def excite_tasks(robot: Robot) -> tuple[str, ...]:
-    """Kinds of tasks that `excite` drives a robot at."""
-    return TASKS.get(robot.kind.name, ())
 
 
 class Excite(Law):
     """Random commands around a goal, of a robot in the plane."""
 
-    FORM: ClassVar[type[State]] = PlanarState
+    TASKS: ClassVar[tuple[str, ...]] = ("go_to_position", "go_to_pose")  # with one place to stay around
     HOW: ClassVar[Excitation | None] = None  # in place of that of the robot's family
     law = "excite"
     title = "random commands, to identify the robot by"
@@ -57,13 +45,12 @@ class Excite(Law):
 
         Args:
             robot: The robot.
-            task: One of `excite_tasks`; its goal is the middle of the room.
+            task: One of `TASKS`; its goal is the middle of the room.
             gains: How restless; the usual of the robot's family by default.
             control_hz: Command rate; the robot's own by default [Hz].
         """
-        tasks = excite_tasks(robot)
-        if task.kind not in tasks:
-            raise ValueError(f"'excite' stays around one place; tasks for that are {', '.join(tasks)}.")
+        if task.kind not in self.TASKS:
+            raise ValueError(f"'excite' stays around one place; tasks for that are {', '.join(self.TASKS)}.")
         how = gains or (robot.actuators.excitation and (self.HOW or robot.actuators.excitation))
         if how is None:
             families = ", ".join(kind for kind, family in FAMILIES.items() if family.excitation)
@@ -71,11 +58,11 @@ class Excite(Law):
         self._how = how
         super().__init__(robot, task, self._how, control_hz=control_hz)
         self._off_centre = any(robot.body.center_of_mass)
+        self._frame = BodyFrame(robot, task)
 
     def bind(self) -> None:
         """See `Law.bind`."""
-        self._frame = BodyFrame(self.robot, self.task)
-        self._world: Any = nominal_worlds(self.robot, 1)
+        self._dynamics, self._world = dynamics_of(self.robot, calm()), nominal_worlds(self.robot, 1)
 
     def reset(self) -> None:
         """Begin the sequence anew."""
@@ -104,7 +91,18 @@ class Excite(Law):
         actuation = actuation_of(self.robot, safe)
         actuation.begin(candidates.T, self._world, None)
         substeps = steps * self.robot.timing.substeps(self.control_hz)
-        away, turning = self._ahead(inputs, actuation, substeps)
+        before = self._around_goal(inputs).mapped(lambda part: np.tile(part, how.far))
+        still = (np.zeros(1),) * 3
+        after = self._dynamics.move(
+            before,
+            actuation,
+            self._world,
+            still,
+            substeps=substeps,
+            latest_s=0.0,
+            off_centre=self._off_centre,
+        )
+        away, turning = self._departure(after)
         miss, spin = away / room, turning / self.robot.performance.yaw_rate
         cost = (miss**2 + how.calm * spin**2).reshape(how.far, count)
         cost = np.where(np.arange(how.far)[:, None] < allowed, cost, np.inf)
@@ -115,84 +113,35 @@ class Excite(Law):
         """From the goal, shape (n,) [m]."""
         return np.asarray(np.hypot(*self._frame.goal(inputs)))
 
-    def _ahead(
-        self, inputs: Inputs, actuation: ActuationState, substeps: int
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Where candidates lead: distance from the goal, the last velocity gone on [m], and turn rate [rad/s].
-
-        Args:
-            inputs: Of n robots.
-            actuation: With the candidates' commands, n of each after those of the one before.
-            substeps: For which they are held.
-        """
-        how = self._how
+    def _around_goal(self, inputs: Inputs) -> State:
+        """Where n robots are, seen from their goals."""
         x, y = self._frame.goal(inputs)
-        u, v, r = self._frame.motion(inputs)
-        before = PlanarState(*(np.tile(part, how.far) for part in (-x, -y, 0.0 * x, u, v, r)))
-        still = (np.zeros(1),) * 3
-        after = move(
-            self.robot,
-            before,
-            actuation,
-            self._world,
-            still,
-            substeps=substeps,
-            latest_s=0.0,
-            off_centre=self._off_centre,
-        )
-        ahead = how.foresight_s
+        return PlanarState(-x, -y, 0.0 * x, *self._frame.motion(inputs))
+
+    def _departure(self, after: Any) -> tuple[np.ndarray, np.ndarray]:
+        """Of candidates: distance from the goal, the last velocity gone on [m], and turn rate [rad/s]."""
+        ahead = self._how.foresight_s
         return np.hypot(after.x + ahead * after.vx, after.y + ahead * after.vy), after.yaw_rate
 
 
 class ExciteInSpace(Excite):
     """Random commands around a goal, of a body in space; its attitude does not count."""
 
-    FORM = SpatialState
+    TASKS = ("go_to_position_3d", "go_to_pose_3d")
     # A command that pushes in the world turns with the body: more candidates, and a longer look ahead.
     HOW = Excitation(hold_s=0.6, foresight_s=8.0, near=6, far=48)
-
-    def bind(self) -> None:
-        """See `Law.bind`."""
-        self._dynamics = dynamics_of(self.robot, calm())
-        self._world = nominal_worlds(self.robot, 1)
 
     def _distance(self, inputs: Inputs) -> np.ndarray:
         """See `Excite._distance`."""
         return np.asarray(inputs.state.distance_to(inputs.goal.current))
 
-    def _ahead(
-        self, inputs: Inputs, actuation: ActuationState, substeps: int
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """See `Excite._ahead`."""
-        how, state = self._how, inputs.state
+    def _around_goal(self, inputs: Inputs) -> State:
+        """See `Excite._around_goal`."""
+        state = inputs.state
         away = minus(state.position, position_of(inputs.goal.current))
-        parts = (*away, *state.quat, *state.velocity, *state.rate)
-        after = self._dynamics.move(
-            SpatialState(*(np.tile(part, how.far) for part in parts)),
-            actuation,
-            self._world,
-            (np.zeros(1),) * 3,
-            substeps=substeps,
-            latest_s=0.0,
-            off_centre=self._off_centre,
-        )
-        then = plus(after.position, scaled(how.foresight_s, after.velocity))
+        return SpatialState(*away, *state.quat, *state.velocity, *state.rate)
+
+    def _departure(self, after: Any) -> tuple[np.ndarray, np.ndarray]:
+        """See `Excite._departure`."""
+        then = plus(after.position, scaled(self._how.foresight_s, after.velocity))
         return np.asarray(length(then)), np.asarray(length(after.rate))
-
-
-def excite_of(
-    robot: Robot, task: Task, *, control_hz: float | None = None, torques: Torques | None = None
-) -> Law:
-    """The controller `excite` of a robot; arguments and errors as of `Excite`, or of `ExciteWheels` for satellites.
-
-    Args:
-        robot: The robot.
-        task: What it would do.
-        control_hz: Command rate; the robot's own by default [Hz].
-        torques: Profile of a satellite; our own by default.
-    """
-    tasks = excite_tasks(robot)
-    if tasks == TURNING:
-        return ExciteWheels(robot, task, torques, control_hz=control_hz)
-    kind = Excite if tasks == IN_PLANE else ExciteInSpace
-    return kind(robot, task, control_hz=control_hz)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import numpy as np
 
 from fulmar_core.controllers.controller import Inputs
@@ -12,13 +14,13 @@ from fulmar_core.tasks import Task
 from fulmar_core.tasks.excitation import Torques
 from fulmar_core.tasks.torque_profiles import gain_of, profile_of
 
-TASKS = ("point",)
 PARTS = 20  # of a control period, over which the mean of a profile is taken
 
 
 class ExciteWheels(Law):
     """Plays a profile from its beginning, from the first step on."""
 
+    TASKS: ClassVar[tuple[str, ...]] = ("point",)
     law = "excite"
     title = "a profile of torques, to identify the inertia by"
 
@@ -37,8 +39,10 @@ class ExciteWheels(Law):
         Raises:
             ValueError: The task does not turn a satellite.
         """
-        if task.kind not in TASKS:
-            raise ValueError(f"'excite' turns a satellite; tasks for that are of kind {', '.join(TASKS)}.")
+        if task.kind not in self.TASKS:
+            raise ValueError(
+                f"'excite' turns a satellite; tasks for that are of kind {', '.join(self.TASKS)}."
+            )
         super().__init__(robot, task, gains or Torques(), control_hz=control_hz)
 
     def bind(self) -> None:

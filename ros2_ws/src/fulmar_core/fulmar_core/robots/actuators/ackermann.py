@@ -36,8 +36,6 @@ class Ackermann(Rolling):
     friction: float  # of the tyres on the floor [-]
     response: Response = Response()
 
-    law = "pure_pursuit"
-
     def __post_init__(self) -> None:
         positive = (
             self.wheel_radius, self.track, self.wheelbase, self.max_speed,

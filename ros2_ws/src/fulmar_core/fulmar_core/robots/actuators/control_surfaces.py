@@ -76,7 +76,6 @@ class ControlSurfaces(Actuators):
     servo_damping: float  # of them [-]
     response: Response = Response()  # only its delay and gain: servos have dynamics of their own
 
-    law = "lqr"
     flies = True
     plausible = (  # wings reach farther than other robots, and carry their mass near the middle
         Plausible("body.radius", "m", (0.01, 30.0), (0.3, 10.0), "from hand-launched models to light aircraft"),

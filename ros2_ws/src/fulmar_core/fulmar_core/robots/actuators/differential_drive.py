@@ -31,7 +31,6 @@ class DifferentialDrive(Rolling):
     caster_x: float  # where the casters are, ahead and behind the axle; negative: behind alone [m]
     response: Response = Response()
 
-    law = "polar"
     takes_velocity = True
 
     def __post_init__(self) -> None:

@@ -29,7 +29,6 @@ class Actuators(ABC):
         kind: Name of the family: the key `kind` of the YAML.
         response: How fast actuators follow their commands.
         tank: What feeds thrusters; None: their supply never falls by itself.
-        law: Name of the classical law that drives the family (`controllers/classical.py`); empty for none.
         excitation: Random commands that identify it; None: the controller `excite` rejects the family.
         one_way: Commands go from 0 to `scale`; else from -scale to scale.
         opens_late: Actuators may take longer to begin than to end, as valves do.
@@ -44,7 +43,6 @@ class Actuators(ABC):
     tank: Tank | None = None
     __dataclass_fields__: ClassVar[dict[str, Field[Any]]]  # every family is a frozen dataclass
 
-    law: ClassVar[str] = ""
     excitation: ClassVar[Excitation | None] = None
     one_way: ClassVar[bool] = False
     opens_late: ClassVar[bool] = False

@@ -32,7 +32,6 @@ class Fans(Pushing):
     fans: tuple[Fan, ...]
     response: Response = Response()
 
-    law = "lqr"
     one_way = True
     shared_pressure = False
     plausible = (

@@ -34,7 +34,6 @@ class Propellers(Pushing):
     curve: tuple[float, ...]  # thrust at evenly spaced commands from -1 to 1 [N]
     response: Response = Response()
 
-    law = "line_of_sight"
     excitation = Excitation(
         hold_s=6.0, foresight_s=2.0, calm=0.0
     )  # long enough to come up to speed, and to stop

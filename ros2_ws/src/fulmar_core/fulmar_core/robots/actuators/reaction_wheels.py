@@ -74,7 +74,6 @@ class ReactionWheels(Actuators):
     unloading: Unloading | None = None
     response: Response = Response()
 
-    law = "lqr"
     turns_only = True
     excitation = Excitation(hold_s=20.0, foresight_s=0.0, calm=1.0)
     plausible = (

@@ -41,7 +41,6 @@ class Thrusters(Pushing):
     response: Response = Response()
     tank: Tank | None = None  # that feeds them; None: the supply never falls by itself
 
-    law = "lqr"
     one_way = True
     opens_late = True
 
