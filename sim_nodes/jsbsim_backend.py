@@ -14,9 +14,7 @@ import numpy as np
 
 from fulmar_core.config.errors import SafetyError
 from fulmar_core.dynamics.flight_dynamics import FlightDynamics, flipped
-from fulmar_core.dynamics.motion import truths_of
 from fulmar_core.robots.robot import Robot
-from fulmar_core.robots.sensors.air_data import NAME as AIR
 from fulmar_core.robots.sensors.kind import Truth
 from fulmar_core.robots.sensors.simulated import SimulatedSensors
 from fulmar_core.simulation.backend import Sample
@@ -201,6 +199,8 @@ class JsbsimBackend:
             force = [0.0, 0.0, 0.0]
         felt_force = self._in_robots_axes(force[0], force[1], force[2])
         world: Any = self._world.world  # of an aircraft
-        air = self._dynamics.air_data(SpatialState.from_rigid(truth)[None], self._gust, world)
-        felt = Truth(truth, felt_force, {AIR: air, **truths_of(self.robot, self._world.actuation)})
+        state = SpatialState.from_rigid(truth)[None]
+        felt = Truth(
+            truth, felt_force, self._dynamics.truths(state, self._world.actuation, world, self._gust)
+        )
         return Sample({"odometry": Reading(odometry), **self._sensors.measure(felt, self._time_s)}, truth)

@@ -2,21 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
-from fulmar_core.dynamics.flight_dynamics import FlightDynamics
-from fulmar_core.dynamics.motion import truths_of
 from fulmar_core.dynamics.things import Poses, Thing
 from fulmar_core.robots.robot import Robot
-from fulmar_core.robots.sensors.air_data import NAME as AIR
-from fulmar_core.robots.sensors.air_data import AirData
 from fulmar_core.robots.sensors.kind import Truth
 from fulmar_core.robots.sensors.simulated import SimulatedSensors
 from fulmar_core.simulation.backend import Sample
 from fulmar_core.simulation.episode import Episode
-from fulmar_core.states.spatial import SpatialState
 from fulmar_core.states.state import State
 from fulmar_core.wires.reading import Reading
 from sim_nodes.one_world import OneWorld
@@ -75,17 +68,11 @@ class MockBackend:
     def close(self) -> None:
         """Nothing to release."""
 
-    def _air(self) -> dict[str, AirData]:
-        dynamics = self._world.dynamics
-        world: Any = self._world.world
-        if not isinstance(dynamics, FlightDynamics) or not isinstance(self._state, SpatialState):
-            return {}
-        return {AIR: dynamics.air_data(self._state, None, world)}
-
     def _sample(self, ticks: int = 0) -> Sample:
         self._ticks += ticks
         truth = self._state[0].to_rigid()
-        true = Truth(truth, more=truths_of(self.robot, self._world.actuation) | self._air())
+        world = self._world
+        true = Truth(truth, more=world.dynamics.truths(self._state, world.actuation, world.world))
         others = self._sensors.measure(true, self._ticks * self.robot.timing.physics_dt)
         things = {name: pose[0] for name, pose in self._poses.items()}
         return Sample({"odometry": Reading(truth), **others}, truth, things)

@@ -9,7 +9,6 @@ import mujoco
 import numpy as np
 
 from fulmar_core.config.errors import SafetyError
-from fulmar_core.dynamics.motion import truths_of
 from fulmar_core.dynamics.things import Thing
 from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.sensors.kind import Truth
@@ -140,7 +139,7 @@ class MujocoBackend:
         position[2] -= self._scene.robot_model.rest_height
         w, x, y, z = read["attitude"]
         state = RigidBodyState(position, np.array([x, y, z, w]), read["velocity"], read["gyroscope"])
-        more = truths_of(self.robot, self._world.actuation) | self._scene.robot_model.own_truth(self.data)
+        more = self._world.actuation.truths() | self._scene.robot_model.own_truth(self.data)
         return Truth(state, read["accelerometer"], more)
 
     def _sample(self, truth: Truth, odometry: RigidBodyState) -> Sample:

@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_core.dynamics.by_kind import dynamics_of
-from fulmar_core.dynamics.motion import actuation_of
+from fulmar_core.dynamics.by_kind import actuation_of, dynamics_of
 from fulmar_core.robots.robot import Robot
 from fulmar_core.simulation.episode import Episode
 from fulmar_core.simulation.simulation import ACTUATOR_NOISE

@@ -9,10 +9,8 @@ import numpy as np
 
 from fulmar_core.dynamics.actuators.actuation import ActuationState
 from fulmar_core.dynamics.flight_dynamics import FlightDynamics
-from fulmar_core.dynamics.motion import truths_of
 from fulmar_core.dynamics.rigid_body import inertia_of
 from fulmar_core.robots.robot import Robot
-from fulmar_core.robots.sensors.air_data import NAME as AIR
 from fulmar_core.states.gravity import GRAVITY
 from fulmar_core.states.spatial import SpatialState
 from fulmar_core.worlds.turbulence import Gust
@@ -79,8 +77,7 @@ class Aircraft:
     def own_truth(self, data: mujoco.MjData) -> dict[str, Any]:
         """What air probes and servos would measure without errors."""
         assert self._actuation is not None  # as of `fly_in`
-        air = self._dynamics.air_data(self._state(data), self._gust, self._world)
-        return {AIR: air, **truths_of(self._robot, self._actuation)}
+        return self._dynamics.truths(self._state(data), self._actuation, self._world, self._gust)
 
     def drive(
         self, model: mujoco.MjModel, data: mujoco.MjData, applied: np.ndarray, gain: np.ndarray, outside: Any

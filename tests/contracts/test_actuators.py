@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from fulmar_core.config.errors import ConfigError
+from fulmar_core.dynamics.batch_dynamics import PlanarDynamics, RollingDynamics
+from fulmar_core.dynamics.by_kind import actuation_of
 from fulmar_core.dynamics.linear_model import linearise, linearise_wrench
-from fulmar_core.dynamics.motion import actuation_of, move
 from fulmar_core.loop.teleop import Wish, hand_mapping
 from fulmar_core.robots.actuators.families import FAMILIES
 from fulmar_core.robots.actuators.pushing import PLANAR, Pushing
@@ -207,8 +208,8 @@ def moved(robot, state, command, *, seconds):
     world = nominal_world(robot)
     actuation = actuation_of(robot, command[:, None])
     actuation.begin(command[:, None], world, None)
-    after = move(
-        robot,
+    in_plane = RollingDynamics if isinstance(robot.actuators, Rolling) else PlanarDynamics
+    after = in_plane(robot).move(
         PlanarState(*(np.array([state[name]]) for name in PlanarState.COLUMNS)),
         actuation,
         world,

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from fulmar_core.dynamics.by_kind import actuation_of
 from fulmar_core.dynamics.flight_dynamics import FlightDynamics
 from fulmar_core.dynamics.flight_trim import find_trim, still_air
-from fulmar_core.dynamics.motion import actuation_of
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.states.attitude import euler_of, turn_back
 from tests.peers.environment import run_peer

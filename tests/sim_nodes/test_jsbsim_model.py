@@ -8,9 +8,9 @@ import jsbsim
 import numpy as np
 import pytest
 
+from fulmar_core.dynamics.by_kind import actuation_of
 from fulmar_core.dynamics.flight_dynamics import FlightDynamics
 from fulmar_core.dynamics.flight_trim import find_trim, still_air
-from fulmar_core.dynamics.motion import actuation_of
 from fulmar_core.robots.airframe.airframe import flow_past
 from fulmar_core.robots.robot_file import load_robot
 from sim_nodes.jsbsim_model import FOOT, RADIUS_M, write_aircraft

@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 from fulmar_core.config.paths import config_names
+from fulmar_core.dynamics.by_kind import dynamics_of
 from fulmar_core.dynamics.contact import SIDEWAYS, outline_of, push
+from fulmar_core.dynamics.things import Thing
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.simulation.simulation import BatchSimulation
 from fulmar_core.simulation.trajectories import TargetCounter
@@ -131,7 +133,9 @@ def test_a_floating_robot_pays_the_floor_s_work_from_its_speed_and_wheels_hold_t
     work = BLOCK.floor_friction * BLOCK.mass * 9.81 * way
     energy = 0.5 * PLATFORM.body.mass * (0.3**2 - state.vx[0] ** 2)
     assert energy == pytest.approx(work, rel=1e-9)
-    assert pushed(body(vx=0.3), body(0.06, vx=0.3), (BASE.body.radius + 0.15, 0.0))[1].vx.tolist() == [0.3]
+    poses = {"block": np.array([[BASE.body.radius + 0.15, 0.0, 0.0]])}
+    _, base = dynamics_of(BASE).push_things((Thing("block", BLOCK),), poses, body(vx=0.3), body(0.06, vx=0.3))
+    assert base.vx.tolist() == [0.3]
 
 
 def test_a_slow_robot_is_stopped_and_never_thrown_back():

@@ -15,9 +15,8 @@ import numpy as np
 from fulmar_core.controllers.body_frame import BodyFrame
 from fulmar_core.controllers.controller import Inputs
 from fulmar_core.controllers.law import Law
-from fulmar_core.dynamics.by_kind import dynamics_of
+from fulmar_core.dynamics.by_kind import actuation_of, dynamics_of
 from fulmar_core.dynamics.linear_model import calm, nominal_worlds
-from fulmar_core.dynamics.motion import actuation_of
 from fulmar_core.robots.actuators.excitation import Excitation
 from fulmar_core.robots.actuators.families import FAMILIES
 from fulmar_core.robots.robot import Robot

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 
 from fulmar_core.controllers.lqr import regulator
+from fulmar_core.dynamics.by_kind import actuation_of
 from fulmar_core.dynamics.flight_dynamics import FlightDynamics
 from fulmar_core.dynamics.flight_schedule import MOTION, RATE, SPEED, flight_model
 from fulmar_core.dynamics.flight_trim import find_trim, still_air
-from fulmar_core.dynamics.motion import actuation_of
 from fulmar_core.robots.robot import Robot
 from fulmar_core.states.attitude import (
     euler_of,

@@ -14,7 +14,7 @@ from fulmar_core.controllers.flight_reference import Aim
 from fulmar_core.dynamics.actuators.flight_actuation import FlightActuation
 from fulmar_core.dynamics.flight_dynamics import FlightDynamics
 from fulmar_core.dynamics.flight_trim import still_air
-from fulmar_core.dynamics.motion import actuation_of
+from fulmar_core.robots.actuators.control_surfaces import ControlSurfaces
 from fulmar_core.robots.robot import Robot
 from fulmar_core.states.attitude import length
 from fulmar_core.states.rotation import Array
@@ -86,8 +86,8 @@ class FlightRollouts:
         if len(self._world.mass) != total:
             self._world = still_air(self._robot, total)
         state = state.mapped(lambda part: np.repeat(part, each))
-        actuation = actuation_of(self._robot, np.repeat(servos[:, :commands].T, each, axis=1))
-        assert isinstance(actuation, FlightActuation)  # of every aircraft
+        craft = self._robot.actuated_by(ControlSurfaces)
+        actuation = FlightActuation(craft, np.repeat(servos[:, :commands].T, each, axis=1))
         actuation.servo_rates = np.repeat(servos[:, commands:].T, each, axis=1)
         still, cost = (np.zeros(total),) * 3, np.zeros(total)
         for step in range(steps):

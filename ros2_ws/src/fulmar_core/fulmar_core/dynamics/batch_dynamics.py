@@ -1,4 +1,4 @@
-"""How robots of one kind are disturbed, move and are measured in a batch; one class for each state type.
+"""How robots of one kind are disturbed, move and are measured in a batch; `by_kind.py` has the class of each.
 
 Simulators that integrate bodies themselves take disturbances and odometry from here, on a batch of one.
 """
@@ -10,15 +10,18 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, Generic, TypeVar
 
+from fulmar_core.config.errors import ConfigError
 from fulmar_core.dynamics.actuators.actuation import ActuationState
 from fulmar_core.dynamics.actuators.wheel_actuation import WheelActuation
-from fulmar_core.dynamics.free_body import Wrench
+from fulmar_core.dynamics.free_body import Wrench, free_body_step
 from fulmar_core.dynamics.gyrostat import Flywheels, gyrostat_step
-from fulmar_core.dynamics.motion import move
+from fulmar_core.dynamics.motion import to_center
 from fulmar_core.dynamics.rigid_body import inertia_of, rigid_body_step, shifted
+from fulmar_core.dynamics.rolling import rolling_step
 from fulmar_core.dynamics.things import Poses, Thing, push_things
 from fulmar_core.robots.actuators.pushing import Pushing
 from fulmar_core.robots.actuators.reaction_wheels import ReactionWheels
+from fulmar_core.robots.actuators.rolling import Rolling
 from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.sensors.odometer import Odometer
 from fulmar_core.robots.sensors.spatial_odometer import SpatialOdometer
@@ -113,6 +116,23 @@ class Dynamics(ABC, Generic[W, S]):
         """
 
     @abstractmethod
+    def under_wrench(self, state: S, wrench: Array, world: W) -> S:
+        """State after one integration step under a wrench on the body.
+
+        Args:
+            state: Of the centre of mass.
+            wrench: About it and in the body's frame: [F_x, F_y, M_z] or force and torque, shape (3 or 6, worlds).
+            world: In which nothing else pushes.
+
+        Raises:
+            ConfigError: The robot takes no wrench.
+        """
+
+    def truths(self, state: S, actuation: ActuationState, world: W) -> dict[str, Any]:
+        """What sensors measure beside the motion, of a batch of one, by their names; see `Truth.more`."""
+        return actuation.truths()
+
+    @abstractmethod
     def reported(self, measured: S, truth: RigidBodyState) -> RigidBodyState:
         """Odometry of one body, without a batch axis: what is measured, and of the rest the truth."""
 
@@ -122,7 +142,7 @@ class Dynamics(ABC, Generic[W, S]):
 
 
 class PlanarDynamics(Dynamics[World, PlanarState]):
-    """Bodies on air, water or wheels that move in the plane."""
+    """Bodies on air or water that move in the plane."""
 
     state_type = PlanarState
     odometer = Odometer
@@ -159,15 +179,28 @@ class PlanarDynamics(Dynamics[World, PlanarState]):
         off_centre: bool,
     ) -> PlanarState:
         """See `Dynamics.move`."""
-        return move(
-            self.robot,
-            state,
-            actuation,
-            world,
-            outside,
-            substeps=substeps,
-            latest_s=latest_s,
-            off_centre=off_centre,
+        dt, water = self.robot.timing.physics_dt, self.robot.hydrodynamics
+        actuators = self.robot.actuated_by(Pushing)
+        if off_centre:
+            state = to_center(state, world)
+        push: Wrench | None = None
+        doing: Array = None
+        for _ in range(substeps):
+            applied = actuation.advance(dt, latest_s=latest_s)
+            if push is None or applied is not doing:
+                doing = applied
+                push = actuators.planar_wrench(applied, actuation.gain)
+                if off_centre:
+                    ahead, left, moment = push
+                    push = ahead, left, moment - (world.com_x * left - world.com_y * ahead)
+            state = free_body_step(state, push, outside, world, water, dt)
+        return to_center(state, world, -1.0) if off_centre else state
+
+    def under_wrench(self, state: PlanarState, wrench: Array, world: World) -> PlanarState:
+        """See `Dynamics.under_wrench`."""
+        push, still = (wrench[0], wrench[1], wrench[2]), (0.0 * wrench[0],) * 3
+        return free_body_step(
+            state, push, still, world, self.robot.hydrodynamics, self.robot.timing.physics_dt
         )
 
     def reported(self, measured: PlanarState, truth: RigidBodyState) -> RigidBodyState:
@@ -186,6 +219,41 @@ class PlanarDynamics(Dynamics[World, PlanarState]):
     ) -> tuple[Poses, PlanarState]:
         """See `Dynamics.push_things`."""
         return push_things(things, poses, before, after, self.robot)
+
+
+class RollingDynamics(PlanarDynamics):
+    """Bodies on wheels that do not slip sideways."""
+
+    def move(
+        self,
+        state: PlanarState,
+        actuation: ActuationState,
+        world: World,
+        outside: Wrench,
+        *,
+        substeps: int,
+        latest_s: float,
+        off_centre: bool,
+    ) -> PlanarState:
+        """See `Dynamics.move`; where the centre of mass is does not count."""
+        dt, wheels = self.robot.timing.physics_dt, self.robot.actuated_by(Rolling)
+        for _ in range(substeps):
+            target = actuation.advance(dt, latest_s=latest_s)
+            state = rolling_step(state, target, actuation.gain, outside, world, wheels, dt)
+        return state
+
+    def under_wrench(self, state: PlanarState, wrench: Array, world: World) -> PlanarState:
+        """Refuse; see `Dynamics.under_wrench`."""
+        raise ConfigError(
+            f"'{self.robot.name}' rolls on wheels, which take commands and no wrench. Use `linearise`, whose inputs "
+            "are commands."
+        )
+
+    def push_things(
+        self, things: Sequence[Thing], poses: Poses, before: PlanarState, after: PlanarState
+    ) -> tuple[Poses, PlanarState]:
+        """See `Dynamics.push_things`; wheels hold their speed."""
+        return super().push_things(things, poses, before, after)[0], after
 
 
 class SpatialDynamics(Dynamics[SpatialWorld, SpatialState]):
@@ -258,6 +326,12 @@ class SpatialDynamics(Dynamics[SpatialWorld, SpatialState]):
                 torque = plus(torque, steady)
             state = rigid_body_step(state, force, torque, push, world.mass, inertia, dt)
         return shifted(state, scaled(-1.0, com)) if off_centre else state
+
+    def under_wrench(self, state: SpatialState, wrench: Array, world: SpatialWorld) -> SpatialState:
+        """See `Dynamics.under_wrench`."""
+        force, torque = (wrench[0], wrench[1], wrench[2]), (wrench[3], wrench[4], wrench[5])
+        inertia = inertia_of(tuple(world.inertia))
+        return rigid_body_step(state, force, torque, None, world.mass, inertia, self.robot.timing.physics_dt)
 
     def reported(self, measured: SpatialState, truth: RigidBodyState) -> RigidBodyState:
         """See `Dynamics.reported`."""

@@ -1,20 +1,38 @@
-"""The table of dynamics: which robots move, and are disturbed and measured, in which way."""
+"""The tables of dynamics by kind of robot: how it moves, is disturbed and measured, and what its actuators do."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
-from fulmar_core.dynamics.batch_dynamics import Dynamics, GyrostatDynamics, PlanarDynamics, SpatialDynamics
+from fulmar_core.dynamics.actuators.actuation import ActuationState
+from fulmar_core.dynamics.actuators.flight_actuation import FlightActuation
+from fulmar_core.dynamics.actuators.tank_actuation import TankActuation
+from fulmar_core.dynamics.actuators.wheel_actuation import WheelActuation
+from fulmar_core.dynamics.batch_dynamics import (
+    Dynamics,
+    GyrostatDynamics,
+    PlanarDynamics,
+    RollingDynamics,
+    SpatialDynamics,
+)
 from fulmar_core.dynamics.flight_dynamics import FlightDynamics
 from fulmar_core.robots.robot import Robot
+from fulmar_core.states.rotation import Array
 from fulmar_core.worlds.scenario import Scenario
+from fulmar_core.worlds.world import World
 
 Made = Callable[[Robot, Scenario | None], Dynamics[Any, Any]]
 
 
 def _planar(robot: Robot, _scenario: Scenario | None) -> Dynamics[Any, Any]:
     return PlanarDynamics(robot)
+
+
+def _rolling(robot: Robot, _scenario: Scenario | None) -> Dynamics[Any, Any]:
+    return RollingDynamics(robot)
 
 
 def _free_flyer(robot: Robot, scenario: Scenario | None) -> Dynamics[Any, Any]:
@@ -31,10 +49,17 @@ def _aircraft(robot: Robot, scenario: Scenario | None) -> Dynamics[Any, Any]:
 
 DYNAMICS: dict[str, Made] = {
     "planar": _planar,
-    "rolling": _planar,
+    "rolling": _rolling,
     "free_flyer": _free_flyer,
     "satellite": _satellite,
     "aircraft": _aircraft,
+}
+ACTUATIONS: dict[str, Callable[..., ActuationState]] = {
+    "planar": ActuationState,
+    "rolling": ActuationState,
+    "free_flyer": ActuationState,
+    "satellite": WheelActuation,
+    "aircraft": FlightActuation,
 }
 
 
@@ -46,3 +71,37 @@ def dynamics_of(robot: Robot, scenario: Scenario | None = None) -> Dynamics[Any,
         scenario: That all worlds are drawn from, which saves the work for what it has not; None: any.
     """
     return DYNAMICS[robot.kind.name](robot, scenario)
+
+
+def actuation_of(
+    robot: Robot,
+    safe: Array,
+    *,
+    opens_late: bool = True,
+    latest_s: float = 0.0,
+    step_s: float = math.inf,
+    changes: bool = False,
+    world: World | None = None,
+) -> ActuationState:
+    """The actuators of a robot in their safe state.
+
+    Args:
+        robot: The robot.
+        safe: Its safe command in every world, shape (n, worlds).
+        opens_late: As of `may_open_late`.
+        latest_s: As of `longest_delay` [s].
+        step_s: Least time between two commands [s].
+        changes: Whether a part may stick or the supply may fall within an episode.
+        world: Says how full tanks are; None: they never empty, which costs less.
+    """
+    outlasts_step = latest_s > step_s + 1e-9 and not opens_late
+    make = ACTUATIONS[robot.kind.name]
+    if world is not None and robot.actuators.tank is not None:
+        make = partial(TankActuation, world=world)
+    return make(
+        robot.actuators,
+        safe,
+        opens_late=opens_late,
+        delay_ticks=math.ceil(latest_s / robot.timing.physics_dt - 1e-9) if outlasts_step else 0,
+        parts=robot.actuators.parts if changes else None,
+    )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from fulmar_core.robots.actuators.rolling import Rolling
 from fulmar_core.robots.robot import Robot
 from fulmar_core.states.arrays import array_namespace, clip
 from fulmar_core.states.gravity import GRAVITY
@@ -83,10 +82,11 @@ def push(
         x: Where the block was, shape (...,) [m].
         y: Same.
         block: The block.
-        robot: Its outline, and its mass where nothing but its speed carries it on.
+        robot: Its outline and its mass.
 
     Returns:
-        Where the block is, and the robot: one that floats loses the work that pushing took; wheels hold their speed.
+        Where the block is, and the robot, which loses the work that pushing took if nothing but its speed carries it
+        on: wheels hold theirs, see `RollingDynamics`.
     """
     xp = array_namespace(x)
     outline = outline_of(robot)
@@ -110,8 +110,6 @@ def push(
         c, s = xp.cos(yaw), xp.sin(yaw)
         x, y = x + c * mx - s * my, y + s * mx + c * my
         driven = driven + xp.sqrt(mx * mx + my * my)
-    if isinstance(robot.actuators, Rolling):
-        return x, y, after
     return x, y, _slowed(after, x - start_x, y - start_y, driven, block, robot.body.mass)
 
 

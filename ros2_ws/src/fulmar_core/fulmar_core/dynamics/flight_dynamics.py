@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from fulmar_core.robots.actuators.control_surfaces import ControlSurfaces
 from fulmar_core.robots.airframe.airframe import Flow, alpha_rate, flow_past
 from fulmar_core.robots.airframe.atmosphere import air_density
 from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.sensors.air_data import NAME as AIR
 from fulmar_core.robots.sensors.air_data import AirData, AirDataSpec
 from fulmar_core.states.arrays import array_namespace
 from fulmar_core.states.attitude import (
@@ -166,6 +168,13 @@ class FlightDynamics(SpatialDynamics):
         through = minus(state.velocity, (world.wind[0], world.wind[1], world.wind[2]))
         velocity = flipped(turn_back(state.quat, through))
         return velocity if gust is None else minus(velocity, gust[:3])
+
+    def truths(
+        self, state: SpatialState, actuation: ActuationState, world: SpatialWorld, gust: Gust | None = None
+    ) -> dict[str, Any]:
+        """With what air probes measure; see `Dynamics.truths`."""
+        assert isinstance(world, FlightWorld)
+        return {AIR: self.air_data(state, gust, world), **actuation.truths()}
 
     def air_data(self, state: SpatialState, gust: Gust | None, world: FlightWorld) -> AirData:
         """What air probes without errors measure, of a batch of one."""

@@ -13,12 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_core.config.errors import ConfigError
-from fulmar_core.dynamics.by_kind import dynamics_of
-from fulmar_core.dynamics.free_body import free_body_step
-from fulmar_core.dynamics.motion import actuation_of
-from fulmar_core.dynamics.rigid_body import inertia_of, rigid_body_step
-from fulmar_core.robots.actuators.rolling import Rolling
+from fulmar_core.dynamics.by_kind import actuation_of, dynamics_of
 from fulmar_core.robots.robot import Robot
 from fulmar_core.states.attitude import (
     Vector,
@@ -91,7 +86,7 @@ def linearise(
             off_centre=off_centre,
         )
 
-    chart = _chart(state, lambda trim: moved(trim, command[:, None]))
+    chart = CHARTS[type(state)](state, lambda trim: moved(trim, command[:, None]))
     each = np.tile(command[:, None], 2 * len(chart.trim))
     a = slopes(lambda x: chart.numbers(moved(chart.state(x), each)), chart.trim - DELTA, chart.trim + DELTA)
     held = chart.state(np.tile(chart.trim[:, None], 2 * len(command)))
@@ -115,28 +110,16 @@ def linearise_wrench(robot: Robot, state: State, wrench: np.ndarray, dt: float) 
     Raises:
         ConfigError: The robot rolls on wheels, which take no wrench.
     """
-    if isinstance(robot.actuators, Rolling):
-        raise ConfigError(
-            f"'{robot.name}' rolls on wheels, which take commands and no wrench. Use `linearise`, whose inputs are "
-            "commands."
-        )
+    dynamics = dynamics_of(robot)
 
     def moved(now: Any, inputs: np.ndarray) -> Any:
-        count, physics_dt = inputs.shape[1], robot.timing.physics_dt
-        world = nominal_worlds(robot, count)
-        still = (np.zeros(count),) * 3
+        world = nominal_worlds(robot, inputs.shape[1])
         for _ in range(robot.timing.substeps(1.0 / dt)):
-            if isinstance(now, SpatialState):
-                force, torque = _vector(inputs[:3]), _vector(inputs[3:])
-                inertia = inertia_of(tuple(world.inertia))
-                now = rigid_body_step(now, force, torque, None, world.mass, inertia, physics_dt)
-            else:
-                push = (inputs[0], inputs[1], inputs[2])
-                now = free_body_step(now, push, still, world, robot.hydrodynamics, physics_dt)
+            now = dynamics.under_wrench(now, inputs, world)
         return now
 
     wrench = np.asarray(wrench, dtype=float)
-    chart = _chart(state, lambda trim: moved(trim, wrench[:, None]))
+    chart = CHARTS[type(state)](state, lambda trim: moved(trim, wrench[:, None]))
     count, trim = len(chart.trim), np.concatenate((chart.trim, wrench))
     both = slopes(
         lambda x: chart.numbers(moved(chart.state(x[:count]), x[count:])), trim - DELTA, trim + DELTA
@@ -153,15 +136,21 @@ class _Chart:
     numbers: Callable[[Any], np.ndarray]  # from states after it to vectors
 
 
-def _chart(state: State, moved: Callable[[State], State]) -> _Chart:
-    """The vectors of a state; `moved` does the step with nothing but the trim, for states of shapes (1,)."""
-    if isinstance(state, PlanarState):
-        return _Chart(_columns(state), lambda x: PlanarState(*x), _columns)
-    assert isinstance(state, SpatialState)  # there is no other
+def _in_plane(state: PlanarState, moved: Callable[[PlanarState], PlanarState]) -> _Chart:
+    return _Chart(_columns(state), lambda x: PlanarState(*x), _columns)
+
+
+def _in_space(state: SpatialState, moved: Callable[[SpatialState], SpatialState]) -> _Chart:
     before = state.in_float64().mapped(lambda column: column.reshape(1))
     after = moved(before)
-    assert isinstance(after, SpatialState)
     return _Chart(np.zeros(DEPARTURES), lambda x: _departed(before, x), lambda s: _departure(after, s))
+
+
+# The vectors of a state; `moved` does the step with nothing but the trim, for states of shapes (1,).
+CHARTS: dict[type[State], Callable[[Any, Callable[[Any], Any]], _Chart]] = {
+    PlanarState: _in_plane,
+    SpatialState: _in_space,
+}
 
 
 def _departed(trim: SpatialState, x: np.ndarray) -> SpatialState:

@@ -9,13 +9,11 @@ from typing import Any, Generic
 import numpy as np
 from array_api_compat import is_numpy_namespace
 
-from fulmar_core.dynamics.actuators.wheel_actuation import WheelActuation
 from fulmar_core.dynamics.batch_dynamics import Dynamics
-from fulmar_core.dynamics.by_kind import dynamics_of
-from fulmar_core.dynamics.motion import actuation_of, may_be_off_centre, may_open_late
+from fulmar_core.dynamics.by_kind import actuation_of, dynamics_of
+from fulmar_core.dynamics.motion import may_be_off_centre, may_open_late
 from fulmar_core.dynamics.things import Poses
 from fulmar_core.robots.robot import Robot
-from fulmar_core.robots.sensors.wheels import NAME as WHEELS
 from fulmar_core.simulation.episode import draw_episodes
 from fulmar_core.simulation.episode_prefetch import Beginning, UpcomingEpisodes
 from fulmar_core.states.arrays import array_namespace
@@ -173,9 +171,7 @@ class BatchSimulation(MutableState, Generic[S]):
     @property
     def readings(self) -> dict[str, np.ndarray]:
         """What is measured beside the odometry, without errors: speeds of reaction wheels, see `Inputs.readings`."""
-        if not isinstance(self._actuation, WheelActuation):
-            return {}
-        return {WHEELS: np.asarray(self._actuation.speeds, dtype=float).T}
+        return self._actuation.readings
 
     def step(self, command: Array) -> None:
         """Do one control step of a learner: limit and apply its command, and advance the goals by what is measured.

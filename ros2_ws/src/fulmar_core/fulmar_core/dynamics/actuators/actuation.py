@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from array_api_compat import device
 
 from fulmar_core.dynamics.actuators.sticking import Sticking, supplied
+from fulmar_core.robots.actuators.family import Actuators
 from fulmar_core.robots.actuators.parts import MovingParts
-from fulmar_core.robots.actuators.response import Response
 from fulmar_core.states.arrays import array_namespace, clip
 from fulmar_core.states.mutable_state import MutableState
 from fulmar_core.states.rotation import Array
@@ -33,11 +33,9 @@ class ActuationState(MutableState):
 
     def __init__(
         self,
-        response: Response,
-        *,
-        binary: bool,
-        scale: np.ndarray,
+        actuators: Actuators,
         safe: Array,
+        *,
         opens_late: bool = True,
         delay_ticks: int = 0,
         parts: MovingParts | None = None,
@@ -45,9 +43,7 @@ class ActuationState(MutableState):
         """Begin in the safe state.
 
         Args:
-            response: Delay, slew and lag.
-            binary: On/off actuators: errors act on what they do, not on the command.
-            scale: Largest command of each actuator, shape (n,).
+            actuators: Whose delay, slew and lag count; errors of on/off ones act on what they do, not on the command.
             safe: Safe command of every world, shape (n, worlds), of the floating type to compute in.
             opens_late: Whether closed valves may open later than open ones close; saves the work where none does.
             delay_ticks: Physics ticks by which the latest command may act late, where another command may come
@@ -55,8 +51,10 @@ class ActuationState(MutableState):
             parts: What may stick within an episode, in worlds whose supply may fall; None saves the work where
                 nothing changes.
         """
-        self._response, self._binary, self._opens_late = response, binary, opens_late
-        self._scale = array_namespace(safe).asarray(scale, dtype=safe.dtype, device=device(safe))[:, None]
+        self._response, self._binary, self._opens_late = actuators.own_response, actuators.binary, opens_late
+        self._scale = array_namespace(safe).asarray(actuators.scale, dtype=safe.dtype, device=device(safe))[
+            :, None
+        ]
         self._before, self._wanted, self.applied = safe, safe, safe
         self.gain = array_namespace(safe).ones_like(safe)
         self._since_s = 0.0
@@ -70,9 +68,18 @@ class ActuationState(MutableState):
         self._sticking = None if parts is None else Sticking(parts, safe)
         self._world: World
         self._slew: Array | None = None
-        if response.slew:
+        if self._response.slew:
             xp = array_namespace(safe)
-            self._slew = xp.asarray(response.slew, dtype=safe.dtype, device=device(safe))[:, None]
+            self._slew = xp.asarray(self._response.slew, dtype=safe.dtype, device=device(safe))[:, None]
+
+    @property
+    def readings(self) -> dict[str, np.ndarray]:
+        """What sensors measure of it without errors, worlds first; see `Inputs.readings`."""
+        return {}
+
+    def truths(self) -> dict[str, Any]:
+        """What sensors measure of it, of a batch of one, by the names of the sensors; see `Truth.more`."""
+        return {}
 
     def reset(self, which: Array, safe: Array) -> None:
         """Bring some worlds back to the safe state.

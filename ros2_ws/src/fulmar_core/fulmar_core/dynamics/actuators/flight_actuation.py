@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from array_api_compat import device
 
 from fulmar_core.dynamics.actuators.actuation import ActuationState
 from fulmar_core.robots.actuators.control_surfaces import ControlSurfaces
-from fulmar_core.robots.actuators.parts import MovingParts
+from fulmar_core.robots.sensors.surfaces import NAME, SurfacePositions
 from fulmar_core.states.arrays import array_namespace, clip
 from fulmar_core.states.rotation import Array
 from fulmar_core.worlds.turbulence import FILTERS, Gust, gust_step
@@ -28,19 +29,9 @@ class FlightActuation(ActuationState):
 
     MUTABLE = (*ActuationState.MUTABLE, "servo_rates", "gusts", "gust_steps")
 
-    def __init__(
-        self, actuators: ControlSurfaces, safe: Array, *, delay_ticks: int, parts: MovingParts | None
-    ) -> None:
-        """Begin in the safe state, in still air; arguments as of `ActuationState`."""
-        super().__init__(
-            actuators.response,
-            binary=False,
-            scale=actuators.scale,
-            safe=safe,
-            opens_late=False,
-            delay_ticks=delay_ticks,
-            parts=parts,
-        )
+    def __init__(self, actuators: ControlSurfaces, safe: Array, **kwargs: Any) -> None:
+        """Begin in the safe state, in still air; arguments as of `ActuationState`, and nothing opens late."""
+        super().__init__(actuators, safe, **{**kwargs, "opens_late": False})
         self._actuators, self._count = actuators, actuators.positions
         xp, worlds = array_namespace(safe), safe.shape[1]
         self._kwargs = {"dtype": safe.dtype, "device": device(safe)}
@@ -60,6 +51,10 @@ class FlightActuation(ActuationState):
             values = xp.asarray(getattr(self, name), copy=True)
             values[..., which] = 0
             setattr(self, name, values)
+
+    def truths(self) -> dict[str, Any]:
+        """Where surfaces and throttles are; see `ActuationState.truths`."""
+        return {NAME: SurfacePositions(self._actuators.names, np.asarray(self.applied[:, 0], dtype=float))}
 
     def hold(self, command: Array) -> None:
         """Let every actuator stand where a command asks for, at rest, shape (n, worlds)."""

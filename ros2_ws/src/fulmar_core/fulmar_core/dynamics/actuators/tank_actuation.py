@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from fulmar_core.dynamics.actuators.actuation import ActuationState
 from fulmar_core.robots.actuators.family import Actuators
-from fulmar_core.robots.actuators.tank import Tank
+from fulmar_core.robots.sensors.supply import NAME
 from fulmar_core.states.arrays import array_namespace, clip
 from fulmar_core.states.rotation import Array
 from fulmar_core.worlds.world import World
@@ -17,10 +19,11 @@ class TankActuation(ActuationState):
 
     MUTABLE = (*ActuationState.MUTABLE, "_filled", "_fallen", "_share")
 
-    def __init__(self, actuators: Actuators, tank: Tank, world: World, *args: Any, **kwargs: Any) -> None:
+    def __init__(self, actuators: Actuators, safe: Array, *, world: World, **kwargs: Any) -> None:
         """Begin with full tanks, or with less as the worlds say; the rest as in `ActuationState`."""
-        super().__init__(*args, **kwargs)
-        self._actuators, self._tank = actuators, tank
+        super().__init__(actuators, safe, **kwargs)
+        assert actuators.tank is not None
+        self._actuators, self._tank = actuators, actuators.tank
         self._filled: Array = world.tank_fill
         self._fallen: Array = array_namespace(self.applied).zeros_like(
             self.applied[0]
@@ -31,6 +34,15 @@ class TankActuation(ActuationState):
     def pressure(self) -> Array:
         """In each tank, shape (worlds,) [Pa]."""
         return clip(self._tank.pressure * self._filled - self._fallen, 0.0, None)
+
+    @property
+    def readings(self) -> dict[str, np.ndarray]:
+        """Pressure of the tanks; see `ActuationState.readings`."""
+        return {NAME: np.asarray(self.pressure, dtype=float)[:, None]}
+
+    def truths(self) -> dict[str, Any]:
+        """Pressure of the tank; see `ActuationState.truths`."""
+        return {NAME: float(self.pressure[0])}
 
     def reset(self, which: Array, safe: Array) -> None:
         """Bring some worlds back to the safe state, with fresh tanks; arguments as in `ActuationState.reset`."""

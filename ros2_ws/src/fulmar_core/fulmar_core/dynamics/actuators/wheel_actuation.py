@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from fulmar_core.dynamics.actuators.actuation import ActuationState
+from fulmar_core.robots.actuators.reaction_wheels import ReactionWheels
+from fulmar_core.robots.sensors.wheels import NAME, WheelSpeeds
 from fulmar_core.states.arrays import array_namespace
 from fulmar_core.states.rotation import Array
 
@@ -18,10 +22,20 @@ class WheelActuation(ActuationState):
 
     MUTABLE = (*ActuationState.MUTABLE, "speeds")
 
-    def __init__(self, *args: Any, count: int, **kwargs: Any) -> None:
-        """Begin with wheels at rest; `count` wheels, the rest as of `ActuationState`."""
-        super().__init__(*args, **kwargs)
-        self.speeds: Array = 0.0 * self.applied[:count]
+    def __init__(self, actuators: ReactionWheels, safe: Array, **kwargs: Any) -> None:
+        """Begin with wheels at rest; arguments as of `ActuationState`."""
+        super().__init__(actuators, safe, **kwargs)
+        self._names = actuators.wheel_names
+        self.speeds: Array = 0.0 * self.applied[: actuators.count]
+
+    @property
+    def readings(self) -> dict[str, np.ndarray]:
+        """Speeds of the wheels; see `ActuationState.readings`."""
+        return {NAME: np.asarray(self.speeds, dtype=float).T}
+
+    def truths(self) -> dict[str, Any]:
+        """Speeds of the wheels; see `ActuationState.truths`."""
+        return {NAME: WheelSpeeds(self._names, self.readings[NAME][0])}
 
     def reset(self, which: Array, safe: Array) -> None:
         """Bring some worlds back to the safe state, wheels at rest; arguments as of `ActuationState.reset`."""

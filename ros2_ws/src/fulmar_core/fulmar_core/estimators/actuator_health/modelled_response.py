@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from fulmar_core.dynamics.by_kind import actuation_of
 from fulmar_core.dynamics.linear_model import nominal_worlds
-from fulmar_core.dynamics.motion import actuation_of
 from fulmar_core.robots.robot import Robot
 
 

@@ -71,6 +71,11 @@ class Actuators(ABC):
         return 0
 
     @property
+    def own_response(self) -> Response:
+        """What of `response` happens before the dynamics, which have the rest."""
+        return self.response
+
+    @property
     def remembers(self) -> bool:
         """Whether what an actuator does depends on more than the newest command."""
         return self.response.remembers

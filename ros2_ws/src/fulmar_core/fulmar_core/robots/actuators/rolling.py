@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 from abc import abstractmethod
 
@@ -10,6 +11,7 @@ import numpy as np
 from fulmar_core.robots.actuators.excitation import Excitation
 from fulmar_core.robots.actuators.family import Actuators
 from fulmar_core.robots.actuators.refuge import RampDown, Refuge
+from fulmar_core.robots.actuators.response import Response
 from fulmar_core.states.planar import PlanarState
 from fulmar_core.states.rotation import Array
 
@@ -64,6 +66,11 @@ class Rolling(Actuators):
             yaw_inertia: Of the robot [kg·m²].
             dt: Integration step, > 0 [s].
         """
+
+    @property
+    def own_response(self) -> Response:
+        """Without the lag, which the wheels' own servos bring in; see `Actuators.own_response`."""
+        return dataclasses.replace(self.response, lag_s=0.0)
 
     @property
     def servo_s(self) -> float:
