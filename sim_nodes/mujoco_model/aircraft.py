@@ -85,7 +85,7 @@ class Aircraft:
         """Set the forces of the coming step; see `RobotModel.drive`. What flies no longer stops there."""
         assert self._actuation is not None  # as of `fly_in`
         state, dt = self._state(data), self._robot.timing.physics_dt
-        if not self._dynamics.flies(state)[0]:
+        if not self._dynamics.is_aloft(state)[0]:
             data.qvel[:] = 0.0
             data.xfrc_applied[self._body] = 0.0, 0.0, model.body_mass[self._body] * GRAVITY, 0.0, 0.0, 0.0
             return

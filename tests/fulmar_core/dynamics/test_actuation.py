@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -19,13 +20,8 @@ NOMINAL = draw_world(ROBOT, load_scenario("ideal"), Draws(0, np.arange(WORLDS), 
 
 
 def actuation(*, binary=False, scale=(1.0, 1.0), delay_ticks=0, **response):
-    return ActuationState(
-        Response(**response),
-        binary=binary,
-        scale=np.array(scale),
-        safe=np.zeros((2, WORLDS)),
-        delay_ticks=delay_ticks,
-    )
+    family = SimpleNamespace(own_response=Response(**response), binary=binary, scale=np.array(scale))
+    return ActuationState(family, np.zeros((2, WORLDS)), delay_ticks=delay_ticks)
 
 
 def full(value=1.0):

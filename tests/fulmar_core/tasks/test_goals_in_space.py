@@ -134,11 +134,11 @@ def test_a_task_in_space_of_any_name_is_not_proposed_for_itself(tmp_path, monkey
         load_task("arrive").check(load_robot("floating_platform"))
     with pytest.raises(
         ConfigError,
-        match=r"Did you mean 'go_to_pose'\? Names of tasks that move a body in space end in _3d\.$",
+        match=r"Did you mean 'go_to_pose'\? `fulmar list tasks` shows others, such as go_to_pose\.$",
     ):
         load_task("go_to_pose_3d").check(load_robot("floating_platform"))
     with pytest.raises(
         ConfigError,
-        match=r"Did you mean 'go_to_pose_3d'\? Names of tasks that move a body in space end in _3d\.$",
+        match=r"Did you mean 'go_to_pose_3d'\? `fulmar list tasks` shows others, such as go_to_pose_3d\.$",
     ):
         load_task("go_to_pose").check(load_robot("spacecraft_16"))

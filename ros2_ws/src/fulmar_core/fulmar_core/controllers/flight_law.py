@@ -48,8 +48,7 @@ class FlightLaw(Law):
 
     def believed(self, inputs: Inputs) -> SpatialState:
         """The believed state of n craft."""
-        state = inputs.state if inputs.believed is None else inputs.believed
-        assert isinstance(state, SpatialState)
+        state: SpatialState = inputs.state if inputs.believed is None else inputs.believed
         return state
 
     def saturated(self, command: np.ndarray) -> np.ndarray:

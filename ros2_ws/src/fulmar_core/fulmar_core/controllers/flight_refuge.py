@@ -160,4 +160,4 @@ def descent_weights(robot: Robot) -> FlightWeights:
 
 def refuge_of(robot: Robot, hz: float) -> Refuge:
     """Safe controller of a robot, asked so often [Hz]: that of its actuators, or, of an aircraft, one that flies."""
-    return LevelDescent(robot, hz) if robot.flies else robot.actuators.refuge
+    return robot.actuators.refuge if robot.kind.stops else LevelDescent(robot, hz)

@@ -25,8 +25,8 @@ ROTATED = 20.0
 
 def can_replace(robot: Robot) -> bool:
     """Whether motors apart from each other turn an aircraft whose rudder does not."""
-    craft = robot.actuators
-    if not isinstance(craft, ControlSurfaces) or REPLACED not in craft.names:
+    craft = robot.actuated_by(ControlSurfaces)
+    if REPLACED not in craft.names:
         return False
     aside = [motor.position[1] for motor in craft.motors]
     return min(aside, default=0.0) < 0.0 < max(aside, default=0.0)

@@ -113,12 +113,12 @@ class FlightDynamics(SpatialDynamics):
 
     def where_it_flies(self, before: SpatialState, after: SpatialState) -> SpatialState:
         """The state after a step, or, of a craft that flies no longer, where it was, at rest."""
-        xp, flying = array_namespace(after.x), self.flies(after)
+        xp, flying = array_namespace(after.x), self.is_aloft(after)
         stopped = before.stopped()
         columns = zip(after.columns(), stopped.columns(), strict=True)
         return SpatialState(*(xp.where(flying, new, old) for new, old in columns))
 
-    def flies(self, state: SpatialState) -> Array:
+    def is_aloft(self, state: SpatialState) -> Array:
         """Whether the hull is above the ground, and tumbles no faster than models of the air hold for, shape (...,)."""
         return (state.z + self.robot.hull_span[0] > 0.0) & (dot(state.rate, state.rate) < FASTEST_TUMBLE**2)
 

@@ -16,10 +16,8 @@ import yaml
 
 from fulmar_core.config.errors import ConfigError
 from fulmar_core.config.strict_yaml import load_config
-from fulmar_core.robots.actuators.differential_drive import DifferentialDrive
 from fulmar_core.robots.actuators.thrusters import Thrusters
 from fulmar_core.robots.robot import Robot
-from fulmar_core.states.spatial import SpatialState
 
 VARIABLE = "FULMAR_CALIBRATION"
 DRAGS = (("surge", 0), ("sway", 1), ("yaw", 5))  # axes, with their index among the six of `Hydrodynamics`
@@ -128,16 +126,10 @@ def calibrated(robot: Robot, calibration: Calibration) -> Robot:
 
 def _places(robot: Robot) -> tuple[str, ...]:
     """Names of the quantities that a calibration of this robot may have."""
-    if isinstance(robot.actuators, DifferentialDrive):
-        return "wheel_scale", "turn_scale", "lag", "delay"
-    body: tuple[str, ...] = ("mass", "yaw_inertia", "center_of_mass_x", "center_of_mass_y", "delay")
-    if robot.state_type is SpatialState:
-        body += ("roll_inertia", "pitch_inertia", "center_of_mass_z")
-    if isinstance(robot.actuators, Thrusters):
-        return *body, "thrust", "opening_delay"
-    if robot.hydrodynamics is not None:
-        return *body, *(f"{axis}_{kind}_drag" for axis, _ in DRAGS for kind in ("linear", "quadratic"))
-    return ()
+    found = robot.actuators.calibrated
+    if not found and robot.hydrodynamics is not None:
+        found = tuple(f"{axis}_{kind}_drag" for axis, _ in DRAGS for kind in ("linear", "quadratic"))
+    return (*robot.kind.calibrated, *found) if found else ()
 
 
 def _body(robot: Robot, calibration: Calibration) -> Robot:
@@ -187,9 +179,9 @@ def _actuators(robot: Robot, calibration: Calibration) -> Robot:
         response = replace(response, lag_s=calibration.lag.value)
     if calibration.wheel_scale and calibration.turn_scale:
         response = replace(response, gain=(calibration.wheel_scale.value, calibration.turn_scale.value))
-    if calibration.thrust and isinstance(actuators, Thrusters):
-        factor = calibration.thrust.value / actuators.thrust
-        actuators = replace(actuators, thrust=calibration.thrust.value)
+    if calibration.thrust:
+        factor = calibration.thrust.value / robot.actuated_by(Thrusters).thrust
+        actuators = replace(robot.actuated_by(Thrusters), thrust=calibration.thrust.value)
         performance = replace(
             performance, force=factor * performance.force, torque=factor * performance.torque
         )

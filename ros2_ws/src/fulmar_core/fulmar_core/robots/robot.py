@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from dataclasses import dataclass, field
-from typing import Annotated, Any, ClassVar, TypeVar
+from typing import Annotated, Any, TypeVar
 
 import numpy as np
 
@@ -12,8 +12,7 @@ from fulmar_core.config.errors import ConfigError
 from fulmar_core.config.strict_yaml import Kinds
 from fulmar_core.robots.actuators.families import FAMILIES
 from fulmar_core.robots.actuators.family import Actuators
-from fulmar_core.robots.actuators.pushing import Pushing
-from fulmar_core.robots.actuators.rolling import CLEARANCE, Rolling
+from fulmar_core.robots.actuators.rolling import Rolling
 from fulmar_core.robots.airframe.airframe import Airframe
 from fulmar_core.robots.hydrodynamics import Hydrodynamics
 from fulmar_core.robots.kinds import kind_of
@@ -24,7 +23,6 @@ from fulmar_core.robots.sensors.kind import SensorKind
 from fulmar_core.robots.sensors.odometer import OdometrySpec
 from fulmar_core.robots.sensors.own_sensor import OwnSensorSpec
 from fulmar_core.robots.sensors.table import SENSORS, sensor_kind
-from fulmar_core.states.planar import PlanarState
 from fulmar_core.states.state import State
 
 Range = tuple[float, float]
@@ -113,8 +111,6 @@ class Performance:
     lateral_speed: float  # to either side, that tasks ask for; 0: it cannot [m/s]
     yaw_rate: float  # that tasks ask for [rad/s]
     turning_acceleration: float  # speed times turn rate that it can sustain [m/s²]
-
-    MOVING: ClassVar[tuple[str, ...]] = ("force", "top_speed", "speed", "turning_acceleration")
 
     def __post_init__(self) -> None:
         if min(self.torque, self.yaw_rate) <= 0.0:
@@ -304,8 +300,7 @@ class Robot:
     @property
     def drifts(self) -> bool:
         """Whether it keeps its motion when its actuators are at rest: neither the floor nor water slows it down."""
-        carried = isinstance(self.actuators, Pushing) or self.actuators.turns_only
-        return self.hydrodynamics is None and carried
+        return self.hydrodynamics is None and self.kind.drifts
 
     @property
     def hull_span(self) -> tuple[float, float]:
@@ -313,11 +308,10 @@ class Robot:
 
         The body's origin lies at the height of the axles, at the waterline, or half way up.
         """
-        height = self.body.height
-        if isinstance(self.actuators, Rolling):
-            return (CLEARANCE - 1.0) * self.actuators.wheel_radius, height - self.actuators.wheel_radius
-        low = -0.5 * height if self.hydrodynamics is None else -self.hydrodynamics.hydrostatics.draught
-        return low, low + height
+        if self.hydrodynamics is None:
+            return self.actuators.hull_span(self.body.height)
+        low = -self.hydrodynamics.hydrostatics.draught
+        return low, low + self.body.height
 
     @property
     def recipe(self) -> str:
@@ -325,36 +319,13 @@ class Robot:
         return self.kind.recipe or self.actuators.recipe
 
     def __post_init__(self) -> None:
-        moving = [getattr(self.performance, name) for name in Performance.MOVING]
-        if not self.actuators.turns_only and min(moving) <= 0.0:
-            raise ValueError(f"{', '.join(Performance.MOVING)} of 'performance' must be greater than 0.")
-        if self.actuators.turns_only and (self.body.planar or max(moving) > 0.0 or any(self.body.com)):
-            raise ValueError(
-                f"{self.actuators.kind} only turn a body: it needs 'planar: false', its centre of mass at its origin, "
-                "and in 'performance' 0 for all but torque and yaw_rate."
-            )
-        if self.flies is not (self.airframe is not None) or (
-            self.flies and (self.body.planar or any(self.body.com))
-        ):
-            raise ValueError(
-                "control_surfaces and 'airframe' need one another, with 'planar: false' and the centre of mass at the "
-                "body's origin."
-            )
-        if self.state_type is PlanarState and (len(self.body.inertia), len(self.body.center_of_mass)) != (
-            3,
-            2,
-        ):
+        _CHECKS.get(self.kind.name, _check_pushed)(self)
+        axes = self.state_type.AXES
+        if len(self.body.inertia) > 3 * (axes - 1) or len(self.body.center_of_mass) > axes:
             raise ValueError(
                 f"'body.inertia' has {len(self.body.inertia)} values and 'body.center_of_mass' "
                 f"{len(self.body.center_of_mass)}; a robot in the plane has xx, yy, zz and x, y. Leave out the others."
             )
-        if isinstance(self.actuators, Rolling) and self.actuators.track > 2.0 * self.body.radius:
-            raise ValueError(
-                f"'track' = {self.actuators.track:g} m puts the wheels outside of the outline, whose 'radius' is "
-                f"{self.body.radius:g} m."
-            )
-        if self.hydrodynamics is not None and isinstance(self.actuators, Rolling):
-            raise ValueError("'hydrodynamics' and wheels exclude one another.")
         if len(self.event_cameras) > 2:
             raise ValueError("'event_cameras' has more than two; a rate is estimated from one or two.")
         if self.air_bearing and not self.drifts:
@@ -373,3 +344,47 @@ class Robot:
         gains = self.actuators.response.gain
         if gains and len(gains) != len(self.actuators.names):
             raise ValueError(f"'gain' needs {len(self.actuators.names)} values, one for each actuator.")
+
+
+def _check_pushed(robot: Robot) -> None:
+    can = robot.performance
+    if min(can.force, can.top_speed, can.speed, can.turning_acceleration) <= 0.0:
+        raise ValueError(
+            "force, top_speed, speed, turning_acceleration of 'performance' must be greater than 0."
+        )
+    if (robot.airframe is None) is not robot.kind.stops:
+        raise ValueError(_WINGS)
+
+
+def _check_rolling(robot: Robot) -> None:
+    _check_pushed(robot)
+    track = robot.actuated_by(Rolling).track
+    if track > 2.0 * robot.body.radius:
+        raise ValueError(
+            f"'track' = {track:g} m puts the wheels outside of the outline, whose 'radius' is {robot.body.radius:g} m."
+        )
+    if robot.hydrodynamics is not None:
+        raise ValueError("'hydrodynamics' and wheels exclude one another.")
+
+
+def _check_satellite(robot: Robot) -> None:
+    can = robot.performance
+    moves = max(can.force, can.top_speed, can.speed, can.turning_acceleration) > 0.0
+    if robot.body.planar or moves or any(robot.body.com) or robot.airframe is not None:
+        raise ValueError(
+            f"{robot.actuators.kind} only turn a body: it needs 'planar: false', its centre of mass at its origin, no "
+            "'airframe', and in 'performance' 0 for all but torque and yaw_rate."
+        )
+
+
+def _check_aircraft(robot: Robot) -> None:
+    _check_pushed(robot)
+    if robot.body.planar or any(robot.body.com):
+        raise ValueError(_WINGS)
+
+
+_WINGS = (
+    "control_surfaces and 'airframe' need one another, with 'planar: false' and the centre of mass at the body's "
+    "origin."
+)
+_CHECKS = {"rolling": _check_rolling, "satellite": _check_satellite, "aircraft": _check_aircraft}

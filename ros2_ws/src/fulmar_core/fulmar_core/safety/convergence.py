@@ -11,16 +11,13 @@ import numpy as np
 from fulmar_core.controllers.controller import Inputs
 from fulmar_core.estimators.actuator_health.applied import AppliedHistory
 from fulmar_core.robots.robot import Robot
+from fulmar_core.safety.by_kind import EFFORTS
 from fulmar_core.states.rotation import Array
 from fulmar_core.states.state import State
 from fulmar_core.tasks import Task
 from fulmar_core.tasks.goal import Goal
 from fulmar_core.tasks.terms import Errors
 
-SLACK = 2.0  # errors up to so many tolerances are no reason to stop: noise and steady pushes hold robots there [-]
-SLACK_IN_FLIGHT = 20.0  # the same for an aircraft, which gusts move all the time [-]
-AUTHORITY = 0.2  # share of full command from which a robot counts as trying [-]
-SATURATED = 0.95  # the same for a surface of an aircraft [-]
 LEAST_S = 6.0  # without progress, however near the goal [s]
 LEAST_PERIODS = 20  # same, in control periods
 PATIENCE = 3.0  # least times to the goal that are given [-]
@@ -30,7 +27,6 @@ UNCONVERGED = "does not converge"
 MAY_BE = "An actuator may have failed, or something holds or pushes it."
 ALIKE = 0.1  # difference of a command and what was applied up to which they count as the same, in full commands [-]
 OWN = 5  # commands of one's own that may be what was applied last: links delay them
-STEEPEST = 0.1  # path of an aircraft that returns to its course, in its speed [-]
 
 
 class TimeToGoal:
@@ -40,11 +36,11 @@ class TimeToGoal:
         """Derive speeds and accelerations from the robot's performance."""
         best = robot.performance
         inertia = max(robot.body.inertia[:3]) if not robot.body.planar else robot.body.inertia[2]
-        self._push = best.turning_acceleration if robot.flies else best.force / robot.body.mass
+        effort = EFFORTS[robot.kind.name]
+        self._push, self._slack = effort.acceleration(robot), effort.slack
         self._thrust = best.force / robot.body.mass
-        self._speed = STEEPEST * best.speed if robot.flies else best.speed
+        self._speed = effort.speed * best.speed
         self._turn, self._yaw_rate = best.torque / inertia, best.yaw_rate
-        self._slack = SLACK_IN_FLIGHT if robot.flies else SLACK
         limits = task.tolerance
         self._limits = Errors(
             limits.position,
@@ -99,11 +95,10 @@ class ConvergenceMonitor:
         self._task, self._dt = task, control_dt
         self._time = TimeToGoal(robot, task)
         self._scale = np.where(robot.actuators.scale > 0.0, robot.actuators.scale, 1.0)
-        self._counted, self._enough = slice(None), AUTHORITY
-        if robot.flies:
-            self._counted, self._enough = slice(robot.actuators.positions), SATURATED
-        turns = not (robot.actuators.sideways or robot.flies or robot.actuators.turns_only)
-        half_turn = np.pi / robot.performance.yaw_rate if turns and robot.body.planar else 0.0
+        self._enough = EFFORTS[robot.kind.name].authority
+        self._counted = slice(robot.actuators.positions or None)  # of an aircraft its surfaces
+        turns = robot.body.planar and not robot.actuators.sideways
+        half_turn = np.pi / robot.performance.yaw_rate if turns else 0.0
         self._least_s = max(LEAST_S, LEAST_PERIODS * control_dt) + HALF_TURNS * half_turn
         self.reset()
 

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping
-from typing import Protocol
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any, Protocol
 
 import numpy as np
 
 from fulmar_core.config.errors import ConfigError
 from fulmar_core.robots.robot import Robot
 from fulmar_core.states.planar import PlanarState
+from fulmar_core.states.rotation import Array
 from fulmar_core.states.spatial import SpatialState
 from fulmar_core.states.state import State
 from fulmar_core.tasks import load_task
@@ -19,8 +21,12 @@ from fulmar_core.tasks.goal import Goal, goal_at
 from fulmar_core.tasks.goal_files import FollowedPath, GoalFile, Poses, Positions, Trajectory, Velocities
 from fulmar_core.tasks.references.look_ahead import LookAhead, Progress, body_target, steered_target
 from fulmar_core.tasks.space_terms import place_errors
-from fulmar_core.tasks.terms import Tolerance, pose_errors
+from fulmar_core.tasks.terms import Errors, Tolerance, pose_errors
 
+_ERRORS: dict[type[State], Callable[[Any, Array], Errors]] = {
+    PlanarState: partial(pose_errors, heading=True),
+    SpatialState: partial(place_errors, attitude=True),
+}
 HOLD_S = 1.0  # within the tolerance for so long, a target is reached rather than passed
 
 
@@ -80,7 +86,8 @@ class Waypoints:
         targets = file.targets()
         self._goals = [_goal(*targets)] if at_once else [_goal(target) for target in targets]
         self.standstill = self._goals[0]
-        self._targets, self._tolerance, self._hold_s = targets, tolerance, hold_s
+        self._targets, self._hold_s = targets, hold_s
+        self._tolerance = dataclasses.replace(tolerance, velocity=0.0, yaw_rate_deg=0.0, rate_deg=0.0)
         self._reached = 0
         self._inside_since: float | None = None
 
@@ -125,14 +132,7 @@ class Waypoints:
 
     def _is_inside(self, state: State, target: np.ndarray) -> bool:
         """Whether a state lies within the tolerance of a target."""
-        if isinstance(state, SpatialState):
-            return bool(self._tolerance.holds(place_errors(state, target, attitude=True)))
-        assert isinstance(state, PlanarState)
-        errors = pose_errors(state, target, heading=True)
-        inside = float(errors.position) <= self._tolerance.position
-        if self._tolerance.heading_deg:
-            inside &= abs(math.degrees(float(errors.heading))) <= self._tolerance.heading_deg
-        return inside
+        return bool(self._tolerance.holds(_ERRORS[self.form](state, target)))
 
 
 class Schedule:

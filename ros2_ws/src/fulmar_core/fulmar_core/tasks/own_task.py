@@ -25,7 +25,7 @@ from fulmar_core.states.counter_rng import START, Draws
 from fulmar_core.states.planar import PlanarState
 from fulmar_core.states.rotation import Array
 from fulmar_core.states.spatial import SpatialState
-from fulmar_core.states.state import State
+from fulmar_core.states.state import POSE, TWIST, State
 from fulmar_core.tasks.goal import Goal
 from fulmar_core.tasks.task import Task
 from fulmar_core.tasks.terms import Errors, Tolerance
@@ -288,9 +288,8 @@ class OwnTask(Task[Any]):
         for thing in self.things:
             if thing.name not in found.things:
                 raise self._wrong(member, f"returned a Goal without the pose of {thing.name} in its things")
-        twists = self.goal_topic == "goal_velocity"
-        pose = 3 if self.state_type is PlanarState else 7
-        target = pose if self.state_type is PlanarState or not twists else 6
+        rigid = TWIST if self.goal_topic == "goal_velocity" else POSE
+        pose, target = (self.state_type.targets_of(np.ones(size)).size for size in (POSE, rigid))
         for name, value, tail in (
             ("targets", found.targets, (None, target)),
             ("done", found.done, ()),

@@ -117,7 +117,7 @@ def uncontrollable_losses(robot: Robot, count: int) -> tuple[tuple[int, ...], ..
 
     A robot without thrusters has none.
     """
-    if not (isinstance(robot.actuators, Pushing) and robot.actuators.one_way):
+    if not robot.actuators.one_way:
         return ()
     every = itertools.combinations(range(len(robot.actuators.names)), count)
     return tuple(lost for lost in every if not can_hold(robot, lost))
@@ -129,6 +129,6 @@ def one_way_actuators(robot: Robot) -> Pushing:
     Raises:
         ConfigError: It has none.
     """
-    if not (isinstance(robot.actuators, Pushing) and robot.actuators.one_way):
+    if not robot.actuators.one_way:
         raise ConfigError(f"'{robot.name}' has no thrusters, so that there are no shares of time to choose.")
-    return robot.actuators
+    return robot.actuated_by(Pushing)

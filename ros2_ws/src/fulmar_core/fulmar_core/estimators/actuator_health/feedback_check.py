@@ -3,27 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
+from fulmar_core.estimators.actuator_health.by_kind import JOINTS, MOTION
 from fulmar_core.estimators.actuator_health.failed_part import Finding
 from fulmar_core.estimators.actuator_health.joint_feedback import ReactionWheelFeedback, SurfaceFeedback
-from fulmar_core.estimators.actuator_health.motion_feedback import (
-    CarFeedback,
-    DriveFeedback,
-    PropellerFeedback,
-)
 from fulmar_core.estimators.actuator_health.supply_check import SupplyCheck
-from fulmar_core.robots.actuators.ackermann import Ackermann
-from fulmar_core.robots.actuators.control_surfaces import ControlSurfaces
-from fulmar_core.robots.actuators.differential_drive import DifferentialDrive
-from fulmar_core.robots.actuators.propellers import Propellers
-from fulmar_core.robots.actuators.reaction_wheels import ReactionWheels
 from fulmar_core.robots.robot import Robot
-from fulmar_core.robots.sensors.surfaces import NAME as SURFACES
-from fulmar_core.robots.sensors.wheels import NAME as WHEELS
 from fulmar_core.simulation.backend import Sample
-from fulmar_core.states.planar import PlanarState
 from fulmar_core.states.state import RigidBodyState
 from fulmar_core.wires.reading import Reading
 
@@ -33,13 +22,8 @@ class JointCheck:
 
     def __init__(self, robot: Robot) -> None:
         """Begin without findings; robots without such sensors have none."""
-        self._check: SurfaceFeedback | ReactionWheelFeedback | None = None
-        self._sensor, self._names = "", robot.actuators.names
-        if isinstance(robot.actuators, ControlSurfaces) and SURFACES in robot.sensors.specs:
-            self._check, self._sensor = SurfaceFeedback(robot), SURFACES
-        if isinstance(robot.actuators, ReactionWheels) and WHEELS in robot.sensors.specs:
-            self._check, self._sensor = ReactionWheelFeedback(robot), WHEELS
-            self._names = robot.actuators.wheel_names
+        check = JOINTS.get(robot.kind.name)
+        self._check = check(robot) if check is not None and check.SENSOR in robot.sensors.specs else None
         self.findings: tuple[Finding, ...] = ()
 
     def reset(self) -> None:
@@ -52,18 +36,18 @@ class JointCheck:
         """Take a command, shape (n,), how long it was applied [s], and the readings at the end."""
         if self._check is None:
             return
-        reading = readings.get(self._sensor)
-        self._check.see(command, seconds, None if reading is None else self._values(reading))
+        reading = readings.get(self._check.SENSOR)
+        self._check.see(command, seconds, None if reading is None else _values(reading.value, self._check))
         self.findings = self._check.findings
 
-    def _values(self, reading: Reading) -> np.ndarray:
-        """What was measured of each joint in the robot's order; NaN for what was not."""
-        value = reading.value
-        numbers = value.positions if self._sensor == SURFACES else value.speeds
-        if value.names == self._names:
-            return np.asarray(numbers)
-        by_name = dict(zip(value.names, numbers, strict=False))
-        return np.array([by_name.get(name, np.nan) for name in self._names], dtype=float)
+
+def _values(value: Any, check: SurfaceFeedback | ReactionWheelFeedback) -> np.ndarray:
+    """What was measured of each joint in the robot's order; NaN for what was not."""
+    numbers = getattr(value, check.VALUES)
+    if value.names == check.names:
+        return np.asarray(numbers)
+    by_name = dict(zip(value.names, numbers, strict=False))
+    return np.array([by_name.get(name, np.nan) for name in check.names], dtype=float)
 
 
 class MotionCheck:
@@ -71,13 +55,8 @@ class MotionCheck:
 
     def __init__(self, robot: Robot) -> None:
         """Begin without findings; robots whose motion does not show single actuators have none."""
-        self._check: DriveFeedback | CarFeedback | PropellerFeedback | None = None
-        if isinstance(robot.actuators, DifferentialDrive):
-            self._check = DriveFeedback(robot)
-        if isinstance(robot.actuators, Ackermann):
-            self._check = CarFeedback(robot)
-        if isinstance(robot.actuators, Propellers) and robot.state_type is PlanarState:
-            self._check = PropellerFeedback(robot)
+        check = MOTION.get((robot.kind.name, robot.actuators.kind))
+        self._check = None if check is None else check(robot)
         self.findings: tuple[Finding, ...] = ()
 
     @property
@@ -110,7 +89,7 @@ class ActuatorFeedback:
         """Begin without findings; `moves`: whether the backend's odometry is the one that is published."""
         self._joints, self._motion = JointCheck(robot), MotionCheck(robot) if moves else None
         self.supply = SupplyCheck(robot)
-        self._vital = robot.actuators.names[: robot.actuators.positions] if robot.flies else ()
+        self._vital = robot.actuators.names[: robot.actuators.positions]
         self.findings: tuple[Finding, ...] = ()
 
     @property

@@ -46,8 +46,7 @@ class Hypothesis:
 
 def can_monitor(robot: Robot) -> bool:
     """Whether faults of a robot's actuators show in its motion: valves or fans of a body that floats."""
-    actuators = robot.actuators
-    return isinstance(actuators, Pushing) and actuators.one_way and robot.hydrodynamics is None
+    return robot.actuators.one_way and robot.hydrodynamics is None
 
 
 class Hypotheses:

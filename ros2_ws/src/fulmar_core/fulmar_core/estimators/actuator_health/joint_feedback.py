@@ -28,13 +28,16 @@ class SurfaceFeedback:
     """Compares measured deflections and thrust levels with a model of servos and motors.
 
     Attributes:
+        names: Of the joints.
         findings: Joints that do not follow, in the order of the actuators.
     """
+
+    SENSOR, VALUES = "surfaces", "positions"  # the reading that it takes, and the numbers in it
 
     def __init__(self, robot: Robot) -> None:
         """Begin without findings."""
         sensor = robot.sensors.specs["surfaces"]
-        self._names, self._scale = robot.actuators.names, robot.actuators.scale
+        self.names, self._scale = robot.actuators.names, robot.actuators.scale
         noise = NOISE * (sensor.std + sensor.quantum)
         self._off = MODEL * self._scale + noise
         self._stands = STANDS * self._scale + noise
@@ -46,14 +49,14 @@ class SurfaceFeedback:
         self._model.reset()
         self._recent: deque[tuple[float, np.ndarray]] = deque()  # age is the sum of the lengths after it
         self._seen: deque[tuple[float, np.ndarray]] = deque()
-        self._off_s = np.zeros(len(self._names))
+        self._off_s = np.zeros(len(self.names))
         self._found: dict[str, Finding] = {}
         self._begun = False
 
     @property
     def findings(self) -> tuple[Finding, ...]:
         """See the class."""
-        return tuple(self._found[name] for name in self._names if name in self._found)
+        return tuple(self._found[name] for name in self.names if name in self._found)
 
     def see(self, command: np.ndarray, seconds: float, positions: np.ndarray | None) -> None:
         """Take what was applied, and what was measured at the end.
@@ -88,7 +91,7 @@ class SurfaceFeedback:
     def _note(self) -> None:
         seen = np.stack([positions for _, positions in self._seen])
         span = seen.max(axis=0) - seen.min(axis=0)
-        for i, name in enumerate(self._names):
+        for i, name in enumerate(self.names):
             if self._off_s[i] < -AGREES_S:
                 self._found.pop(name, None)
             if self._off_s[i] <= OFF_S or name in self._found:
@@ -99,7 +102,7 @@ class SurfaceFeedback:
                 self._found[name] = unresponsive(name)
 
     def _stuck(self, number: int, where: float) -> Finding:
-        name = self._names[number]
+        name = self.names[number]
         if not is_throttle(name):
             return stuck(name, where, "rad")
         return dead(name) if where <= IDLES else stuck(name, where, "")
@@ -114,12 +117,16 @@ class ReactionWheelFeedback:
     """Compares how wheels speed up with the torques of their motors.
 
     Attributes:
+        names: Of the wheels.
         findings: Wheels whose speed does not follow the torque.
     """
+
+    SENSOR, VALUES = "wheels", "speeds"  # the reading that it takes, and the numbers in it
 
     def __init__(self, robot: Robot) -> None:
         """Begin without findings."""
         self._wheels, sensor = robot.actuated_by(ReactionWheels), robot.sensors.specs["wheels"]
+        self.names = self._wheels.wheel_names
         self._std = np.array([np.sqrt(2.0) * max(sensor.std + sensor.quantum, 1e-6 * self._wheels.top_speed)])
         self._model = ModelledResponse(robot)
         most = np.array([self._wheels.torque / self._wheels.spin_inertia])
@@ -143,7 +150,7 @@ class ReactionWheelFeedback:
     @property
     def findings(self) -> tuple[Finding, ...]:
         """See the class."""
-        named = zip(self._wheels.wheel_names, self._banks, strict=True)
+        named = zip(self.names, self._banks, strict=True)
         return tuple(dead(name) for name, bank in named if bank.fault)
 
     def see(self, command: np.ndarray, seconds: float, speeds: np.ndarray | None) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
+
 import numpy as np
 
 from fulmar_core.dynamics.free_body import free_body_step
@@ -28,7 +30,40 @@ ROLLS = 0.1  # share of top speed from which steering shows [-]
 BLOCKED = "the robot does not move, whatever its wheels are commanded: it is held, blocked or without power"
 
 
-class DriveFeedback:
+class MotionFeedback(ABC):
+    """Compares how a robot moves with what is applied to its actuators."""
+
+    def __init__(self, robot: Robot, names: tuple[str, ...], bank: ResponseBank) -> None:
+        """Begin without findings; `bank` compares the parts of these names."""
+        self._names, self._bank, self._model = names, bank, ModelledResponse(robot)
+        self.reset()
+
+    def reset(self) -> None:
+        """Begin anew."""
+        self._model.reset()
+        self._bank.reset()
+        self._since_s = 0.0
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """The part that is believed dead or stuck."""
+        return tuple(unresponsive(self._names[part]) for part in self._bank.fault)
+
+    @abstractmethod
+    def see(self, command: np.ndarray, seconds: float, motion: RigidBodyState | None) -> None:
+        """Take what was applied, shape (n,), for how long [s], and the motion at its end; None: not measured."""
+
+
+class WheelFeedback(MotionFeedback):
+    """Of robots that two numbers drive, which wheels follow with a lag."""
+
+    def reset(self) -> None:
+        """Begin anew."""
+        super().reset()
+        self._modelled = self._before = np.zeros(2)
+
+
+class DriveFeedback(WheelFeedback):
     """Compares what each side of a base with two driven wheels does with what it is commanded.
 
     Attributes:
@@ -37,30 +72,21 @@ class DriveFeedback:
 
     def __init__(self, robot: Robot) -> None:
         """Begin without findings."""
-        self._drive, self._model = robot.actuated_by(DifferentialDrive), ModelledResponse(robot)
-        self._names, half = self._drive.parts.names, 0.5 * self._drive.track
+        self._drive = robot.actuated_by(DifferentialDrive)
+        half = 0.5 * self._drive.track
         speed, rate = standard_deviations(robot)
         self._std = float(np.hypot(speed, half * rate))
         self._to_rims = np.array([[1.0, -half], [1.0, half]])
-        self._bank = ResponseBank(2, offsets=np.full(2, self._drive.max_speed), together=True)
-        self.reset()
-
-    def reset(self) -> None:
-        """Begin anew."""
-        self._model.reset()
-        self._bank.reset()
-        self._modelled = self._before = np.zeros(2)
-        self._since_s = 0.0
+        bank = ResponseBank(2, offsets=np.full(2, self._drive.max_speed), together=True)
+        super().__init__(robot, self._drive.parts.names, bank)
 
     @property
     def findings(self) -> tuple[Finding, ...]:
         """See the class."""
-        if len(self._bank.fault) == 2:
-            return (Finding("", BLOCKED),)
-        return _found(self._bank, self._names)
+        return (Finding("", BLOCKED),) if len(self._bank.fault) == 2 else super().findings
 
     def see(self, command: np.ndarray, seconds: float, motion: RigidBodyState | None) -> None:
-        """Take what was applied, shape (2,), for how long [s], and the motion at its end; None: not measured."""
+        """See `MotionFeedback.see`."""
         done = self._model.follow(command, seconds) @ self._to_rims.T
         self._modelled = _lagged(self._modelled, done, seconds, self._drive.servo_s)
         self._since_s += seconds
@@ -73,7 +99,7 @@ class DriveFeedback:
         self._before, self._since_s = self._modelled, 0.0
 
 
-class CarFeedback:
+class CarFeedback(WheelFeedback):
     """Compares speed and curvature of a car with its commands.
 
     Attributes:
@@ -82,27 +108,15 @@ class CarFeedback:
 
     def __init__(self, robot: Robot) -> None:
         """Begin without findings."""
-        self._car, self._model = robot.actuated_by(Ackermann), ModelledResponse(robot)
+        self._car = robot.actuated_by(Ackermann)
         self._std = standard_deviations(robot)
         self._rolls = ROLLS * robot.performance.top_speed
         most = self._car.scale
-        self._bank = ResponseBank(2, offsets=most, aside=np.array([1e-3 * most[0], ASIDE * most[1]]))
-        self.reset()
-
-    def reset(self) -> None:
-        """Begin anew."""
-        self._model.reset()
-        self._bank.reset()
-        self._modelled = self._before = np.zeros(2)
-        self._since_s = 0.0
-
-    @property
-    def findings(self) -> tuple[Finding, ...]:
-        """See the class."""
-        return _found(self._bank, self._car.parts.names)
+        bank = ResponseBank(2, offsets=most, aside=np.array([1e-3 * most[0], ASIDE * most[1]]))
+        super().__init__(robot, self._car.parts.names, bank)
 
     def see(self, command: np.ndarray, seconds: float, motion: RigidBodyState | None) -> None:
-        """Take what was applied, shape (2,), for how long [s], and the motion at its end; None: not measured."""
+        """See `MotionFeedback.see`."""
         done = self._model.follow(command, seconds)
         speed = _lagged(self._modelled[:1], done[:, :1], seconds, self._car.servo_s)[0]
         self._modelled = np.array([speed, done[-1, 1] if len(done) else self._modelled[1]])
@@ -121,7 +135,7 @@ class CarFeedback:
         self._before, self._since_s = self._modelled, 0.0
 
 
-class PropellerFeedback:
+class PropellerFeedback(MotionFeedback):
     """Compares how a boat speeds up and turns with the thrust of its propellers.
 
     A push of wind or current is estimated beside what each propeller gives.
@@ -133,7 +147,7 @@ class PropellerFeedback:
     def __init__(self, robot: Robot) -> None:
         """Begin without findings."""
         self._robot, self._propellers = robot, robot.actuated_by(Propellers)
-        self._model, self._world = ModelledResponse(robot), nominal_worlds(robot, 1)
+        self._world = nominal_worlds(robot, 1)
         self._std = np.array(standard_deviations(robot))
         added = robot.hydrodynamics.planar_added_mass if robot.hydrodynamics is not None else (0.0, 0.0, 0.0)
         self._inertia = np.array([robot.body.mass + added[0], robot.body.inertia[2] + added[2]])
@@ -141,7 +155,7 @@ class PropellerFeedback:
         count, slew = len(robot.actuators.names), robot.actuators.response.slew
         fades_s = FADES / min(slew) if slew else 0.0
         most = np.full(count, np.abs(self._propellers.curve).max())
-        self._bank = ResponseBank(
+        bank = ResponseBank(
             count,
             offsets=most,
             pushes=PUSH * able,
@@ -150,22 +164,16 @@ class PropellerFeedback:
             onsets_s=ONSETS_S,
             fades_s=fades_s,
         )
-        self.reset()
+        super().__init__(robot, self._propellers.names, bank)
 
     def reset(self) -> None:
         """Begin anew."""
-        self._model.reset()
-        self._bank.reset()
+        super().reset()
         self._before: PlanarState | None = None
-        self._since_s, self._impulses = 0.0, np.zeros(len(self._propellers.names))
-
-    @property
-    def findings(self) -> tuple[Finding, ...]:
-        """See the class."""
-        return _found(self._bank, self._propellers.names)
+        self._impulses = np.zeros(len(self._names))
 
     def see(self, command: np.ndarray, seconds: float, motion: RigidBodyState | None) -> None:
-        """Take what was applied, shape (n,), for how long [s], and the motion at its end; None: not measured."""
+        """See `MotionFeedback.see`."""
         done = self._model.follow(command, seconds)
         if len(done):
             self._impulses = self._impulses + (seconds / len(done)) * self._propellers.thrusts(done).sum(
@@ -180,7 +188,7 @@ class PropellerFeedback:
                 return
             self._compare(self._before, now)
         self._before, self._since_s = now, 0.0
-        self._impulses = np.zeros(len(self._propellers.names))
+        self._impulses = np.zeros(len(self._names))
 
     def _compare(self, before: PlanarState, now: PlanarState) -> None:
         """Compare two motions with the thrust between them."""
@@ -194,11 +202,6 @@ class PropellerFeedback:
         )  # force and moment of 1 N
         rows = np.hstack((work * self._impulses, work * self._since_s, np.eye(2) * self._since_s))
         self._bank.add(self._since_s, rows / self._inertia[:, None], gained, self._std)
-
-
-def _found(bank: ResponseBank, names: tuple[str, ...]) -> tuple[Finding, ...]:
-    """The part that a bank believes dead or stuck."""
-    return tuple(unresponsive(names[part]) for part in bank.fault)
 
 
 def _ahead(motion: RigidBodyState) -> float:

@@ -58,14 +58,14 @@ class ThrusterHealth:
             raise ConfigError(
                 f"the health of '{robot.name}' cannot be estimated: it is no body on air with thrusters."
             )
-        assert isinstance(robot.actuators, Thrusters)
+        thrusters = robot.actuated_by(Thrusters)
         self._robot, self._settings = robot, settings or HealthSettings()
-        self._shared = robot.actuators.shared_pressure
-        count = len(robot.actuators.nozzles)
+        self._shared = thrusters.shared_pressure
+        count = len(thrusters.nozzles)
         lost = [each for size in range(MOST_LOST + 1) for each in itertools.combinations(range(count), size)]
         self._alive = np.array([[float(i not in each) for i in range(count)] for each in lost])
         # Ahead, left, yaw moment.
-        wrench = robot.actuators.thrust * robot.actuators.wrench_per_newton[:, [0, 1, 5]]
+        wrench = thrusters.thrust * thrusters.wrench_per_newton[:, [0, 1, 5]]
         self._doing = np.hstack((wrench, np.ones((count, 1))))  # and how many valves share the pressure
         failure = self._settings.failure
         chances = [failure ** len(each) * (1.0 - failure) ** (count - len(each)) for each in lost]

@@ -32,6 +32,7 @@ class DifferentialDrive(Rolling):
     response: Response = Response()
 
     takes_velocity = True
+    calibrated = ("wheel_scale", "turn_scale", "lag", "delay")
 
     def __post_init__(self) -> None:
         positive = (

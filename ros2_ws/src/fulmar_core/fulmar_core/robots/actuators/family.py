@@ -34,6 +34,7 @@ class Actuators(ABC):
         opens_late: Actuators may take longer to begin than to end, as valves do.
         turns_only: Commands turn the body and push it nowhere.
         flies: Commands steer an aircraft, which the robot's `airframe` describes.
+        calibrated: Quantities that identification measures of it, beside those of `Kind.calibrated`.
         takes_velocity: A command is (speed, turn rate) of the body, which ROS has a message of its own for.
         plausible: Ranges of the family's own keys beside those of `plausible_ranges.ROBOT`, or in their place.
     """
@@ -49,6 +50,7 @@ class Actuators(ABC):
     turns_only: ClassVar[bool] = False
     takes_velocity: ClassVar[bool] = False
     flies: ClassVar[bool] = False
+    calibrated: ClassVar[tuple[str, ...]] = ()
     plausible: ClassVar[tuple[Plausible, ...]] = ()
 
     @property
@@ -119,6 +121,10 @@ class Actuators(ABC):
     def supply_warning(self, pressure: float) -> str:
         """What is wrong with a pressure of the tank [Pa]; empty where nothing is, or no tank is described."""
         return "" if self.tank is None else self.tank.warning(pressure, float(self.total_thrust(self.scale)))
+
+    def hull_span(self, height: float) -> tuple[float, float]:
+        """Bottom and top of a hull of this height in the body's frame, on land or in the air [m]."""
+        return -0.5 * height, 0.5 * height
 
     @property
     def recipe(self) -> str:

@@ -72,6 +72,10 @@ class Rolling(Actuators):
         """Without the lag, which the wheels' own servos bring in; see `Actuators.own_response`."""
         return dataclasses.replace(self.response, lag_s=0.0)
 
+    def hull_span(self, height: float) -> tuple[float, float]:
+        """The body's origin lies at the height of the axles; see `Actuators.hull_span`."""
+        return (CLEARANCE - 1.0) * self.wheel_radius, height - self.wheel_radius
+
     @property
     def servo_s(self) -> float:
         """Time constant of the wheels' speed servos [s]."""

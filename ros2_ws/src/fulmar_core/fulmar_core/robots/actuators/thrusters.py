@@ -43,6 +43,7 @@ class Thrusters(Pushing):
 
     one_way = True
     opens_late = True
+    calibrated = ("thrust", "opening_delay")
 
     def __post_init__(self) -> None:
         if self.thrust <= 0.0:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fulmar_core.robots.kinds.kind import Kind
+from fulmar_core.robots.kinds.planar import PLANAR
 from fulmar_core.states.spatial import SpatialState
 
 FREE_FLYER = Kind(
@@ -14,4 +15,6 @@ FREE_FLYER = Kind(
     usual_estimator="mocap_imu_3d",
     far_goal=(4.0, 4.0, 2.0, 20.0, -30.0, 90.0),
     recipe="free_flyer",
+    drifts=True,
+    calibrated=(*PLANAR.calibrated, "roll_inertia", "pitch_inertia", "center_of_mass_z"),
 )

@@ -13,4 +13,6 @@ PLANAR = Kind(
     usual_task="go_to_pose",
     usual_estimator="mocap_imu",
     far_goal=(FAR_M, 0.0, 0.0),
+    drifts=True,
+    calibrated=("mass", "yaw_inertia", "center_of_mass_x", "center_of_mass_y", "delay"),
 )

@@ -18,4 +18,5 @@ SATELLITE = Kind(
     recipe="free_flyer",
     always_estimated=True,
     goes_anywhere=False,
+    drifts=True,
 )
