@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from fulmar_core.dynamics.batch_dynamics import Steps
 from fulmar_core.dynamics.things import Poses, Thing
 from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.sensors.kind import Truth
@@ -43,9 +44,7 @@ class MockBackend:
             world.actuation,
             world.world,
             world.outside,
-            substeps=ticks,
-            latest_s=world.latest_s,
-            off_centre=world.dynamics.is_off_centre(world.world),
+            Steps(ticks, world.latest_s, world.dynamics.is_off_centre(world.world)),
         )
         self._poses, self._state = world.dynamics.push_things(self._things, self._poses, before, after)
         return self._sample(ticks)

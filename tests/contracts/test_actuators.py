@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fulmar_core.config.errors import ConfigError
-from fulmar_core.dynamics.batch_dynamics import PlanarDynamics, RollingDynamics
+from fulmar_core.dynamics.batch_dynamics import PlanarDynamics, RollingDynamics, Steps
 from fulmar_core.dynamics.by_kind import actuation_of
 from fulmar_core.dynamics.linear_model import linearise, linearise_wrench
 from fulmar_core.loop.teleop import Wish, hand_mapping
@@ -214,9 +214,7 @@ def moved(robot, state, command, *, seconds):
         actuation,
         world,
         (np.zeros(1),) * 3,
-        substeps=round(seconds / robot.timing.physics_dt),
-        latest_s=0.0,
-        off_centre=any(robot.body.center_of_mass),
+        Steps(round(seconds / robot.timing.physics_dt), off_centre=any(robot.body.center_of_mass)),
     )
     return after[0]
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from fulmar_core.dynamics.batch_dynamics import Steps
 from fulmar_core.dynamics.by_kind import actuation_of
 from fulmar_core.dynamics.flight_dynamics import FlightDynamics
 from fulmar_core.dynamics.flight_trim import find_trim, still_air
@@ -28,9 +29,7 @@ def ours(trim, after: np.ndarray) -> np.ndarray:
     found = []
     for _ in range(STEPS):
         actuation.begin(after[:, None], world, None)
-        state = dynamics.move(
-            state, actuation, world, (np.zeros(1),) * 3, substeps=1, latest_s=0.0, off_centre=False
-        )
+        state = dynamics.move(state, actuation, world, (np.zeros(1),) * 3, Steps(1))
         found.append([state.wx[0], -state.wy[0], -state.wz[0]])
     return np.array(found)
 

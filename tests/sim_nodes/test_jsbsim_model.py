@@ -8,6 +8,7 @@ import jsbsim
 import numpy as np
 import pytest
 
+from fulmar_core.dynamics.batch_dynamics import Steps
 from fulmar_core.dynamics.by_kind import actuation_of
 from fulmar_core.dynamics.flight_dynamics import FlightDynamics
 from fulmar_core.dynamics.flight_trim import find_trim, still_air
@@ -91,9 +92,7 @@ def flown_by_us(robot, trim, commands, dt):
     actuation = actuation_of(robot, commands[:, None])
     actuation.begin(commands[:, None], world, None)
     for _ in range(200):
-        state = dynamics.move(
-            state, actuation, world, (np.zeros(1),) * 3, substeps=1, latest_s=0.0, off_centre=False
-        )
+        state = dynamics.move(state, actuation, world, (np.zeros(1),) * 3, Steps(1))
     place = np.array([state.x[0], state.y[0], state.z[0]])
     return place, np.array([state.wx[0], -state.wy[0], -state.wz[0]])
 

@@ -15,6 +15,7 @@ import numpy as np
 from fulmar_core.controllers.body_frame import BodyFrame
 from fulmar_core.controllers.controller import Inputs
 from fulmar_core.controllers.law import Law
+from fulmar_core.dynamics.batch_dynamics import Steps
 from fulmar_core.dynamics.by_kind import actuation_of, dynamics_of
 from fulmar_core.dynamics.linear_model import calm, nominal_worlds
 from fulmar_core.robots.actuators.excitation import Excitation
@@ -93,13 +94,7 @@ class Excite(Law):
         before = self._around_goal(inputs).mapped(lambda part: np.tile(part, how.far))
         still = (np.zeros(1),) * 3
         after = self._dynamics.move(
-            before,
-            actuation,
-            self._world,
-            still,
-            substeps=substeps,
-            latest_s=0.0,
-            off_centre=self._off_centre,
+            before, actuation, self._world, still, Steps(substeps, off_centre=self._off_centre)
         )
         away, turning = self._departure(after)
         miss, spin = away / room, turning / self.robot.performance.yaw_rate

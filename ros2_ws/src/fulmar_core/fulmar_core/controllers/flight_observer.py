@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from fulmar_core.controllers.lqr import regulator
+from fulmar_core.dynamics.batch_dynamics import Steps
 from fulmar_core.dynamics.by_kind import actuation_of
 from fulmar_core.dynamics.flight_dynamics import FlightDynamics
 from fulmar_core.dynamics.flight_schedule import MOTION, RATE, SPEED, flight_model
@@ -91,13 +92,7 @@ class FlightObserver:
             return measured
         self._actuation.begin(previous.T, self._world, None)
         ahead = self._dynamics.move(
-            self._state,
-            self._actuation,
-            self._world,
-            (np.zeros(len(measured.x)),) * 3,
-            substeps=self._substeps,
-            latest_s=0.0,
-            off_centre=False,
+            self._state, self._actuation, self._world, (np.zeros(len(measured.x)),) * 3, Steps(self._substeps)
         )
         self._state = self._corrected(ahead, measured)
         return self._state

@@ -12,6 +12,7 @@ import numpy as np
 from fulmar_core.controllers.flight_lqi import FlightLqr
 from fulmar_core.controllers.flight_reference import Aim
 from fulmar_core.dynamics.actuators.flight_actuation import FlightActuation
+from fulmar_core.dynamics.batch_dynamics import Steps
 from fulmar_core.dynamics.flight_dynamics import FlightDynamics
 from fulmar_core.dynamics.flight_trim import still_air
 from fulmar_core.robots.actuators.control_surfaces import ControlSurfaces
@@ -94,9 +95,7 @@ class FlightRollouts:
             now = np.concatenate((actuation.applied, actuation.servo_rates)).T
             wanted = self._followed(state, aims[step], now) + corrections[step].reshape(total, commands)
             actuation.begin(np.asarray(self._robot.actuators.limited(wanted)).T.copy(), self._world, None)
-            state = self._dynamics.move(
-                state, actuation, self._world, still, substeps=1, latest_s=0.0, off_centre=False
-            )
+            state = self._dynamics.move(state, actuation, self._world, still, Steps(1))
             cost += self._dt * self._per_second(state, np.repeat(aims[step + 1].place, each, axis=0))
         return cost.reshape(count, each)
 

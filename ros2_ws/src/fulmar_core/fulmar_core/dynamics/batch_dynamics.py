@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import partial
 from typing import Any, Generic, TypeVar
 
@@ -45,6 +46,16 @@ from fulmar_core.worlds.spatial_world import (
 from fulmar_core.worlds.world import Drawn, World, outside_wrench, push_is_constant
 
 W = TypeVar("W", bound=Drawn)
+Push = tuple[Array, ...]  # on a body in space, as its dynamics take it
+
+
+@dataclass(frozen=True)
+class Steps:
+    """Integration steps under a command and a push that stay the same."""
+
+    count: int
+    latest_s: float = 0.0  # as of `longest_delay` [s]
+    off_centre: bool = False  # as of `Dynamics.is_off_centre`
 
 
 class Dynamics(ABC, Generic[W, S]):
@@ -89,17 +100,7 @@ class Dynamics(ABC, Generic[W, S]):
         """Whether the centre of mass is beside the body's origin in any world, of NumPy arrays."""
 
     @abstractmethod
-    def move(
-        self,
-        state: S,
-        actuation: ActuationState,
-        world: W,
-        outside: Any,
-        *,
-        substeps: int,
-        latest_s: float,
-        off_centre: bool,
-    ) -> S:
+    def move(self, state: S, actuation: ActuationState, world: W, outside: Any, steps: Steps) -> S:
         """Move under a push that stays the same; the actuators have their command already.
 
         Args:
@@ -107,12 +108,10 @@ class Dynamics(ABC, Generic[W, S]):
             actuation: What the actuators do.
             world: Bodies and surroundings.
             outside: As of `outside`.
-            substeps: Integration steps.
-            latest_s: As of `longest_delay` [s].
-            off_centre: As of `is_off_centre`.
+            steps: Integration steps.
 
         Returns:
-            State after `substeps` physics steps.
+            State after them.
         """
 
     @abstractmethod
@@ -168,33 +167,25 @@ class PlanarDynamics(Dynamics[World, PlanarState]):
         return bool(world.com_x.any() or world.com_y.any())
 
     def move(
-        self,
-        state: PlanarState,
-        actuation: ActuationState,
-        world: World,
-        outside: Wrench,
-        *,
-        substeps: int,
-        latest_s: float,
-        off_centre: bool,
+        self, state: PlanarState, actuation: ActuationState, world: World, outside: Wrench, steps: Steps
     ) -> PlanarState:
         """See `Dynamics.move`."""
         dt, water = self.robot.timing.physics_dt, self.robot.hydrodynamics
         actuators = self.robot.actuated_by(Pushing)
-        if off_centre:
+        if steps.off_centre:
             state = to_center(state, world)
         push: Wrench | None = None
         doing: Array = None
-        for _ in range(substeps):
-            applied = actuation.advance(dt, latest_s=latest_s)
+        for _ in range(steps.count):
+            applied = actuation.advance(dt, latest_s=steps.latest_s)
             if push is None or applied is not doing:
                 doing = applied
                 push = actuators.planar_wrench(applied, actuation.gain)
-                if off_centre:
+                if steps.off_centre:
                     ahead, left, moment = push
                     push = ahead, left, moment - (world.com_x * left - world.com_y * ahead)
             state = free_body_step(state, push, outside, world, water, dt)
-        return to_center(state, world, -1.0) if off_centre else state
+        return to_center(state, world, -1.0) if steps.off_centre else state
 
     def under_wrench(self, state: PlanarState, wrench: Array, world: World) -> PlanarState:
         """See `Dynamics.under_wrench`."""
@@ -225,20 +216,12 @@ class RollingDynamics(PlanarDynamics):
     """Bodies on wheels that do not slip sideways."""
 
     def move(
-        self,
-        state: PlanarState,
-        actuation: ActuationState,
-        world: World,
-        outside: Wrench,
-        *,
-        substeps: int,
-        latest_s: float,
-        off_centre: bool,
+        self, state: PlanarState, actuation: ActuationState, world: World, outside: Wrench, steps: Steps
     ) -> PlanarState:
         """See `Dynamics.move`; where the centre of mass is does not count."""
         dt, wheels = self.robot.timing.physics_dt, self.robot.actuated_by(Rolling)
-        for _ in range(substeps):
-            target = actuation.advance(dt, latest_s=latest_s)
+        for _ in range(steps.count):
+            target = actuation.advance(dt, latest_s=steps.latest_s)
             state = rolling_step(state, target, actuation.gain, outside, world, wheels, dt)
         return state
 
@@ -276,9 +259,7 @@ class SpatialDynamics(Dynamics[SpatialWorld, SpatialState]):
         """See `Dynamics.blurs`."""
         return bool(world.velocity_noise.any() or world.rate_noise.any())
 
-    def outside(
-        self, state: SpatialState, world: SpatialWorld, time_s: Array, control_dt: float
-    ) -> tuple[Array, ...]:
+    def outside(self, state: SpatialState, world: SpatialWorld, time_s: Array, control_dt: float) -> Push:
         """Force along the world's axes [N], and torque about the body's [N·m]; see `Dynamics.outside`.
 
         The torque is that of an orbit, and left out where no world has one; the constant one of a world is not in it.
@@ -295,37 +276,29 @@ class SpatialDynamics(Dynamics[SpatialWorld, SpatialState]):
         return bool(world.com.any())
 
     def move(
-        self,
-        state: SpatialState,
-        actuation: ActuationState,
-        world: SpatialWorld,
-        outside: tuple[Array, ...],
-        *,
-        substeps: int,
-        latest_s: float,
-        off_centre: bool,
+        self, state: SpatialState, actuation: ActuationState, world: SpatialWorld, outside: Push, steps: Steps
     ) -> SpatialState:
         """See `Dynamics.move`."""
         dt, actuators = self.robot.timing.physics_dt, self.robot.actuated_by(Pushing)
         inertia = inertia_of(tuple(world.inertia)[: 6 if self._full else 3])
         com: Vector = (world.com[0], world.com[1], world.com[2])
-        if off_centre:
+        if steps.off_centre:
             state = shifted(state, com)
         push: Vector = (outside[0], outside[1], outside[2])
         steady: Vector = (world.torque[0], world.torque[1], world.torque[2])
         if len(outside) > 3:
             steady = plus(steady, (outside[3], outside[4], outside[5]))
         doing, force, torque = None, push, push
-        for _ in range(substeps):
-            applied = actuation.advance(dt, latest_s=latest_s)
+        for _ in range(steps.count):
+            applied = actuation.advance(dt, latest_s=steps.latest_s)
             if applied is not doing:
                 doing = applied
                 force, torque = actuators.spatial_wrench(applied, actuation.gain)
-                if off_centre:
+                if steps.off_centre:
                     torque = minus(torque, cross(com, force))
                 torque = plus(torque, steady)
             state = rigid_body_step(state, force, torque, push, world.mass, inertia, dt)
-        return shifted(state, scaled(-1.0, com)) if off_centre else state
+        return shifted(state, scaled(-1.0, com)) if steps.off_centre else state
 
     def under_wrench(self, state: SpatialState, wrench: Array, world: SpatialWorld) -> SpatialState:
         """See `Dynamics.under_wrench`."""
@@ -349,9 +322,7 @@ class GyrostatDynamics(SpatialDynamics):
         unloading = self._wheels.unloading
         self._magnetic = unloading is not None and unloading.kind == "magnetic"
 
-    def outside(
-        self, state: SpatialState, world: SpatialWorld, time_s: Array, control_dt: float
-    ) -> tuple[Array, ...]:
+    def outside(self, state: SpatialState, world: SpatialWorld, time_s: Array, control_dt: float) -> Push:
         """Ten numbers, held over a control step; see `Dynamics.outside`.
 
         Force along the world's axes [N], torque about the body's [N·m] with the constant one, direction of the magnetic
@@ -370,15 +341,7 @@ class GyrostatDynamics(SpatialDynamics):
         return False
 
     def move(
-        self,
-        state: SpatialState,
-        actuation: ActuationState,
-        world: SpatialWorld,
-        outside: tuple[Array, ...],
-        *,
-        substeps: int,
-        latest_s: float,
-        off_centre: bool,
+        self, state: SpatialState, actuation: ActuationState, world: SpatialWorld, outside: Push, steps: Steps
     ) -> SpatialState:
         """See `Dynamics.move`; of `outside` what is left out is nothing."""
         assert isinstance(actuation, WheelActuation)  # as of `actuation_of`
@@ -390,8 +353,8 @@ class GyrostatDynamics(SpatialDynamics):
             steady, growth = (outside[3], outside[4], outside[5]), outside[9]
             tensor = tuple(growth * entry for entry in tensor)
             field = (outside[6], outside[7], outside[8]) if self._magnetic else None
-        for _ in range(substeps):
-            applied = actuation.advance(dt, latest_s=latest_s) * actuation.gain
+        for _ in range(steps.count):
+            applied = actuation.advance(dt, latest_s=steps.latest_s) * actuation.gain
             motors = wheels.motor_torque(applied[: wheels.count], actuation.speeds, dt)
             torque, here = steady, None if field is None else turn_back(state.quat, field)
             unloading = wheels.unloading_torque(applied, here)
@@ -410,9 +373,7 @@ class GyrostatDynamics(SpatialDynamics):
         return state
 
 
-def _on_wheels(
-    wheels: ReactionWheels, motors: tuple[Array, ...], speeds: tuple[Array, ...]
-) -> tuple[Array, ...]:
+def _on_wheels(wheels: ReactionWheels, motors: tuple[Array, ...], speeds: tuple[Array, ...]) -> Push:
     """Torque on each wheel: of its motor and of its bearing [N·m]."""
     if not wheels.has_friction:
         return motors

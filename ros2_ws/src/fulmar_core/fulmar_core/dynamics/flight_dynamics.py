@@ -11,7 +11,7 @@ import numpy as np
 
 from fulmar_core.dynamics.actuators.actuation import ActuationState
 from fulmar_core.dynamics.actuators.flight_actuation import FlightActuation
-from fulmar_core.dynamics.batch_dynamics import SpatialDynamics
+from fulmar_core.dynamics.batch_dynamics import Push, SpatialDynamics, Steps
 from fulmar_core.dynamics.rigid_body import Inertia, inertia_of, turn_acceleration
 from fulmar_core.robots.actuators.control_surfaces import ControlSurfaces
 from fulmar_core.robots.airframe.airframe import Flow, alpha_rate, flow_past
@@ -90,23 +90,15 @@ class FlightDynamics(SpatialDynamics):
         return not world.kick.any()
 
     def move(
-        self,
-        state: SpatialState,
-        actuation: ActuationState,
-        world: SpatialWorld,
-        outside: tuple[Array, ...],
-        *,
-        substeps: int,
-        latest_s: float,
-        off_centre: bool,
+        self, state: SpatialState, actuation: ActuationState, world: SpatialWorld, outside: Push, steps: Steps
     ) -> SpatialState:
         """See `Dynamics.move`; a file's centre of mass is the body's origin."""
         assert isinstance(world, FlightWorld)
         dt = self.robot.timing.physics_dt
         inertia = inertia_of(tuple(world.inertia)[: 6 if self._full else 3])
         push: Vector = (outside[0], outside[1], outside[2])
-        for _ in range(substeps):
-            applied = actuation.advance(dt, latest_s=latest_s) * actuation.gain
+        for _ in range(steps.count):
+            applied = actuation.advance(dt, latest_s=steps.latest_s) * actuation.gain
             gust = self.gust(state, actuation, world, dt)
             state = self.where_it_flies(state, self._step(state, applied, gust, world, inertia, push, dt))
         return state

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from fulmar_core.dynamics.batch_dynamics import Steps
 from fulmar_core.dynamics.by_kind import actuation_of, dynamics_of
 from fulmar_core.robots.robot import Robot
 from fulmar_core.states.attitude import (
@@ -69,22 +70,15 @@ def linearise(
     low, high = command - DELTA * actuators.scale, command + DELTA * actuators.scale
     if not actuators.binary:  # at an end of its range an actuator goes one way only
         low, high = np.maximum(low, actuators.lowest), np.minimum(high, actuators.scale)
-    dynamics, off_centre = dynamics_of(robot), any(robot.body.center_of_mass)
+    dynamics = dynamics_of(robot)
+    steps = Steps(robot.timing.substeps(1.0 / dt), off_centre=any(robot.body.center_of_mass))
 
     def moved(states: Any, commands: np.ndarray) -> Any:
         count = commands.shape[1]
         world, still = (worlds or nominal_worlds)(robot, count), (np.zeros(count),) * 3
         actuation = actuation_of(robot, commands)
         actuation.begin(commands, world, None)
-        return dynamics.move(
-            states,
-            actuation,
-            world,
-            still,
-            substeps=robot.timing.substeps(1.0 / dt),
-            latest_s=0.0,
-            off_centre=off_centre,
-        )
+        return dynamics.move(states, actuation, world, still, steps)
 
     chart = CHARTS[type(state)](state, lambda trim: moved(trim, command[:, None]))
     each = np.tile(command[:, None], 2 * len(chart.trim))

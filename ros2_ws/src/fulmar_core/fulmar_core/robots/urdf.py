@@ -9,9 +9,7 @@ from xml.etree import ElementTree
 
 from scipy.spatial.transform import Rotation
 
-from fulmar_core.robots.actuators.pushing import Pushing
-from fulmar_core.robots.actuators.reaction_wheels import ReactionWheels
-from fulmar_core.robots.actuators.rolling import CASTER_RADIUS, WHEEL_WIDTH, Rolling
+from fulmar_core.robots.actuators.parts import Fixture
 from fulmar_core.robots.robot import Robot
 from fulmar_core.wires.robot_name import PLAIN, Frames
 
@@ -29,6 +27,7 @@ class BodyFrame:
     name: str  # without the prefix of a named robot
     position: tuple[float, float, float]  # in `base_link` [m]
     rpy: tuple[float, float, float] = (0.0, 0.0, 0.0)  # roll, pitch and yaw of its axes in `base_link` [rad]
+    part: Fixture | None = None  # what sits there
 
     @property
     def quat_xyzw(self) -> tuple[float, float, float, float]:
@@ -41,26 +40,15 @@ def body_frames(robot: Robot) -> tuple[BodyFrame, ...]:
     """Frames of the parts of a robot.
 
     Returns:
-        `imu_link`, then `<name>_link` of each actuator that pushes, its x axis along the force of a positive command,
-        of each reaction wheel, its x axis along the axis, or of each wheel on the floor, its y axis along the axle, and
-        of each caster.
+        `imu_link`, then `<name>_link` of each of `Actuators.fixtures`.
     """
-    parts = [BodyFrame(IMU, (0.0, 0.0, 0.0))]
-    if isinstance(robot.actuators, Pushing):
-        parts += [
-            BodyFrame(f"{push.name}_link", push.position, _x_axis_along(push.direction))
-            for push in robot.actuators.pushes
-        ]
-    elif isinstance(robot.actuators, ReactionWheels):
-        parts += [
-            BodyFrame(f"{wheel.name}_link", (0.0, 0.0, 0.0), _x_axis_along(wheel.direction.tolist()))
-            for wheel in robot.actuators.wheels
-        ]
-    elif isinstance(robot.actuators, Rolling):
-        parts += [BodyFrame(f"{name}_link", (x, y, 0.0)) for name, (x, y) in robot.actuators.wheels.items()]
-        sunk = (CASTER_RADIUS - 1.0) * robot.actuators.wheel_radius  # wheels and casters stand on one floor
-        parts += [BodyFrame(f"{name}_link", (x, 0.0, sunk)) for name, x in robot.actuators.casters.items()]
-    return tuple(parts)
+    return (
+        BodyFrame(IMU, (0.0, 0.0, 0.0)),
+        *(
+            BodyFrame(f"{part.name}_link", part.position, _x_axis_along(part.axis), part)
+            for part in robot.actuators.fixtures
+        ),
+    )
 
 
 def urdf_of(robot: Robot, frames: Frames = PLAIN) -> str:
@@ -94,8 +82,8 @@ def urdf_of(robot: Robot, frames: Frames = PLAIN) -> str:
     for frame in body_frames(robot):
         name = frames.named(frame.name)
         link = ElementTree.SubElement(root, "link", name=name)
-        if frame.name != IMU:
-            _add_part(ElementTree.SubElement(link, "visual"), robot, frame)
+        if frame.part is not None:
+            _add_part(ElementTree.SubElement(link, "visual"), frame.part)
         joint = ElementTree.SubElement(root, "joint", name=f"{name}_joint", type="fixed")
         _place(joint, frame.position, frame.rpy)
         ElementTree.SubElement(joint, "parent", link=frames.base)
@@ -111,23 +99,21 @@ def _add_hull(geometry: ElementTree.Element, robot: Robot, height: float) -> Non
         ElementTree.SubElement(geometry, "box", size=_numbers((*robot.body.footprint, height)))
 
 
-def _add_part(visual: ElementTree.Element, robot: Robot, frame: BodyFrame) -> None:
+def _add_part(visual: ElementTree.Element, part: Fixture) -> None:
     """Show a caster, a wheel, or a nozzle that ends where its force acts."""
-    if isinstance(robot.actuators, Rolling):
-        radius = robot.actuators.wheel_radius
-        if frame.name.removesuffix("_link") in robot.actuators.casters:
-            _place(visual, (0.0, 0.0, 0.0))
-            ball = ElementTree.SubElement(visual, "geometry")
-            ElementTree.SubElement(ball, "sphere", radius=_number(CASTER_RADIUS * radius))
-            _colour(visual, "wheel", WHEEL_COLOUR)
-            return
-        _place(visual, (0.0, 0.0, 0.0), (0.5 * pi, 0.0, 0.0))
-        _cylinder(ElementTree.SubElement(visual, "geometry"), radius, WHEEL_WIDTH * radius)
-        _colour(visual, "wheel", WHEEL_COLOUR)
-    else:
+    if not part.wheel:
         _place(visual, (-0.5 * NOZZLE, 0.0, 0.0), (0.0, 0.5 * pi, 0.0))
         _cylinder(ElementTree.SubElement(visual, "geometry"), 0.25 * NOZZLE, NOZZLE)
         _colour(visual, "actuator", PART_COLOUR)
+        return
+    if len(part.wheel) == 1:
+        _place(visual, (0.0, 0.0, 0.0))
+        ball = ElementTree.SubElement(visual, "geometry")
+        ElementTree.SubElement(ball, "sphere", radius=_number(*part.wheel))
+    else:
+        _place(visual, (0.0, 0.0, 0.0), (0.5 * pi, 0.0, 0.0))
+        _cylinder(ElementTree.SubElement(visual, "geometry"), *part.wheel)
+    _colour(visual, "wheel", WHEEL_COLOUR)
 
 
 def _cylinder(geometry: ElementTree.Element, radius: float, length: float) -> None:
@@ -152,7 +138,9 @@ def _number(value: float) -> str:
     return repr(float(value))
 
 
-def _x_axis_along(direction: Sequence[float]) -> tuple[float, float, float]:
-    """Roll, which is 0, pitch and yaw that turn the x axis into a direction [rad]."""
+def _x_axis_along(direction: Sequence[float] | None) -> tuple[float, float, float]:
+    """Roll, which is 0, pitch and yaw that turn the x axis into a direction, if any [rad]."""
+    if direction is None:
+        return 0.0, 0.0, 0.0
     x, y, z = direction
     return 0.0, -atan2(z, hypot(x, y)), atan2(y, x)

@@ -9,7 +9,7 @@ from typing import Any, Generic
 import numpy as np
 from array_api_compat import is_numpy_namespace
 
-from fulmar_core.dynamics.batch_dynamics import Dynamics
+from fulmar_core.dynamics.batch_dynamics import Dynamics, Steps
 from fulmar_core.dynamics.by_kind import actuation_of, dynamics_of
 from fulmar_core.dynamics.motion import may_be_off_centre, may_open_late
 from fulmar_core.dynamics.things import Poses
@@ -211,9 +211,7 @@ class BatchSimulation(MutableState, Generic[S]):
             self._actuation,
             self.world,
             self._dynamics.outside(before, self.world, time_s, self.control_dt),
-            substeps=self.substeps,
-            latest_s=self._latest_s,
-            off_centre=self._off_centre,
+            Steps(self.substeps, self._latest_s, self._off_centre),
         )
         self._steps = self._steps + 1
         if self.task.things:

@@ -36,15 +36,15 @@ class PositionReward:
     approach: float  # times metres come nearer
     spin: float  # cost of the turn rate [per rad/s]
 
-    def of(self, old: Array, d: Array, after: PlanarState) -> Array:
-        """Reward of having come from a distance to another [m], shape (...,)."""
+    def of(self, old: Array, d: Array, spin: Array) -> Array:
+        """Reward of having come from a distance to another [m], at a turn rate of some size, shape (...,)."""
         xp = array_namespace(d)
         return (
             self.position * xp.exp(-d / 0.25)
             + self.far * xp.exp(-d / 2.0)
             + self.near * xp.exp(-d / 0.1)
             + self.approach * (old - d)
-            - self.spin * xp.abs(after.yaw_rate)
+            - self.spin * spin
         )
 
 
@@ -77,7 +77,7 @@ class GoToPosition(Task[PlanarState]):
     def reward(self, before: PlanarState, after: PlanarState, goal: Goal, ended: Goal) -> Array:
         """Reward of one control step; see `Task.reward`."""
         old, new = self.errors(before, goal).position, self.errors(after, goal).position
-        return self.reward_weights.of(old, new, after)
+        return self.reward_weights.of(old, new, abs(after.yaw_rate))
 
     def errors(self, state: PlanarState, goal: Goal) -> Errors:
         """Distance from the goal."""

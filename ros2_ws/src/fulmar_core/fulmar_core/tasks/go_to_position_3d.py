@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 from fulmar_core.robots.robot import Robot
-from fulmar_core.states.arrays import array_namespace
 from fulmar_core.states.attitude import length
 from fulmar_core.states.counter_rng import Draws
 from fulmar_core.states.rotation import Array
 from fulmar_core.states.spatial import SpatialState
+from fulmar_core.tasks.go_to_position import PositionReward
 from fulmar_core.tasks.goal import Goal, goals_at
 from fulmar_core.tasks.space_terms import (
     FINE_TERMS,
@@ -27,17 +27,6 @@ from fulmar_core.tasks.terms import Errors, Tolerance
 
 
 @dataclass(frozen=True)
-class SpacePositionReward:
-    """Weights of the reward, per control step; d is the distance to the goal."""
-
-    position: float  # times exp(-d / 0.25 m): RANS 3-D GoToPosition
-    far: float  # times exp(-d / 2 m): leads in from metres away
-    near: float  # times exp(-d / 0.1 m): asks for centimetres
-    approach: float  # times metres come nearer
-    spin: float  # cost of the turn rate [per rad/s]
-
-
-@dataclass(frozen=True)
 class GoToPosition3d(Task[SpatialState]):
     """Go to a position in space; the goal arrives on `goal_point`."""
 
@@ -48,7 +37,7 @@ class GoToPosition3d(Task[SpatialState]):
     start: SpaceStart
     tolerance: Tolerance
     fine_distance: float  # where the magnified position saturates [m]
-    reward_weights: SpacePositionReward
+    reward_weights: PositionReward
 
     goal_topic: ClassVar[str] = "goal_point"
     state_type = SpatialState
@@ -66,15 +55,8 @@ class GoToPosition3d(Task[SpatialState]):
 
     def reward(self, before: SpatialState, after: SpatialState, goal: Goal, ended: Goal) -> Array:
         """Reward of one control step; see `Task.reward`."""
-        xp, w = array_namespace(after.x), self.reward_weights
         old, d = self.errors(before, goal).position, self.errors(after, goal).position
-        return (
-            w.position * xp.exp(-d / 0.25)
-            + w.far * xp.exp(-d / 2.0)
-            + w.near * xp.exp(-d / 0.1)
-            + w.approach * (old - d)
-            - w.spin * length(after.rate)
-        )
+        return self.reward_weights.of(old, d, length(after.rate))
 
     def errors(self, state: SpatialState, goal: Goal) -> Errors:
         """Distance from the goal."""

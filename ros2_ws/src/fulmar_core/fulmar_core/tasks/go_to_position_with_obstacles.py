@@ -84,7 +84,7 @@ class GoToPositionWithObstacles(Task[PlanarState]):
 
     def reward(self, before: PlanarState, after: PlanarState, goal: Goal, ended: Goal) -> Array:
         """Reward of one control step; see `Task.reward`."""
-        return self.reward_weights.of(_way(before, goal)[2], _way(after, goal)[2], after)
+        return self.reward_weights.of(_way(before, goal)[2], _way(after, goal)[2], abs(after.yaw_rate))
 
     def errors(self, state: PlanarState, goal: Goal) -> Errors:
         """Distance from the goal."""

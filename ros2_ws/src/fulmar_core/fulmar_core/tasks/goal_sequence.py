@@ -6,7 +6,7 @@ import dataclasses
 import math
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
@@ -67,6 +67,15 @@ class GoalSequence(Protocol):
         """
 
 
+class _ByClock:
+    """What goes by the clock alone: it has no place."""
+
+    place: ClassVar[dict[str, int]] = {}
+
+    def go_on_at(self, place: Mapping[str, int]) -> None:
+        """It goes by the clock."""
+
+
 class Waypoints:
     """Positions or poses, each when the one before is reached, or all in one goal."""
 
@@ -82,7 +91,7 @@ class Waypoints:
             hold_s: How long a robot must stay there [s].
             at_once: Whether the goal has all targets; it then is done after one round.
         """
-        self.topic, self._form = topic, file.form
+        self.topic, self.form = topic, file.form
         targets = file.targets()
         self._goals = [_goal(*targets)] if at_once else [_goal(target) for target in targets]
         self.standstill = self._goals[0]
@@ -90,11 +99,6 @@ class Waypoints:
         self._tolerance = dataclasses.replace(tolerance, velocity=0.0, yaw_rate_deg=0.0, rate_deg=0.0)
         self._reached = 0
         self._inside_since: float | None = None
-
-    @property
-    def form(self) -> type[State]:
-        """State type of the file's goals."""
-        return self._form
 
     @property
     def done(self) -> bool:
@@ -135,23 +139,18 @@ class Waypoints:
         return bool(self._tolerance.holds(_ERRORS[self.form](state, target)))
 
 
-class Schedule:
+class Schedule(_ByClock):
     """Velocities by the clock, and standstill after the last."""
 
     topic = "goal_velocity"
 
     def __init__(self, file: Velocities) -> None:
         """Begin with the first."""
-        self._form = file.form
+        self.form = file.form
         targets = file.targets()
         self._goals, self._ends = [_goal(velocity) for velocity in targets], file.ends()
         self.standstill = _goal(np.zeros_like(targets[0]))
         self._over = 0
-
-    @property
-    def form(self) -> type[State]:
-        """State type of the file's goals."""
-        return self._form
 
     @property
     def done(self) -> bool:
@@ -163,14 +162,6 @@ class Schedule:
         """How many are over."""
         return f"{self._over} of {len(self._ends)} velocities over"
 
-    @property
-    def place(self) -> dict[str, int]:
-        """None: it goes by the clock."""
-        return {}
-
-    def go_on_at(self, place: Mapping[str, int]) -> None:
-        """It goes by the clock."""
-
     def step(self, state: State, time_s: float) -> Goal:
         """The velocity of this time; see `GoalSequence.step`."""
         # A microsecond early, for times that were added up.
@@ -181,7 +172,7 @@ class Schedule:
 class Following:
     """Velocities that lead along a path, and standstill at its end."""
 
-    topic = "goal_velocity"
+    topic, form = "goal_velocity", PlanarState
     standstill = goal_at((0.0, 0.0, 0.0))
 
     def __init__(self, file: FollowedPath, *, sideways: bool) -> None:
@@ -190,11 +181,6 @@ class Following:
         self._planner: LookAhead = file.planner()
         self._on_path: Progress | None = None
         self._begin = Progress()
-
-    @property
-    def form(self) -> type[State]:
-        """Paths lie in the plane."""
-        return PlanarState
 
     @property
     def done(self) -> bool:
@@ -242,20 +228,15 @@ class Following:
         return self._begin
 
 
-class Moving:
+class Moving(_ByClock):
     """A pose or a position that moves by the clock, and stands still at its end."""
 
     def __init__(self, file: Trajectory) -> None:
         """Begin where the file's path does."""
         self.topic = "goal_point" if file.facing == "any" else "goal_pose"
         self._target, self._time_s = file.target(), 0.0
-        self._form = file.form
+        self.form = file.form
         self.standstill = _goal(self._target.pose(0.0))
-
-    @property
-    def form(self) -> type[State]:
-        """State type of the file's goals."""
-        return self._form
 
     @property
     def done(self) -> bool:
@@ -269,14 +250,6 @@ class Moving:
         if not self._target.path.closed:
             return f"{math.floor(10.0 * rounds) * 10} % of the path"
         return f"{math.floor(rounds)} of {self._target.loops or 'endless'} rounds"
-
-    @property
-    def place(self) -> dict[str, int]:
-        """None: it goes by the clock."""
-        return {}
-
-    def go_on_at(self, place: Mapping[str, int]) -> None:
-        """It goes by the clock."""
 
     def step(self, state: State, time_s: float) -> Goal:
         """The pose of this time; see `GoalSequence.step`."""

@@ -113,13 +113,7 @@ class TrackVelocities(Task[PlanarState]):
 
     def advance(self, goal: Goal, state: PlanarState, time_s: Array) -> Goal:
         """The next target comes when the time of this one is over."""
-        if goal.targets.shape[-2] == 1:
-            return goal
-        xp = array_namespace(goal.targets)
-        done = xp.floor((time_s + 1e-6) / self.step_s)
-        last = goal.targets.shape[-2] - 1
-        done = xp.astype(clip(done, 0.0, float(last)), goal.done.dtype)
-        return replace(goal, done=xp.zeros_like(goal.done) + done)
+        return at_time(goal, time_s, self.step_s)
 
     def reward(self, before: PlanarState, after: PlanarState, goal: Goal, ended: Goal) -> Array:
         """Reward of one control step; see `Task.reward`."""
@@ -135,3 +129,12 @@ class TrackVelocities(Task[PlanarState]):
         target = goal.current
         eu, ev = target[..., 0] - u, target[..., 1] - v
         return Errors(velocity=xp.sqrt(eu * eu + ev * ev), yaw_rate=target[..., 2] - r)
+
+
+def at_time(goal: Goal, time_s: Array, step_s: float) -> Goal:
+    """A goal whose targets follow each other by the clock, each after `step_s` [s]; one alone stays."""
+    if goal.targets.shape[-2] == 1:
+        return goal
+    xp, last = array_namespace(goal.targets), goal.targets.shape[-2] - 1
+    done = clip(xp.floor((time_s + 1e-6) / step_s), 0.0, float(last))
+    return replace(goal, done=xp.zeros_like(goal.done) + xp.astype(done, goal.done.dtype))

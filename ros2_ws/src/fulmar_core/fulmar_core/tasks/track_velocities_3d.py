@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 from fulmar_core.robots.robot import Robot
@@ -16,7 +16,7 @@ from fulmar_core.tasks.goal import Goal, no_obstacles
 from fulmar_core.tasks.space_terms import AXES, MOTION_TERMS, motion_terms
 from fulmar_core.tasks.task import Task
 from fulmar_core.tasks.terms import Errors, Tolerance
-from fulmar_core.tasks.track_velocities import VelocityReward
+from fulmar_core.tasks.track_velocities import VelocityReward, at_time
 
 ERROR_TERMS = (
     *(f"velocity_error_{axis}_in_body" for axis in AXES),
@@ -83,12 +83,7 @@ class TrackVelocities3d(Task[SpatialState]):
 
     def advance(self, goal: Goal, state: SpatialState, time_s: Array) -> Goal:
         """The next target comes when the time of this one is over."""
-        if goal.targets.shape[-2] == 1:
-            return goal
-        xp = array_namespace(goal.targets)
-        last = goal.targets.shape[-2] - 1
-        done = clip(xp.floor((time_s + 1e-6) / self.step_s), 0.0, float(last))
-        return replace(goal, done=xp.zeros_like(goal.done) + xp.astype(done, goal.done.dtype))
+        return at_time(goal, time_s, self.step_s)
 
     def reward(self, before: SpatialState, after: SpatialState, goal: Goal, ended: Goal) -> Array:
         """Reward of one control step; see `Task.reward`."""

@@ -15,7 +15,7 @@ import numpy as np
 
 from fulmar_core.config.plausible_ranges import Plausible
 from fulmar_core.robots.actuators.excitation import Excitation
-from fulmar_core.robots.actuators.parts import MovingParts
+from fulmar_core.robots.actuators.parts import Fixture, MovingParts
 from fulmar_core.robots.actuators.refuge import Refuge, StopAtOnce
 from fulmar_core.robots.actuators.response import Response
 from fulmar_core.robots.actuators.tank import Tank
@@ -96,6 +96,11 @@ class Actuators(ABC):
     def parts(self) -> MovingParts:
         """What of it can stick, one by one: what its commands name."""
         return MovingParts(self.names, self.lowest, self.scale)
+
+    @property
+    def fixtures(self) -> tuple[Fixture, ...]:
+        """What of it can be seen on the body."""
+        return ()
 
     @property
     def safe_command(self) -> np.ndarray:

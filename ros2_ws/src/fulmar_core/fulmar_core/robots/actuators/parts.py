@@ -8,6 +8,18 @@ import numpy as np
 
 
 @dataclass(frozen=True)
+class Fixture:
+    """A part on the body, as people see it."""
+
+    name: str
+    position: tuple[float, float, float]  # in the body's frame [m]
+    axis: tuple[float, float, float] | None = None  # along which its x axis points; None: as the body's
+    wheel: tuple[
+        float, ...
+    ] = ()  # radius and width, the axle along y; of a ball the radius; none: a nozzle [m]
+
+
+@dataclass(frozen=True)
 class MovingParts:
     """Parts that commands move; there are as many of them as a command has numbers.
 

@@ -12,6 +12,7 @@ from array_api_compat import device
 
 from fulmar_core.robots.actuators.excitation import Excitation
 from fulmar_core.robots.actuators.family import Actuators
+from fulmar_core.robots.actuators.parts import Fixture
 from fulmar_core.states.arrays import array_namespace, sum_of
 from fulmar_core.states.attitude import Vector
 from fulmar_core.states.rotation import Array
@@ -75,6 +76,11 @@ class Pushing(Actuators):
         Returns:
             Shape (..., n) [N].
         """
+
+    @property
+    def fixtures(self) -> tuple[Fixture, ...]:
+        """Each with its x axis along the force of a positive command; see `Actuators.fixtures`."""
+        return tuple(Fixture(push.name, push.position, push.direction) for push in self.pushes)
 
     @property
     def names(self) -> tuple[str, ...]:

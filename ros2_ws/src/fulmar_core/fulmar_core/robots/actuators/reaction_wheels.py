@@ -17,6 +17,7 @@ from array_api_compat import device
 from fulmar_core.config.plausible_ranges import Plausible
 from fulmar_core.robots.actuators.excitation import Excitation
 from fulmar_core.robots.actuators.family import Actuators
+from fulmar_core.robots.actuators.parts import Fixture
 from fulmar_core.robots.actuators.response import Response
 from fulmar_core.states.arrays import array_namespace, clip, sum_of
 from fulmar_core.states.attitude import Vector
@@ -92,6 +93,11 @@ class ReactionWheels(Actuators):
         if self.response.slew and len(self.response.slew) != len(self.names):
             raise ValueError(f"'slew' needs {len(self.names)} values, one for each actuator.")
         self.response.refuse_lag_beside_slew()
+
+    @property
+    def fixtures(self) -> tuple[Fixture, ...]:
+        """Each wheel in the body's middle, its x axis along its own; see `Actuators.fixtures`."""
+        return tuple(Fixture(wheel.name, (0.0, 0.0, 0.0), wheel.direction.tolist()) for wheel in self.wheels)
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from fulmar_core.robots.actuators.excitation import Excitation
 from fulmar_core.robots.actuators.family import Actuators
+from fulmar_core.robots.actuators.parts import Fixture
 from fulmar_core.robots.actuators.refuge import RampDown, Refuge
 from fulmar_core.robots.actuators.response import Response
 from fulmar_core.states.planar import PlanarState
@@ -51,6 +52,17 @@ class Rolling(Actuators):
     def casters(self) -> dict[str, float]:
         """Name of each ball caster, and its place ahead of the body's origin [m]."""
         return {}
+
+    @property
+    def fixtures(self) -> tuple[Fixture, ...]:
+        """Wheels, and casters, which stand on the same floor; see `Actuators.fixtures`."""
+        radius = self.wheel_radius
+        wheel, ball = (radius, WHEEL_WIDTH * radius), CASTER_RADIUS * radius
+        sunk = (CASTER_RADIUS - 1.0) * radius
+        return (
+            *(Fixture(name, (x, y, 0.0), wheel=wheel) for name, (x, y) in self.wheels.items()),
+            *(Fixture(name, (x, 0.0, sunk), wheel=(ball,)) for name, x in self.casters.items()),
+        )
 
     @abstractmethod
     def next_yaw_rate(
