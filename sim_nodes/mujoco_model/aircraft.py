@@ -15,12 +15,13 @@ from fulmar_core.states.gravity import GRAVITY
 from fulmar_core.states.spatial import SpatialState
 from fulmar_core.worlds.turbulence import Gust
 from sim_nodes.mujoco_model.floater import OFF_CENTRE
+from sim_nodes.mujoco_model.free_body import FreeBody, tensor_of
 from sim_nodes.mujoco_model.scenery import BODY, add_hull
 
 STEPS = 2  # of MuJoCo in a physics tick, each with the forces of where the craft is by then
 
 
-class Aircraft:
+class Aircraft(FreeBody):
     """One body on a free joint; see `RobotModel`."""
 
     steps_per_tick = STEPS
@@ -55,24 +56,14 @@ class Aircraft:
 
     def take_world(self, model: mujoco.MjModel, world: Any) -> None:
         """Take mass and inertia."""
-        xx, yy, zz, xy, xz, yz = np.asarray(world.inertia, dtype=float)
-        moments, axes = np.linalg.eigh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
-        axes[:, 2] = np.cross(axes[:, 0], axes[:, 1])  # a rotation, not a mirror image
-        mujoco.mju_mat2Quat(model.body_iquat[self._body], axes.ravel())
-        model.body_ipos[self._body] = 0.0
-        model.body_inertia[self._body], model.body_mass[self._body] = moments, world.mass
+        self.set_inertia(model, tensor_of(world))
+        model.body_mass[self._body], model.body_ipos[self._body] = world.mass, 0.0
 
     def fly_in(self, world: Any, actuation: ActuationState) -> None:
         """Take the air of an episode, a `FlightWorld`, and what remembers its gusts, each of a batch of one."""
         self._world, self._actuation = world, actuation
         self._inertia = inertia_of(tuple(world.inertia))
         self._tick, self._gust = -1, None
-
-    def place(self, model: mujoco.MjModel, data: mujoco.MjData, start: SpatialState) -> None:
-        """Put the craft where it starts."""
-        x, y, z, w = start.quat
-        data.qpos[:7] = *start.position, w, x, y, z
-        data.qvel[:6] = *start.velocity, *start.rate
 
     def own_truth(self, data: mujoco.MjData) -> dict[str, Any]:
         """What air probes and servos would measure without errors."""

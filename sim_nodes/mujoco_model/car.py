@@ -23,13 +23,7 @@ class Car(Chassis):
 
     def __init__(self, robot: Robot) -> None:
         self._car = robot.actuated_by(Ackermann)
-        super().__init__(
-            robot,
-            wheel_radius=self._car.wheel_radius,
-            friction=self._car.friction,
-            wheels=self._car.wheels,
-            weight_x=0.5 * self._car.wheelbase,
-        )
+        super().__init__(robot, self._car, weight_x=0.5 * self._car.wheelbase)
 
     def add(self, spec: mujoco.MjSpec) -> mujoco.MjsBody:
         """Add chassis, steering, wheels and servos; see `RobotModel.add`."""

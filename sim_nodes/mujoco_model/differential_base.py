@@ -19,13 +19,8 @@ class DifferentialBase(Chassis):
 
     def __init__(self, robot: Robot) -> None:
         self._drive = robot.actuated_by(DifferentialDrive)
-        super().__init__(
-            robot,
-            wheel_radius=self._drive.wheel_radius,
-            friction=self._drive.friction,
-            wheels=self._drive.wheels,
-            weight_x=min(0.0, WEIGHT_TO_CASTER * self._drive.caster_x),
-        )
+        weight_x = min(0.0, WEIGHT_TO_CASTER * self._drive.caster_x)
+        super().__init__(robot, self._drive, weight_x=weight_x)
 
     def add(self, spec: mujoco.MjSpec) -> mujoco.MjsBody:
         """Add chassis, wheels, casters and servos; see `RobotModel.add`."""

@@ -30,6 +30,7 @@ class Floater:
     """
 
     steps_per_tick = 1
+    in_space = False
 
     @property
     def steady(self) -> bool:

@@ -6,14 +6,14 @@ import mujoco
 import numpy as np
 
 from fulmar_core.robots.robot import Robot
-from fulmar_core.states.spatial import SpatialState
 from fulmar_core.worlds.spatial_world import SpatialWorld
 from sim_nodes.mujoco_model.floater import Floater, add_actuator
+from sim_nodes.mujoco_model.free_body import FreeBody, tensor_of
 
 TORQUE_SITE = "torque"  # where the torque of the surroundings acts
 
 
-class FreeFlyer(Floater):
+class FreeFlyer(FreeBody, Floater):
     """One body on a free joint, without gravity, under forces at fixed places and a push of the surroundings.
 
     Three more actuators apply the torque of an episode about the body's axes: a constant one, and that of an orbit.
@@ -33,19 +33,9 @@ class FreeFlyer(Floater):
 
     def take_world(self, model: mujoco.MjModel, world: SpatialWorld) -> None:
         """Take mass, inertia, centre of mass and constant torque."""
-        xx, yy, zz, xy, xz, yz = np.asarray(world.inertia, dtype=float)
-        moments, axes = np.linalg.eigh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
-        axes[:, 2] = np.cross(axes[:, 0], axes[:, 1])  # a rotation, not a mirror image
-        mujoco.mju_mat2Quat(model.body_iquat[self._body], axes.ravel())
-        model.body_inertia[self._body], model.body_mass[self._body] = moments, world.mass
-        model.body_ipos[self._body] = world.com
+        self.set_inertia(model, tensor_of(world))
+        model.body_mass[self._body], model.body_ipos[self._body] = world.mass, world.com
         self._torque = np.array(world.torque, dtype=float)
-
-    def place(self, model: mujoco.MjModel, data: mujoco.MjData, start: SpatialState) -> None:
-        """Put the body where it starts."""
-        x, y, z, w = start.quat
-        data.qpos[:7] = *start.position, w, x, y, z
-        data.qvel[:6] = *start.velocity, *start.rate
 
     def drive(
         self,

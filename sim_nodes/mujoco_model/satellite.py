@@ -16,14 +16,14 @@ from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.sensors.wheels import NAME as WHEELS
 from fulmar_core.robots.sensors.wheels import WheelSpeeds
 from fulmar_core.states.attitude import turn_back
-from fulmar_core.states.spatial import SpatialState
 from fulmar_core.worlds.spatial_world import SpatialWorld
+from sim_nodes.mujoco_model.free_body import FreeBody, tensor_of
 from sim_nodes.mujoco_model.scenery import BODY, add_hull
 
 WHEEL_MASS = 1e-3  # of the body, each; they sit in its middle, where their mass turns nothing [-]
 
 
-class Satellite:
+class Satellite(FreeBody):
     """One body on a free joint, without gravity, with reaction wheels; see `RobotModel`."""
 
     steps_per_tick = 1
@@ -73,8 +73,7 @@ class Satellite:
 
     def take_world(self, model: mujoco.MjModel, world: SpatialWorld) -> None:
         """Take mass and inertia."""
-        xx, yy, zz, xy, xz, yz = np.asarray(world.inertia, dtype=float)
-        self._inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        self._inertia = tensor_of(world)
         rest = sum(model.body_mass) - model.body_mass[self._body]
         model.body_mass[self._body] = float(world.mass) - rest
         self._set_inertia(model, 1.0)
@@ -83,17 +82,8 @@ class Satellite:
         """Give the body what the spacecraft has with its wheels locked, less the wheels' own."""
         wheels = self._wheels
         hub = growth * self._inertia - wheels.count * wheels.spin_inertia * np.eye(3)
-        moments, axes = np.linalg.eigh(hub)
-        axes[:, 2] = np.cross(axes[:, 0], axes[:, 1])  # a rotation, not a mirror image
-        mujoco.mju_mat2Quat(model.body_iquat[self._body], axes.ravel())
-        model.body_inertia[self._body] = moments
+        self.set_inertia(model, hub)
         self._growth = growth
-
-    def place(self, model: mujoco.MjModel, data: mujoco.MjData, start: SpatialState) -> None:
-        """Put the body where it starts, its wheels at rest."""
-        x, y, z, w = start.quat
-        data.qpos[:7] = *start.position, w, x, y, z
-        data.qvel[:6] = *start.velocity, *start.rate
 
     def own_truth(self, data: mujoco.MjData) -> dict[str, Any]:
         """Speeds of the wheels."""

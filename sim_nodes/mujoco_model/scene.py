@@ -12,7 +12,6 @@ from fulmar_core.config.errors import ConfigError
 from fulmar_core.dynamics.things import Thing
 from fulmar_core.robots.robot import Robot
 from fulmar_core.simulation.episode import Episode
-from fulmar_core.states.spatial import SpatialState
 from sim_nodes.mujoco_model.aircraft import Aircraft
 from sim_nodes.mujoco_model.car import Car
 from sim_nodes.mujoco_model.differential_base import DifferentialBase
@@ -107,7 +106,7 @@ def _spec(
     spec = mujoco.MjSpec()
     spec.modelname = robot.name
     spec.option.timestep = robot.timing.physics_dt / robot_model.steps_per_tick
-    in_space = robot.state_type is SpatialState
+    in_space = robot_model.in_space
     # Euler's method as in the core's plane; a free body tumbles, and would gain energy by it.
     kinds = mujoco.mjtIntegrator
     spec.option.integrator = kinds.mjINT_RK4 if in_space else kinds.mjINT_EULER
@@ -128,9 +127,11 @@ class RobotModel(Protocol):
 
     Attributes:
         steps_per_tick: MuJoCo steps in one physics tick of the robot.
+        in_space: Whether it moves freely, without floor or water.
     """
 
     steps_per_tick: int
+    in_space: bool
 
     @property
     def steady(self) -> bool:

@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 
 from fulmar_core.robots.actuators.response import Response
-from fulmar_core.robots.actuators.rolling import CASTER_RADIUS, SERVO_S, WHEEL_WIDTH
+from fulmar_core.robots.actuators.rolling import CASTER_RADIUS, SERVO_S, WHEEL_WIDTH, Rolling
 from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.urdf import WHEEL_COLOUR
 from fulmar_core.states.gravity import GRAVITY
@@ -40,29 +40,16 @@ class Chassis:
 
     steady = True
 
-    def __init__(
-        self,
-        robot: Robot,
-        *,
-        wheel_radius: float,
-        friction: float,
-        wheels: dict[str, tuple[float, float]],
-        weight_x: float,
-    ) -> None:
-        """Describe it.
+    in_space = False
 
-        Args:
-            robot: The robot.
-            wheel_radius: Of every wheel [m].
-            friction: Of tyres on the floor [-].
-            wheels: Name and place (x, y) of each [m].
-            weight_x: Of the centre of mass, ahead of the origin [m].
-        """
-        self.robot, self.radius, self.friction, self.places = robot, wheel_radius, friction, wheels
+    def __init__(self, robot: Robot, drive: Rolling, *, weight_x: float) -> None:
+        """Describe a robot with a drive; `weight_x`: of the centre of mass, ahead of the origin [m]."""
+        self.robot, self.radius = robot, drive.wheel_radius
+        self.friction, self.places = drive.friction, drive.wheels
         self.steps_per_tick = max(1, round(robot.timing.physics_dt / STEP_S))
-        self.rest_height = wheel_radius
-        height = max(wheel_radius, WEIGHT_HEIGHT * robot.body.height)
-        self._weight = np.array([weight_x, 0.0, height - wheel_radius])
+        self.rest_height = drive.wheel_radius
+        height = max(drive.wheel_radius, WEIGHT_HEIGHT * robot.body.height)
+        self._weight = np.array([weight_x, 0.0, height - drive.wheel_radius])
         self._wheel_mass = WHEEL_SHARE * robot.body.mass
         self._settled = np.zeros(0)
         self._body = 0

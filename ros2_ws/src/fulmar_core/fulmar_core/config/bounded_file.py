@@ -23,7 +23,6 @@ RECORD_BYTES = 2_000_000  # `metadata.yaml` of a bag: some ten thousand files
 WEIGHTS_BYTES = 50_000_000  # networks and golden vectors
 IMPORTED_BYTES = 200_000_000  # checkpoints of other stacks, which hold an optimiser beside the weights
 CATALOGUE_BYTES = 100_000_000  # of stars
-CHECKPOINT_BYTES = 8_000_000_000  # of training, with its replay buffer
 ENDLESS = 1 << 62  # for bags and recordings, which are read piece by piece
 
 
@@ -63,12 +62,6 @@ def read_bounded(path: Path, most: int) -> bytes:
     if len(content) > most:  # files of the kernel have no size
         raise RefusedFileError(errno.EFBIG, f"more than {most} bytes, at most these are read", str(path))
     return content
-
-
-def check_bounded(path: Path, most: int) -> None:
-    """Refuse a file before a library opens it by its name; arguments and errors as of `bounded_file`."""
-    with bounded_file(path, most):
-        return
 
 
 def check_unpacked(content: bytes, most: int) -> None:

@@ -84,28 +84,23 @@ def _fitted(settings: Motion, robot: Robot) -> Motion:
     return replace(settings, **more) if more else settings  # type: ignore[arg-type]
 
 
-def _planar_motion(settings: PlanarMotionSettings, robot: Robot) -> Estimator:
+def _motion(make: Callable[..., Estimator], settings: Motion, robot: Robot) -> Estimator:
     from fulmar_core.estimators.motion.frozen import noise_of
+
+    gyroscope_range, noise = robot.sensors.imu.gyroscope_range, noise_of(robot.sensors)
+    return make(_fitted(settings, robot), robot.limits, gyroscope_range=gyroscope_range, noise=noise)
+
+
+def _planar_motion(settings: PlanarMotionSettings, robot: Robot) -> Estimator:
     from fulmar_core.estimators.motion.planar_motion import PlanarMotionEstimator
 
-    return PlanarMotionEstimator(
-        _fitted(settings, robot),
-        robot.limits,
-        gyroscope_range=robot.sensors.imu.gyroscope_range,
-        noise=noise_of(robot.sensors),
-    )
+    return _motion(PlanarMotionEstimator, settings, robot)
 
 
 def _spatial_motion(settings: SpatialMotionSettings, robot: Robot) -> Estimator:
-    from fulmar_core.estimators.motion.frozen import noise_of
     from fulmar_core.estimators.motion.spatial_motion import SpatialMotionEstimator
 
-    return SpatialMotionEstimator(
-        _fitted(settings, robot),
-        robot.limits,
-        gyroscope_range=robot.sensors.imu.gyroscope_range,
-        noise=noise_of(robot.sensors),
-    )
+    return _motion(SpatialMotionEstimator, settings, robot)
 
 
 def _attitude(settings: AttitudeSettings, robot: Robot) -> Estimator:

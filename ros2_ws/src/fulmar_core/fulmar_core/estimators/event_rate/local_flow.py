@@ -11,7 +11,6 @@ from fulmar_core.robots.sensors.star_camera import StarCamera
 
 TUKEY = 4.685  # of Tukey's biweight, in robust standard deviations
 PASSES = 12
-LEAST_SPREAD_S = 0.01  # of the times of a track: shorter ones show no motion [s]
 
 
 @dataclass(frozen=True)
