@@ -20,8 +20,8 @@ from fulmar_core.states.spatial import SpatialState
 from fulmar_core.tasks.flight_terms import angle_of_attack, check_above_ground, is_lost
 from fulmar_core.tasks.goal import Goal, no_obstacles
 from fulmar_core.tasks.references.flight_paths import PATHS, through
-from fulmar_core.tasks.task import Task
-from fulmar_core.tasks.terms import Errors, Tolerance, weighted_sum
+from fulmar_core.tasks.task import FileTask
+from fulmar_core.tasks.terms import Errors, weighted_sum
 
 Range = tuple[float, float]
 NOW = "reference"  # among the things of a goal: time [s], place [m] and its rate [m/s] now, seven numbers
@@ -68,18 +68,14 @@ class FlightReward:
 
 
 @dataclass(frozen=True)
-class FollowReference(Task[SpatialState]):
+class FollowReference(FileTask[SpatialState]):
     """Follow places that lie `spacing_s` apart in time, all of them known from the start (`goal_path`).
 
     Errors are across the flight: to the side and in height. How far along x the craft is does not count.
     """
 
     kind: Literal["follow_reference"]
-    name: str
-    title: str
-    episode_s: float  # length of an episode [s]
     start: FlightStart
-    tolerance: Tolerance
     reward_weights: FlightReward
     # "hold", one of `tasks.references.flight_paths.PATHS`, or through the waypoints of the file
     reference: Literal["hold", "a", "b", "c", "d", "e", "f", "waypoints"] = "hold"

@@ -12,7 +12,7 @@ from fulmar_core.states.counter_rng import Draws
 from fulmar_core.states.planar import PlanarState, wrapped
 from fulmar_core.states.rotation import Array
 from fulmar_core.tasks.goal import Goal, goals_at
-from fulmar_core.tasks.task import Task
+from fulmar_core.tasks.task import FileTask
 from fulmar_core.tasks.terms import (
     FINE_TERMS,
     HEADING_TERMS,
@@ -20,7 +20,6 @@ from fulmar_core.tasks.terms import (
     POSITION_TERMS,
     Errors,
     Start,
-    Tolerance,
     fine_terms,
     goal_terms,
     heading_terms,
@@ -49,15 +48,11 @@ class PoseReward:
 
 
 @dataclass(frozen=True)
-class GoToPose(Task[PlanarState]):
+class GoToPose(FileTask[PlanarState]):
     """Go to a pose in the plane; the goal arrives on `goal_pose`."""
 
     kind: Literal["go_to_pose"]
-    name: str
-    title: str
-    episode_s: float  # length of an episode [s]
     start: Start
-    tolerance: Tolerance
     fine_distance: float  # where the magnified position saturates [m]
     reward_weights: PoseReward
     fine_heading_deg: float = 0.0  # where the magnified heading error saturates; 0: not observed [deg]

@@ -27,8 +27,8 @@ from fulmar_core.tasks.space_terms import (
     place_errors,
     rotation_terms,
 )
-from fulmar_core.tasks.task import Task
-from fulmar_core.tasks.terms import Errors, Tolerance, weighted_sum
+from fulmar_core.tasks.task import FileTask
+from fulmar_core.tasks.terms import Errors, weighted_sum
 
 
 @dataclass(frozen=True)
@@ -46,15 +46,11 @@ class SpacePoseReward:
 
 
 @dataclass(frozen=True)
-class GoToPose3d(Task[SpatialState]):
+class GoToPose3d(FileTask[SpatialState]):
     """Go to a pose in space; the goal arrives on `goal_pose`."""
 
     kind: Literal["go_to_pose_3d"]
-    name: str
-    title: str
-    episode_s: float  # length of an episode [s]
     start: SpaceStart
-    tolerance: Tolerance
     fine_distance: float  # where the magnified position saturates [m]
     fine_angle: float  # where the magnified attitude error saturates [rad]
     reward_weights: SpacePoseReward

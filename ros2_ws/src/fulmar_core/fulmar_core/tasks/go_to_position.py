@@ -11,14 +11,13 @@ from fulmar_core.states.counter_rng import Draws
 from fulmar_core.states.planar import PlanarState
 from fulmar_core.states.rotation import Array
 from fulmar_core.tasks.goal import Goal, goals_at
-from fulmar_core.tasks.task import Task
+from fulmar_core.tasks.task import FileTask
 from fulmar_core.tasks.terms import (
     FINE_TERMS,
     MOTION_TERMS,
     POSITION_TERMS,
     Errors,
     Start,
-    Tolerance,
     fine_terms,
     goal_terms,
     motion_terms,
@@ -49,15 +48,11 @@ class PositionReward:
 
 
 @dataclass(frozen=True)
-class GoToPosition(Task[PlanarState]):
+class GoToPosition(FileTask[PlanarState]):
     """Go to a position in the plane; the goal arrives on `goal_point`."""
 
     kind: Literal["go_to_position"]
-    name: str
-    title: str
-    episode_s: float  # length of an episode [s]
     start: Start
-    tolerance: Tolerance
     fine_distance: float  # where the magnified position saturates [m]
     reward_weights: PositionReward
 

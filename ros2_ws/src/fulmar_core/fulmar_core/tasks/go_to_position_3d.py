@@ -22,20 +22,16 @@ from fulmar_core.tasks.space_terms import (
     motion_terms,
     place_errors,
 )
-from fulmar_core.tasks.task import Task
-from fulmar_core.tasks.terms import Errors, Tolerance
+from fulmar_core.tasks.task import FileTask
+from fulmar_core.tasks.terms import Errors
 
 
 @dataclass(frozen=True)
-class GoToPosition3d(Task[SpatialState]):
+class GoToPosition3d(FileTask[SpatialState]):
     """Go to a position in space; the goal arrives on `goal_point`."""
 
     kind: Literal["go_to_position_3d"]
-    name: str
-    title: str
-    episode_s: float  # length of an episode [s]
     start: SpaceStart
-    tolerance: Tolerance
     fine_distance: float  # where the magnified position saturates [m]
     reward_weights: PositionReward
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import ClassVar, Literal
 
 from fulmar_core.robots.robot import Robot
@@ -15,12 +15,11 @@ from fulmar_core.tasks.go_to_position import GoToPosition, PositionReward
 from fulmar_core.tasks.goal import Goal, offset_to
 from fulmar_core.tasks.obstacles import TOUCH, Obstacles, clearance
 from fulmar_core.tasks.shortest_paths import shortest_way
-from fulmar_core.tasks.task import Task
+from fulmar_core.tasks.task import FileTask
 from fulmar_core.tasks.terms import (
     MOTION_TERMS,
     Errors,
     Start,
-    Tolerance,
     fine_terms,
     motion_terms,
     pose_errors,
@@ -31,16 +30,12 @@ FINE_WAY_TERMS = ("fine_way_x_in_body", "fine_way_y_in_body", "way_length")
 
 
 @dataclass(frozen=True)
-class GoToPositionWithObstacles(Task[PlanarState]):
+class GoToPositionWithObstacles(FileTask[PlanarState]):
     """Go to a position around discs; the goal arrives on `goal_point`, the discs on `obstacles`."""
 
     kind: Literal["go_to_position_with_obstacles"]
-    name: str
-    title: str
-    episode_s: float  # length of an episode [s]
     start: Start
     obstacles: Obstacles
-    tolerance: Tolerance
     fine_distance: float  # where the magnified position saturates [m]
     reward_weights: PositionReward
     collision_cost: float  # of touching, which ends an episode of training
@@ -56,10 +51,8 @@ class GoToPositionWithObstacles(Task[PlanarState]):
 
     @functools.cached_property
     def _plain(self) -> GoToPosition:
-        return GoToPosition(
-            "go_to_position", self.name, self.title, self.episode_s, self.start, self.tolerance,
-            self.fine_distance, self.reward_weights,
-        )  # fmt: skip
+        shared = {each.name: getattr(self, each.name) for each in fields(GoToPosition) if each.name != "kind"}
+        return GoToPosition("go_to_position", **shared)
 
     def draw(self, draws: Draws, robot: Robot, *, training: bool) -> tuple[PlanarState, Goal]:
         """Draw starts, goals and obstacles; see `Task.draw`."""

@@ -28,8 +28,8 @@ from fulmar_core.states.rotation import Array
 from fulmar_core.states.spatial import SpatialState, quat_of
 from fulmar_core.tasks.flight_terms import angle_of_attack, check_above_ground, is_lost, tilt_error
 from fulmar_core.tasks.goal import Goal, goals_at
-from fulmar_core.tasks.task import Task
-from fulmar_core.tasks.terms import Errors, Tolerance, weighted_sum
+from fulmar_core.tasks.task import FileTask
+from fulmar_core.tasks.terms import Errors, weighted_sum
 
 Range = tuple[float, float]
 MOTION_TERMS = (
@@ -71,14 +71,10 @@ class HoldReward:
 
 
 @dataclass(frozen=True)
-class _HoldFlight(Task[SpatialState]):
+class _HoldFlight(FileTask[SpatialState]):
     """What both tasks share; see there."""
 
-    name: str
-    title: str
-    episode_s: float  # length of an episode [s]
     start: HoldStart
-    tolerance: Tolerance
     reward_weights: HoldReward
 
     state_type = SpatialState

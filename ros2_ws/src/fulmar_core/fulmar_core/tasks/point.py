@@ -33,8 +33,8 @@ from fulmar_core.tasks.space_terms import (
     fine_attitude_terms,
     rotation_terms,
 )
-from fulmar_core.tasks.task import Task
-from fulmar_core.tasks.terms import Errors, Tolerance, weighted_sum
+from fulmar_core.tasks.task import FileTask
+from fulmar_core.tasks.terms import Errors, weighted_sum
 
 FIRST = "first_target"  # among the things of a goal: the target when its time began
 
@@ -65,7 +65,7 @@ class PointReward:
 
 
 @dataclass(frozen=True)
-class Point(Task[SpatialState]):
+class Point(FileTask[SpatialState]):
     """Hold the attitude of a goal on `goal_pose`, whose place does not count.
 
     With an orbit rate the wanted attitude turns about the world's y from the moment when the goal arrives, as the way
@@ -73,11 +73,7 @@ class Point(Task[SpatialState]):
     """
 
     kind: Literal["point"]
-    name: str
-    title: str
-    episode_s: float  # length of an episode [s]
     start: PointStart
-    tolerance: Tolerance
     fine_angle: float  # where the magnified attitude error saturates [rad]
     reward_weights: PointReward
     orbit_rate: float = (

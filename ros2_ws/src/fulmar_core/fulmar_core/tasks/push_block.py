@@ -17,8 +17,8 @@ from fulmar_core.states.counter_rng import Draws
 from fulmar_core.states.planar import PlanarState, at_rest, to_body
 from fulmar_core.states.rotation import Array
 from fulmar_core.tasks.goal import Goal, no_obstacles, offset_to
-from fulmar_core.tasks.task import Task
-from fulmar_core.tasks.terms import MOTION_TERMS, Errors, Tolerance, motion_terms
+from fulmar_core.tasks.task import FileTask
+from fulmar_core.tasks.terms import MOTION_TERMS, Errors, motion_terms
 from fulmar_core.tasks.waypoint_tasks import toward
 
 Range = tuple[float, float]
@@ -42,19 +42,15 @@ class PushReward:
 
 
 @dataclass(frozen=True)
-class PushBlock(Task[PlanarState]):
+class PushBlock(FileTask[PlanarState]):
     """Push a block to a place; that arrives on `goal_point`, where the block is on `block/pose`."""
 
     kind: Literal["push_block"]
-    name: str
-    title: str
-    episode_s: float  # length of an episode [s]
     block: Block
     block_distance: Range  # of the block from its place in evaluation [m]
     training_block_distance: Range  # same in training [m]
     start_distance: Range  # of the robot from the block; farther off where it would touch it [m]
     goal_area: float  # side of the square that places are drawn from [m]
-    tolerance: Tolerance
     fine_distance: float  # where the magnified way of the block saturates [m]
     reward_weights: PushReward
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Generic, Self
 
 from fulmar_core.config.paths import config_names
@@ -173,3 +174,13 @@ class Task(ABC, Generic[S]):
         if self.goal_topic == "goal_velocity":
             return None
         return state.distance_to(goal.current)
+
+
+@dataclass(frozen=True, kw_only=True)
+class FileTask(Task[S]):
+    """A task that a file of `configs/tasks` describes, with what every file has."""
+
+    name: str
+    title: str
+    episode_s: float  # length of an episode [s]
+    tolerance: Tolerance  # what counts as success; of targets that follow each other, within which one counts

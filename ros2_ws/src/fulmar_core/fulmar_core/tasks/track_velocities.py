@@ -14,8 +14,8 @@ from fulmar_core.states.counter_rng import Draws
 from fulmar_core.states.planar import PlanarState, at_rest
 from fulmar_core.states.rotation import Array
 from fulmar_core.tasks.goal import Goal, no_obstacles
-from fulmar_core.tasks.task import Task
-from fulmar_core.tasks.terms import MOTION_TERMS, Errors, Tolerance, motion_terms
+from fulmar_core.tasks.task import FileTask
+from fulmar_core.tasks.terms import MOTION_TERMS, Errors, motion_terms
 
 ERROR_TERMS = ("velocity_error_x_in_body", "velocity_error_y_in_body", "yaw_rate_error")
 FINE_ERROR_TERMS = ("fine_velocity_error_x_in_body", "fine_velocity_error_y_in_body", "fine_yaw_rate_error")
@@ -46,7 +46,7 @@ class VelocityReward:
 
 
 @dataclass(frozen=True)
-class TrackVelocities(Task[PlanarState]):
+class TrackVelocities(FileTask[PlanarState]):
     """Track a velocity in the body's frame; the target arrives on `goal_velocity`.
 
     Targets are drawn from what the robot can do: up to its speeds, and no faster a turn than its sideways acceleration
@@ -54,11 +54,7 @@ class TrackVelocities(Task[PlanarState]):
     """
 
     kind: Literal["track_velocities"]
-    name: str
-    title: str
-    episode_s: float  # length of an episode [s]
     hold_s: float  # time of one target [s]
-    tolerance: Tolerance
     fine_velocity: float  # where the magnified velocity error saturates [m/s]
     fine_yaw_rate: float  # same for the turn rate [rad/s]
     reward_weights: VelocityReward

@@ -14,8 +14,8 @@ from fulmar_core.states.rotation import Array
 from fulmar_core.states.spatial import SpatialState
 from fulmar_core.tasks.goal import Goal, no_obstacles
 from fulmar_core.tasks.space_terms import AXES, MOTION_TERMS, motion_terms
-from fulmar_core.tasks.task import Task
-from fulmar_core.tasks.terms import Errors, Tolerance
+from fulmar_core.tasks.task import FileTask
+from fulmar_core.tasks.terms import Errors
 from fulmar_core.tasks.track_velocities import VelocityReward, at_time
 
 ERROR_TERMS = (
@@ -26,7 +26,7 @@ FINE_ERROR_TERMS = tuple(f"fine_{name}" for name in ERROR_TERMS)
 
 
 @dataclass(frozen=True)
-class TrackVelocities3d(Task[SpatialState]):
+class TrackVelocities3d(FileTask[SpatialState]):
     """Track a velocity and a turn rate in the body's frame; the target arrives on `goal_velocity`.
 
     Directions of targets are uniform over the sphere, speeds up to the robot's, and no turn is faster than its
@@ -34,11 +34,7 @@ class TrackVelocities3d(Task[SpatialState]):
     """
 
     kind: Literal["track_velocities_3d"]
-    name: str
-    title: str
-    episode_s: float  # length of an episode [s]
     hold_s: float  # time of one target [s]
-    tolerance: Tolerance
     fine_velocity: float  # where the magnified velocity error saturates [m/s]
     fine_rate: float  # same for the turn rate [rad/s]
     reward_weights: VelocityReward

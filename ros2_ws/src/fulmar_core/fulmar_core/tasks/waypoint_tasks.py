@@ -15,11 +15,10 @@ from fulmar_core.states.counter_rng import Draws
 from fulmar_core.states.planar import PlanarState, at_rest, to_body, wrapped
 from fulmar_core.states.rotation import Array
 from fulmar_core.tasks.goal import Goal, no_obstacles
-from fulmar_core.tasks.task import Task
+from fulmar_core.tasks.task import FileTask
 from fulmar_core.tasks.terms import (
     MOTION_TERMS,
     Errors,
-    Tolerance,
     goal_terms,
     heading_terms,
     motion_terms,
@@ -60,16 +59,12 @@ class WaypointReward:
 
 
 @dataclass(frozen=True, kw_only=True)
-class WaypointTask(Task[PlanarState]):
+class WaypointTask(FileTask[PlanarState]):
     """Pass targets in their order; they arrive on `goal_path`. Each kind says where its targets lie."""
 
-    name: str
-    title: str
-    episode_s: float  # length of an episode [s]
     start_distance: tuple[float, float]  # from the first target [m]
     start_cone_deg: float = 180.0  # from straight behind the first target; 180: on any side of it [deg]
     reach: float  # radius within which a target counts as reached; `fitted` may widen it [m]
-    tolerance: Tolerance  # same, for evaluation
     required: int = field()  # targets that make an episode a success; a file has to say it
     reward_weights: WaypointReward
 

@@ -26,8 +26,8 @@ from fulmar_core.tasks.space_terms import (
     place_errors,
     rotation_terms,
 )
-from fulmar_core.tasks.task import Task
-from fulmar_core.tasks.terms import Errors, Tolerance
+from fulmar_core.tasks.task import FileTask
+from fulmar_core.tasks.terms import Errors
 
 SEEN = ("goal", "next_goal")  # targets that a controller sees, in their order
 CANDIDATES = 12  # places tried for each waypoint; that all leave the cube is rarer than one in a million
@@ -79,17 +79,13 @@ class SpaceWaypointReward:
 
 
 @dataclass(frozen=True, kw_only=True)
-class SpaceWaypointTask(Task[SpatialState]):
+class SpaceWaypointTask(FileTask[SpatialState]):
     """Pass targets in their order; they arrive on `goal_path`."""
 
-    name: str
-    title: str
-    episode_s: float  # length of an episode [s]
     start_distance: tuple[float, float]  # from the first target, in any direction [m]
     course: SpaceWaypoints
     reach: float  # radius within which a target counts as reached for a controller [m]
     reach_attitude_deg: float = 0.0  # same of the angle between attitudes; 0: any [deg]
-    tolerance: Tolerance  # same, for evaluation
     required: int = field()  # targets that make an episode a success
     reward_weights: SpaceWaypointReward
 
