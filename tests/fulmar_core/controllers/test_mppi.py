@@ -151,7 +151,7 @@ def test_noise_has_one_number_for_each_command():
 
 def test_it_is_for_aircraft():
     boat = load_robot("kingfisher")
-    with pytest.raises(ConfigError, match=r"'mppi' is for robots with control_surfaces"):
+    with pytest.raises(ConfigError, match=r"'mppi' is for aircraft with control_surfaces"):
         load_classical(boat, load_task("go_to_position"), law="mppi")
 
 
