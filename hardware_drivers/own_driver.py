@@ -172,11 +172,12 @@ def _problem_of(name: str, reading: Any, specs: Mapping[str, Any]) -> str:
 
 def _matrix(robot: Robot, settings: OwnDriver) -> np.ndarray:
     """What a command is multiplied with to give the values of the channels, shape (n, n)."""
-    actuators, unit = robot.actuators, np.eye(len(robot.actuators.names))
+    unit = np.eye(len(robot.actuators.names))
     if settings.order:
         return unit[list(settings.order)]
-    if isinstance(actuators, DifferentialDrive):
-        return np.array([channel_velocity(settings.wiring, actuators.track, *one) for one in unit]).T
+    if robot.actuators.takes_velocity:
+        track = robot.actuated_by(DifferentialDrive).track
+        return np.array([channel_velocity(settings.wiring, track, *one) for one in unit]).T
     if len(unit) == len(settings.wiring):
         return np.array([channels(settings.wiring, *one) for one in unit]).T
     return unit

@@ -42,18 +42,18 @@ class Wiring:
         Returns:
             Same shape and unit.
         """
-        actuators = self._robot.actuators
-        if isinstance(actuators, Thrusters):
+        if isinstance(self._robot.actuators, Thrusters):
             applied = command.copy()
             applied[self._dead] = 0.0
             return applied
         if self._straight:
             return command
-        if not isinstance(actuators, DifferentialDrive):
+        if not self._robot.actuators.takes_velocity:
             return self._crossed(command)
-        half = 0.5 * actuators.track * command[1]
+        track = self._robot.actuated_by(DifferentialDrive).track
+        half = 0.5 * track * command[1]
         left, right = self._crossed(np.array([command[0] - half, command[0] + half]))
-        return np.array([0.5 * (left + right), (right - left) / actuators.track])
+        return np.array([0.5 * (left + right), (right - left) / track])
 
     def _crossed(self, channels: np.ndarray) -> np.ndarray:
         sides = np.zeros(2)
