@@ -42,9 +42,26 @@ class AircraftCheck:
         """Axes that no control moves."""
         return tuple(axis for axis, each in self.authority.items() if max(map(abs, each.values())) < LEAST)
 
-    def as_json(self) -> list[dict[str, Any]]:
-        """The list `trim` of `fulmar check robot --json`."""
-        return [
+    @property
+    def rank(self) -> int:
+        """Number of axes that controls move."""
+        return len(self.authority) - len(self.missing_axes)
+
+    @property
+    def controllable(self) -> bool:
+        """Whether it flies somewhere, and controls move it about every axis."""
+        return bool(self.trims) and not self.missing_axes
+
+    def problems(self) -> Iterator[str]:
+        """One line for each thing that is wrong."""
+        if not self.trims:
+            yield self.missing[0]
+        if self.authority and self.missing_axes:
+            yield f"no control moves it about or along {', '.join(self.missing_axes)}."
+
+    def as_json(self) -> dict[str, Any]:
+        """What `fulmar check robot --json` has of it."""
+        trims = [
             {
                 "speed": trim.speed,
                 "height": trim.height,
@@ -57,17 +74,49 @@ class AircraftCheck:
             }
             for trim, modes in self.trims
         ]
+        return {
+            "actuators": {
+                "count": len(self.robot.actuators.names),
+                "rank": self.rank,
+                "missing_axes": list(self.missing_axes),
+                "axes": list(self.authority),
+                "authority": self.authority,
+            },
+            "zero_wrench_holdable": bool(self.trims),
+            "controllable": self.controllable,
+            "trim": trims,
+        }
+
+    def lines(self) -> list[tuple[str, str]]:
+        """What people read, as labels and texts."""
+        lines = []
+        for axis, each in self.authority.items():
+            strongest = sorted(each.items(), key=lambda one: -abs(one[1]))
+            most = abs(strongest[0][1])
+            shown = [f"{name} {value:+.3g}" for name, value in strongest if abs(value) > 0.05 * most]
+            lines.append((f"full control, {axis}", f"{', '.join(shown)} {UNITS[axis]}"))
+        for trim, modes in self.trims:
+            where = "free air" if trim.height is None else f"{trim.height:g} m"
+            lines.append(
+                (
+                    f"{trim.speed:.4g} m/s, {where}",
+                    f"α {math.degrees(trim.alpha):.2f}°, elevator {math.degrees(trim.elevator):.2f}°, throttle "
+                    f"{trim.throttle:.3f}, thrust {trim.thrust:.4g} N",
+                )
+            )
+            lines += [("", _mode_line(mode)) for mode in modes]
+        return lines
 
 
 def check_aircraft(
-    robot: Robot, *, speed: float | None = None, altitude: float = 0.0, height: float | None = None
+    robot: Robot, *, speed: float | None = None, altitude: float | None = None, height: float | None = None
 ) -> AircraftCheck:
     """Trim and linearise an aircraft.
 
     Args:
         robot: An aircraft.
         speed: Through the air; None: five around its cruising speed [m/s].
-        altitude: Above mean sea level, of the craft in free air, else of the ground [m].
+        altitude: Above mean sea level, of the craft in free air, else of the ground; None: 0 [m].
         height: Of the craft above the ground, with ground effect; None: free air, and, without a speed, some heights
             at cruise too [m].
 
@@ -82,7 +131,7 @@ def check_aircraft(
     found, missing = [], []
     for at_speed, at_height in asked:
         try:
-            trim = find_trim(robot, at_speed, at_height, altitude)
+            trim = find_trim(robot, at_speed, at_height, altitude or 0.0)
         except ConfigError as error:
             if speed is not None:
                 raise
@@ -98,35 +147,6 @@ def _authority(robot: Robot, trim: Trim) -> dict[str, dict[str, float]]:
     full = effects * robot.actuators.scale
     names = robot.actuators.names
     return {axis: dict(zip(names, map(float, full[row]), strict=True)) for axis, row in AXES.items()}
-
-
-def problems_of(check: AircraftCheck) -> Iterator[str]:
-    """One line for each thing that is wrong."""
-    if not check.trims:
-        yield check.missing[0]
-    if check.authority and check.missing_axes:
-        yield f"no control moves it about or along {', '.join(check.missing_axes)}."
-
-
-def lines_of(check: AircraftCheck) -> list[tuple[str, str]]:
-    """What people read, as labels and texts."""
-    lines = []
-    for axis, each in check.authority.items():
-        strongest = sorted(each.items(), key=lambda one: -abs(one[1]))
-        most = abs(strongest[0][1])
-        shown = [f"{name} {value:+.3g}" for name, value in strongest if abs(value) > 0.05 * most]
-        lines.append((f"full control, {axis}", f"{', '.join(shown)} {UNITS[axis]}"))
-    for trim, modes in check.trims:
-        where = "free air" if trim.height is None else f"{trim.height:g} m"
-        lines.append(
-            (
-                f"{trim.speed:.4g} m/s, {where}",
-                f"α {math.degrees(trim.alpha):.2f}°, elevator {math.degrees(trim.elevator):.2f}°, throttle "
-                f"{trim.throttle:.3f}, thrust {trim.thrust:.4g} N",
-            )
-        )
-        lines += [("", _mode_line(mode)) for mode in modes]
-    return lines
 
 
 def _mode_line(mode: Mode) -> str:

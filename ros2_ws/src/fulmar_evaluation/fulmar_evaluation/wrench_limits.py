@@ -14,11 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fulmar_core.config.errors import ConfigError
-from fulmar_core.robots.actuators.pushing import PLANAR, Pushing
-from fulmar_core.robots.actuators.reaction_wheels import ReactionWheels
-from fulmar_core.robots.actuators.rolling import Rolling
 from fulmar_core.robots.robot import Robot
-from fulmar_core.states.spatial import SpatialState
 
 AXES = ("force_x", "force_y", "force_z", "torque_x", "torque_y", "torque_z")
 LEAST_SHARE = 1e-6  # of the largest force or torque: what is less is rounding [-]
@@ -182,31 +178,16 @@ class WrenchSet:
 def wrench_set_of(robot: Robot) -> WrenchSet:
     """Wrenches of a robot's actuators about its origin, along the axes in which it moves.
 
-    Wheels push ahead, and where a robot turns on the spot its two sides push against one another.
-
     Raises:
-        ConfigError: The family neither pushes nor rolls.
+        ConfigError: The forces of its family are not those of single actuators.
     """
-    actuators = robot.actuators
-    if isinstance(actuators, Rolling):
-        half = 0.5 * actuators.track
-        if actuators.largest_curvature is None:
-            columns = actuators.wheel_force * np.array([[1.0, 1.0], [0.0, 0.0], [-half, half]])
-        else:
-            columns = np.array([[actuators.pull], [0.0], [0.0]])
-        return WrenchSet(tuple(AXES[i] for i in PLANAR), columns, -np.ones(columns.shape[1]), shared=False)
-    if isinstance(actuators, ReactionWheels):
-        wheels = slice(actuators.count)  # unloading comes from outside, and is weak
-        columns = (actuators.scale[wheels, None] * actuators.torque_per_command[wheels]).T
-        return WrenchSet(AXES[3:], columns, -np.ones(actuators.count), shared=False)
-    if not isinstance(actuators, Pushing):
+    actuators, axes = robot.actuators, list(robot.kind.axes)
+    if actuators.full_wrenches is None:
         raise ConfigError(
             f"'{robot.name}' has {actuators.kind}, whose forces are not those of single actuators."
         )
-    chosen = list(range(6)) if robot.state_type is SpatialState else PLANAR
-    columns = (actuators.full_thrust[:, None] * actuators.wrench_per_newton)[:, chosen].T
-    least = np.asarray(actuators.thrusts(np.diag(actuators.lowest))).diagonal() / actuators.full_thrust
-    return WrenchSet(tuple(AXES[i] for i in chosen), columns, least, actuators.shared_pressure)
+    wrenches, least, shared = actuators.full_wrenches
+    return WrenchSet(tuple(AXES[i] for i in axes), wrenches[:, axes].T, least, shared)
 
 
 def _distinct(corners: np.ndarray, scale: np.ndarray) -> np.ndarray:

@@ -20,11 +20,6 @@ REFERENCE: dict[str, Any] = {"color": INK, "linestyle": DASHED, "linewidth": 0.9
 PARTS = (*BODY_AXES, CONTROLLER_COLOURS["policy"], CONTROLLER_COLOURS["lqr"])  # of surfaces and throttles
 
 
-def flies(runs: Sequence[View]) -> bool:
-    """Whether the runs are flights of aircraft."""
-    return any(result.robot.flies for _, result in evaluated(runs))
-
-
 def draw_flight_path(rows: Sequence[Axes] | np.ndarray, runs: Sequence[View]) -> None:
     """Side and height over the way ahead, each at a scale of its own, beside the reference."""
     for axes, up in zip(rows, (1, 2), strict=True):

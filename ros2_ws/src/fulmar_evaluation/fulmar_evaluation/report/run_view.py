@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from fulmar_bags.run_record import RunRecord
-from fulmar_core.states.spatial import SpatialState
 from fulmar_evaluation.report.style import colours
 from fulmar_evaluation.run_evaluation import RunResult, evaluate_run
 from fulmar_evaluation.run_summary import latencies_ms, summarise
@@ -67,11 +66,6 @@ def views(records: Sequence[RunRecord]) -> list[View]:
 def evaluated(runs: Sequence[View]) -> list[tuple[View, RunResult]]:
     """Those runs that have a result, with it."""
     return [(run, run.result) for run in runs if run.result is not None]
-
-
-def in_space(runs: Sequence[View]) -> bool:
-    """Whether the runs are of bodies that move in three dimensions."""
-    return any(result.task.state_type is SpatialState for _, result in evaluated(runs))
 
 
 def result_of(run: View) -> tuple[str, str]:

@@ -20,7 +20,7 @@ from fulmar_evaluation.report.style import (
     PAPER,
     house_style,
 )
-from fulmar_evaluation.wrench_limits import AXES, WrenchSet
+from fulmar_evaluation.wrench_limits import AXES, WrenchSet, wrench_set_of
 
 FILL = CONTROLLER_COLOURS["policy"]
 UNSHARED = OTHER_COLOURS[0]
@@ -28,7 +28,7 @@ NOTHING = 1e-9  # rounding, in either unit
 SMALL = 0.1  # torques that stay below are written in mN·m [N·m]
 
 
-def write_wrench_plot(robot: Robot, wrenches: WrenchSet, file: Path) -> Path:
+def write_wrench_plot(robot: Robot, file: Path) -> Path:
     """Draw the polytopes of force and torque.
 
     In each panel two axes change. Filled is what can be made while all others stay zero, dashed what can be made with
@@ -36,9 +36,9 @@ def write_wrench_plot(robot: Robot, wrenches: WrenchSet, file: Path) -> Path:
 
     Args:
         robot: Whose actuators they are.
-        wrenches: Along three or six axes.
         file: Image to write.
     """
+    wrenches = wrench_set_of(robot)
     pairs = [(0, 1), (0, 2), (1, 2)]
     if len(wrenches.axes) == 6:
         pairs += [(3, 4), (3, 5), (4, 5)]

@@ -94,6 +94,12 @@ class DifferentialDrive(Rolling):
         """The most that both wheels push together [N]."""
         return 2.0 * self.wheel_force
 
+    @property
+    def full_wrenches(self) -> tuple[np.ndarray, np.ndarray, bool]:
+        """Of each side: they push against one another too; see `Actuators.full_wrenches`."""
+        sides = [[1.0, 0.0, 0.0, 0.0, 0.0, side * 0.5 * self.track] for side in (-1.0, 1.0)]
+        return self.wheel_force * np.array(sides), -np.ones(2), False
+
     def next_yaw_rate(
         self, state: PlanarState, speed: Array, turn: Array, twist: Array, yaw_inertia: Array, dt: float
     ) -> Array:

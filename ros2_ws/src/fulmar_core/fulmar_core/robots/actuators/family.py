@@ -103,6 +103,16 @@ class Actuators(ABC):
         return ()
 
     @property
+    def full_wrenches(self) -> tuple[np.ndarray, np.ndarray, bool] | None:
+        """What commands make about the body's origin, one by one; None where that is not of single actuators.
+
+        Returns:
+            Wrench of each at its full command, shape (n, 6) [N, N·m], its least share of that, shape (n,) [-], and
+            whether one supply feeds all.
+        """
+        return None
+
+    @property
     def safe_command(self) -> np.ndarray:
         """Command that moves nothing by itself, shape (n,)."""
         return np.zeros(len(self.names))

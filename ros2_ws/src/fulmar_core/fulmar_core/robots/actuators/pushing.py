@@ -105,6 +105,12 @@ class Pushing(Actuators):
         return np.concatenate((directions, np.cross(positions, directions)), axis=1)
 
     @property
+    def full_wrenches(self) -> tuple[np.ndarray, np.ndarray, bool]:
+        """Of each actuator; see `Actuators.full_wrenches`."""
+        least = np.asarray(self.thrusts(np.diag(self.lowest))).diagonal() / self.full_thrust
+        return self.full_thrust[:, None] * self.wrench_per_newton, least, self.shared_pressure
+
+    @property
     def sideways(self) -> bool:
         """Whether any actuator pushes to a side."""
         return bool(np.abs(self.wrench_per_newton[:, 1]).max() > 1e-9)

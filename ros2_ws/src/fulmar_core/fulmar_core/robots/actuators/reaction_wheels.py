@@ -133,6 +133,12 @@ class ReactionWheels(Actuators):
         return np.concatenate((-self.axes, outside))
 
     @property
+    def full_wrenches(self) -> tuple[np.ndarray, np.ndarray, bool]:
+        """Of each wheel: unloading comes from outside, and is weak; see `Actuators.full_wrenches`."""
+        torques = self.scale[: self.count, None] * self.torque_per_command[: self.count]
+        return np.concatenate((np.zeros_like(torques), torques), axis=1), -np.ones(self.count), False
+
+    @property
     def top_momentum(self) -> float:
         """Momentum of one wheel at its top speed [N·m·s]."""
         return self.spin_inertia * self.top_speed

@@ -89,6 +89,11 @@ class Rolling(Actuators):
         return (CLEARANCE - 1.0) * self.wheel_radius, height - self.wheel_radius
 
     @property
+    def full_wrenches(self) -> tuple[np.ndarray, np.ndarray, bool]:
+        """All wheels push ahead together; see `Actuators.full_wrenches`."""
+        return np.array([[self.pull, 0.0, 0.0, 0.0, 0.0, 0.0]]), -np.ones(1), False
+
+    @property
     def servo_s(self) -> float:
         """Time constant of the wheels' speed servos [s]."""
         return max(self.response.lag_s, SERVO_S)

@@ -15,4 +15,5 @@ PLANAR = Kind(
     far_goal=(FAR_M, 0.0, 0.0),
     drifts=True,
     calibrated=("mass", "yaw_inertia", "center_of_mass_x", "center_of_mass_y", "delay"),
+    axes=(0, 1, 5),
 )

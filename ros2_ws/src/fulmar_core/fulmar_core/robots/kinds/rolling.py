@@ -13,4 +13,5 @@ ROLLING = Kind(
     usual_task="go_to_pose",
     usual_estimator="mocap_imu",
     far_goal=(FAR_M, 0.0, 0.0),
+    axes=(0, 1, 5),
 )

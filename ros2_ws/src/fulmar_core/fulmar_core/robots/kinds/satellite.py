@@ -19,4 +19,5 @@ SATELLITE = Kind(
     always_estimated=True,
     goes_anywhere=False,
     drifts=True,
+    axes=(3, 4, 5),
 )

@@ -1,0 +1,19 @@
+"""What `fulmar check robot` finds out about a robot of each kind."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from fulmar_evaluation.aircraft_check import AircraftCheck, check_aircraft
+from fulmar_evaluation.wrench_check import FreeFlyerCheck, SpaceCheck, WheelCheck, WrenchCheck
+
+Findings = WrenchCheck | AircraftCheck
+
+# From a robot, and the speed, altitude and height that a trim was asked for at; each None if none was.
+CHECKS: dict[str, Callable[..., Findings]] = {
+    "planar": WrenchCheck.of,
+    "rolling": WheelCheck.of,
+    "free_flyer": FreeFlyerCheck.of,
+    "satellite": SpaceCheck.of,
+    "aircraft": check_aircraft,
+}
