@@ -11,7 +11,7 @@ from nav_msgs.msg import Odometry
 
 from fulmar_core.robots.topics import TRUTH
 from fulmar_core.robots.wire_check import BETWEEN, WARNINGS
-from fulmar_core.states.spatial import SpatialState
+from fulmar_evaluation.faults.by_kind import FAULTS
 from fulmar_evaluation.faults.fault import STAYS_S, Outcome
 from fulmar_evaluation.faults.fault_environment import goal_of
 from fulmar_evaluation.faults.live_system import LiveSystem
@@ -19,13 +19,8 @@ from fulmar_evaluation.faults.observer import HealthStatus, wait_for
 from fulmar_ros.convert import OdometryReader
 from fulmar_ros.qos import subscriber_qos
 
-NEAR_M, NEAR_DEG = 0.3, 5.0  # from the goal: the robot copes with what was done
 LEVEL_AGAIN_S = 10.0  # for an aircraft to fly level again, or to come down
 AFTER_S = 4.0  # for which it is watched once it was said
-ASTRAY_M, ASTRAY_DEG = (
-    0.5,
-    5.0,
-)  # by which a robot that goes on may be farther from its goal than when it was said
 
 
 class DistanceWatch:
@@ -34,7 +29,7 @@ class DistanceWatch:
     def __init__(self, live: LiveSystem) -> None:
         """Subscribe to the truth."""
         self._read, self._lock = OdometryReader(live.plan.frames), threading.Lock()
-        self._turns, self._axes = live.robot.actuators.turns_only, live.robot.state_type.AXES
+        self._distance, self._axes = FAULTS[live.robot.kind.name].distance, live.robot.state_type.AXES
         self._goal = live.robot.state_type.target_at(goal_of(live.robot)).tolist()
         self._newest = math.inf
         live.bystander.create_subscription(
@@ -45,14 +40,7 @@ class DistanceWatch:
         read = self._read.read(data)
         if read is None:
             return
-        if self._turns:
-            state = SpatialState.from_rigid(read.state)
-            dot = abs(sum(a * float(b) for a, b in zip(self._goal[3:7], state.quat, strict=True)))
-            distance = math.degrees(2.0 * math.acos(min(1.0, dot)))
-        else:
-            distance = math.dist(
-                read.state.position_in_world[: self._axes].tolist(), self._goal[: self._axes]
-            )
+        distance = self._distance.of(read.state, self._goal, self._axes)
         with self._lock:
             self._newest = distance
 
@@ -65,12 +53,12 @@ class DistanceWatch:
     @property
     def near(self) -> float:
         """Within which the robot is at its goal."""
-        return NEAR_DEG if self._turns else NEAR_M
+        return self._distance.near
 
     @property
     def astray(self) -> float:
         """By which it may be farther away after a while."""
-        return ASTRAY_DEG if self._turns else ASTRAY_M
+        return self._distance.astray
 
 
 def complaint(live: LiveSystem, since_s: float, wanted: Callable[[str], bool]) -> HealthStatus | None:

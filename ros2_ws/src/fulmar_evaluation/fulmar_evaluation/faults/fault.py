@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from fulmar_core.robots.robot import Robot
+from fulmar_evaluation.faults.by_kind import FAULTS
 from fulmar_evaluation.faults.fault_environment import USUAL, FaultEnvironment
 from fulmar_evaluation.faults.flight_watch import FLIES_S
 from fulmar_evaluation.faults.launched import RUN
@@ -139,7 +140,8 @@ class Fault:
 
     def inapplicable(self, robot: Robot) -> str:
         """Why a robot, or this machine, cannot have it, by the system that it is done to too; empty if it can."""
-        return self.why_not(robot) or self.about.why_not(robot)
+        excused = FAULTS[robot.kind.name].excused.get(self.name, "")
+        return excused or self.why_not(robot) or self.about.why_not(robot)
 
     @property
     def name(self) -> str:

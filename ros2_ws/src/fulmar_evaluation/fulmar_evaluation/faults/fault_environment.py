@@ -36,6 +36,7 @@ from fulmar_core.robots.topics import (
 )
 from fulmar_core.states.spatial import SpatialState
 from fulmar_core.tasks import Task, load_task
+from fulmar_evaluation.faults.by_kind import STAYS, UNSEEN
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 from policy_server.controllers import shipped_policy
 
@@ -100,17 +101,11 @@ class FaultInjector:
             self._publisher.publish(changed)
 
 
-STAYS = "it stays where it is"  # why what only turns has no limits of place
 HELD = AIRCRAFT.far_goal  # where an aircraft begins
 AISLE_M = 100.0  # of its area, to either side
 CORNER_M = 1.0  # from there to the second place that a node of goals sends it to, along y
 ROOM_M = 2.0  # of an area beyond start and goal
-TASKS = (
-    "go_to_pose",
-    "go_to_pose_3d",
-    "go_to_position",
-    "go_to_position_3d",
-)  # the first with a shipped policy
+POSITION = "go_to_position"  # what is done where no policy is shipped for the usual task
 
 
 @dataclass(frozen=True)
@@ -151,7 +146,7 @@ class FaultEnvironment:
             "no policy is shipped for it": not _has_policy(robot)
             and (self.bundle is not None or self.fallback is not None),
             STAYS: turns and self.has_area,
-            "it is not seen by motion capture": self.intercepted == MOCAP or (flies and self.estimated),
+            UNSEEN: self.intercepted == MOCAP or (flies and self.estimated),
             "only its own controllers drive it": self.by_hand,
             "no goal file holds what it flies along": flies and self.by_goal_node,
         }
@@ -164,11 +159,11 @@ COMMANDS = FaultEnvironment(answers_pass=True)
 
 
 def task_of(robot: Robot) -> Task:
-    """What a robot does when a fault comes: the first of `TASKS` in its world that a policy is shipped for."""
+    """What a robot does when a fault comes: what is usual, or goes to a position."""
     if robot.kind.goal_task:
         return load_task(robot.kind.goal_task)
-    fitting = [task for task in map(load_task, TASKS) if task.state_type is robot.state_type]
-    return next((task for task in fitting if shipped_policy(robot.name, task.name)), fitting[0])
+    fitting = (robot.kind.usual_task, POSITION + robot.state_type.SUFFIX)
+    return load_task(next((task for task in fitting if shipped_policy(robot.name, task)), fitting[0]))
 
 
 def _has_policy(robot: Robot) -> bool:

@@ -12,7 +12,6 @@ from typing import Any
 from nav_msgs.msg import Odometry
 
 from fulmar_bags.message_reader import stamp_ns
-from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.sensors.repetition import FROZEN_AFTER
 from fulmar_evaluation.faults.fault import STAYS_S, Fault, Outcome, stopped
 from fulmar_evaluation.faults.fault_environment import RELAYED, Injection, delayed, lost
@@ -175,11 +174,6 @@ def _epoch(live: LiveSystem, since_s: float) -> tuple[str, str]:
     return (statuses[-1].values["epoch"], statuses[-1].values["mode"]) if statuses else ("", "silent")
 
 
-def _with_one_clock(robot: Robot) -> str:
-    turns = robot.actuators.turns_only
-    return "its wheels stamp what they measure by the same clock, and are not relayed" if turns else ""
-
-
 INPUT_FAULTS = (
     *(
         Fault(do, RELAYED)
@@ -195,5 +189,5 @@ INPUT_FAULTS = (
         )
     ),
     Fault(time_jump_forwards, replace(RELAYED, answers_pass=True)),
-    Fault(time_jump_backwards, replace(RELAYED, answers_pass=True), _with_one_clock),
+    Fault(time_jump_backwards, replace(RELAYED, answers_pass=True)),
 )

@@ -19,13 +19,12 @@ from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.topics import GOAL_POSE, GOAL_WIRES, SIMULATION_START_NS
 from fulmar_core.safety.geofence import is_inside
 from fulmar_core.states.rotation import rotate, rotate_inverse
-from fulmar_core.states.spatial import SpatialState
 from fulmar_core.tasks.goal import goal_at
+from fulmar_evaluation.faults.by_kind import FAULTS, TOO_MUCH
 from fulmar_evaluation.faults.fault import STAYS_S, WORDS_S, Fault, Outcome, stopped, went_on
 from fulmar_evaluation.faults.fault_environment import (
     RELAYED,
     ROOM_M,
-    STAYS,
     FaultEnvironment,
     goal_of,
     task_of,
@@ -36,8 +35,6 @@ from fulmar_evaluation.faults.observer import wait_for
 from fulmar_ros.goal_messages import TYPES, goal_message
 from fulmar_ros.qos import publisher_qos
 
-TOO_MUCH = 2.0  # times the limit
-OF_EACH = 0.8  # of the limit, about each of three axes: together 1.39 of it
 OF_LIMIT, FASTEST = 0.9, 10.0  # a robot is carried off at so much of its speed limit, at most so fast [m/s]
 CARRIED_S = 15.0  # by then it is beyond any geofence
 MATCH_S = 10.0
@@ -54,14 +51,11 @@ def odometry_too_fast(live: LiveSystem) -> Outcome:
 
 def odometry_turns_too_fast(live: LiveSystem) -> Outcome:
     """A turn rate that the robot cannot have; in space the rate about each axis alone is within the limit."""
-    limit, in_space = live.robot.limits.yaw_rate, live.robot.state_type is SpatialState
+    shares, limit = FAULTS[live.robot.kind.name].too_fast, live.robot.limits.yaw_rate
 
     def change(message: Odometry) -> None:
-        rate = message.twist.twist.angular
-        if in_space:
-            rate.x = rate.y = rate.z = OF_EACH * limit
-        else:
-            rate.z = TOO_MUCH * limit
+        for axis, share in shares.items():
+            setattr(message.twist.twist.angular, axis, share * limit)
 
     return _because(intercept(live, changing(change), live.tick_s), "beyond the possible")
 
@@ -186,15 +180,6 @@ def _refusal(live: LiveSystem, since_s: float) -> str:
     )
 
 
-def _without_place(robot: Robot) -> str:
-    if robot.actuators.turns_only:
-        return STAYS
-    contradicts = (
-        "its controller steers against a drift, and faster odometry contradicts itself (gnss_creeps)"
-    )
-    return contradicts if robot.flies else ""
-
-
 def _without_attitude(robot: Robot) -> str:
     task = task_of(robot)
     if task.goal_topic == GOAL_POSE.name:
@@ -205,8 +190,8 @@ def _without_attitude(robot: Robot) -> str:
 LIMIT_FAULTS = (
     Fault(odometry_too_fast, RELAYED),
     Fault(odometry_turns_too_fast, RELAYED),
-    Fault(odometry_leaves_the_area, replace(RELAYED, has_area=True), _without_place),
-    Fault(odometry_leaves_the_geofence, RELAYED, _without_place),
+    Fault(odometry_leaves_the_area, replace(RELAYED, has_area=True)),
+    Fault(odometry_leaves_the_geofence, RELAYED),
     Fault(goal_with_a_wrong_quaternion, why_not=_without_attitude),
     Fault(goal_outside_the_area, FaultEnvironment(has_area=True)),
 )

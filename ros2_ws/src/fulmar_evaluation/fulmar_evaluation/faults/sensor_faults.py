@@ -17,6 +17,7 @@ from fulmar_bags.message_reader import stamp_ns
 from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.sensors.repetition import FEWEST
 from fulmar_core.robots.topics import MOCAP, ODOMETRY
+from fulmar_evaluation.faults.by_kind import FAULTS
 from fulmar_evaluation.faults.command_faults import DISCOVERY_S
 from fulmar_evaluation.faults.endurance import DistanceWatch, complaint, endured
 from fulmar_evaluation.faults.fault import Fault, Outcome, stopped
@@ -30,9 +31,6 @@ NOISE_S = 1.0  # beyond the watchdog: what repeats of a noisy value, or slow dri
 REPEATS = FEWEST + 2  # readings of a slow sensor until it is known to be frozen, the one under way among them
 DRIFT_DEG = 0.05  # per second, of a star tracker [deg/s]
 SAID_S = 20.0  # until a drift that slow has left the noise of gyroscope and wheels
-# Of a position from satellites, with a velocity that knows nothing of it. At the speed of an aircraft a creep that
-# slow is within the error of its velocity [m/s].
-CREEP, CREEP_IN_FLIGHT = 0.3, 3.0
 ASIDE_M = 0.5  # of a second odometry
 STRANGER_S = 0.02  # between its messages
 FIRST_S = 5.0  # for a message that it repeats
@@ -93,7 +91,7 @@ def turned_by(message: Any, angle: float) -> None:
 
 def gnss_creeps(live: LiveSystem) -> Outcome:
     """A position from satellites creeps away, along y, while the velocity knows nothing of it."""
-    speed = CREEP if live.flight is None else CREEP_IN_FLIGHT
+    speed = FAULTS[live.robot.kind.name].creep
 
     def creep(message: Odometry, passed_s: float) -> None:
         message.pose.pose.position.y += speed * passed_s
@@ -147,23 +145,15 @@ def _said(live: LiveSystem, change: Injection, limit_s: float) -> Outcome:
     return endured(live, since_s, limit_s, distance)
 
 
-def _without_mocap(robot: Robot) -> str:
-    return "it is not seen by motion capture" if robot.actuators.turns_only else ""
-
-
-def _without_stars(robot: Robot) -> str:
-    return "" if robot.actuators.turns_only else "no star tracker is in its loop"
-
-
 def _without_satellites(robot: Robot) -> str:
-    outdoors = robot.flies or robot.hydrodynamics is not None
+    outdoors = robot.kind.outdoors or robot.hydrodynamics is not None
     return "" if outdoors else "no satellite navigation is in its loop"
 
 
 SENSOR_FAULTS = (
-    Fault(mocap_frozen, FaultEnvironment(estimated=True, intercepted=MOCAP), _without_mocap),
-    Fault(star_tracker_frozen, FaultEnvironment(estimated=True, intercepted=ATTITUDE), _without_stars),
-    Fault(star_tracker_drifts, FaultEnvironment(estimated=True, intercepted=ATTITUDE), _without_stars),
+    Fault(mocap_frozen, FaultEnvironment(estimated=True, intercepted=MOCAP)),
+    Fault(star_tracker_frozen, FaultEnvironment(estimated=True, intercepted=ATTITUDE)),
+    Fault(star_tracker_drifts, FaultEnvironment(estimated=True, intercepted=ATTITUDE)),
     Fault(gnss_creeps, RELAYED, _without_satellites),
     Fault(two_odometries, RELAYED),
 )

@@ -19,4 +19,5 @@ AIRCRAFT = Kind(
     # The delays of `randomised` are longer than the control step of an aircraft.
     usual_scenario="nominal",
     stops=False,
+    outdoors=True,
 )

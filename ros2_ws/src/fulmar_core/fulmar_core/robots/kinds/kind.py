@@ -32,4 +32,5 @@ class Kind:
     drifts: bool = False  # at rest its actuators let it go on; water slows it all the same
     calibrated: tuple[str, ...] = ()  # quantities of its body that identification measures, of `Calibration`
     stops: bool = True  # it can stay where it is; else its safe state is a flight
+    outdoors: bool = False  # satellite navigation is in its loop
     axes: tuple[int, ...] = (0, 1, 2, 3, 4, 5)  # of a wrench's six, those along and about which it moves
