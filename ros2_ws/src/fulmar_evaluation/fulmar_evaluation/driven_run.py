@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
-
-import numpy as np
 
 from fulmar_bags.run_record import read_run
 from fulmar_core.config.errors import ConfigError
 from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.robot_file import load_robot
-from fulmar_core.states.rotation import yaw_of
-from fulmar_core.states.spatial import SpatialState
-from fulmar_evaluation.identification.drives import Drive, drive_in_space, drive_of
+from fulmar_evaluation.identification.by_kind import DRIVES
+from fulmar_evaluation.identification.drives import Drive
 
 
 def driven_run(path: Path, *, load: int = 0) -> tuple[Robot, Drive, tuple[str, ...]]:
@@ -39,18 +35,5 @@ def driven_run(path: Path, *, load: int = 0) -> tuple[Robot, Drive, tuple[str, .
         raise ConfigError(
             f"{path}: commands have {actuation.effort.shape[1]} values, '{robot.name}' takes {width}."
         )
-    odometry = record.odom
-    if robot.state_type is SpatialState:
-        pose = np.column_stack((odometry.position, odometry.quat_xyzw))
-        drive = drive_in_space(str(path), odometry.stamp_s, pose, actuation.stamp_s, actuation.effort)
-        return robot, replace(drive, load=load), record.warnings
-    drive = drive_of(
-        str(path),
-        odometry.stamp_s,
-        odometry.position[:, :2],
-        np.asarray(yaw_of(odometry.quat_xyzw)),
-        actuation.stamp_s,
-        actuation.effort,
-        load=load,
-    )
-    return robot, drive, record.warnings
+    made = DRIVES[robot.kind.name]
+    return robot, made(str(path), record.odom, actuation.stamp_s, actuation.effort, load), record.warnings

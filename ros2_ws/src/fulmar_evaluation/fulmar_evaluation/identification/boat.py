@@ -18,31 +18,27 @@ from fulmar_core.states.planar import PlanarState
 from fulmar_evaluation.identification.drives import Windows
 from fulmar_evaluation.identification.held_input import followed, for_each_copy
 from fulmar_evaluation.identification.model import (
-    IN_PLANE,
-    PLANE_CHANNELS,
     USEFUL_DELAY_S,
+    PushedModel,
     Unknown,
     Values,
     nominal_world,
 )
 
 
-class BoatModel:
+class BoatModel(PushedModel):
     """Unknowns: mass, yaw inertia, delay, linear and quadratic drag of surge, sway and yaw."""
 
-    kinds: tuple[int, ...] = IN_PLANE
-    channels: tuple[str, ...] = PLANE_CHANNELS
-    own = 9  # six of the state; a constant push along the world's x and y [m/s²] (wind) and in yaw [rad/s²]
     spans_s: tuple[float, ...] = (5.0, 10.0)
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, robot: Robot, propellers: Propellers) -> None:
         """Prepare for the nominal robot; its thrust curve, slew and added mass are taken for true."""
-        assert isinstance(robot.actuators, Propellers) and robot.hydrodynamics is not None
-        self._robot, self._propellers, self._water = robot, robot.actuators, robot.hydrodynamics
+        assert robot.hydrodynamics is not None  # as of `by_kind.MODELS`
+        self._robot, self._propellers, self._water = robot, propellers, robot.hydrodynamics
         unknowns = [
             Unknown("mass", robot.body.mass, "kg"),
             Unknown("yaw_inertia", robot.body.inertia[2], "kg·m²"),
-            Unknown("delay", robot.actuators.response.delay_s, "s", positive=False, useful=USEFUL_DELAY_S),
+            Unknown("delay", propellers.response.delay_s, "s", positive=False, useful=USEFUL_DELAY_S),
         ]
         for axis, i in DRAGS:
             force, speed = ("N·m", "rad/s") if axis == "yaw" else ("N", "m/s")
@@ -60,10 +56,6 @@ class BoatModel:
                 for kind, drag_now, unit in zip(("linear", "quadratic"), drags, units, strict=True)
             ]
         self.unknowns = tuple(unknowns)
-
-    def own_of(self, states: np.ndarray) -> np.ndarray:
-        """See `Model.own_of`."""
-        return np.concatenate((states, np.zeros((3, states.shape[1]))))
 
     def predict(self, values: Values, own: np.ndarray, windows: Windows) -> np.ndarray:
         """See `Model.predict`."""

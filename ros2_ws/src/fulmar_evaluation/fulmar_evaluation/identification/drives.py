@@ -63,7 +63,13 @@ def drive_of(
 
 
 def drive_in_space(
-    name: str, time_s: np.ndarray, pose: np.ndarray, command_s: np.ndarray, command: np.ndarray
+    name: str,
+    time_s: np.ndarray,
+    pose: np.ndarray,
+    command_s: np.ndarray,
+    command: np.ndarray,
+    *,
+    load: int = 0,
 ) -> Drive:
     """The same of a body in space, whose poses have the shape (n, 7): x, y, z [m] and quaternion xyzw.
 
@@ -76,7 +82,7 @@ def drive_in_space(
     turned = np.sum(pose[1:, 3:] * pose[:-1, 3:], axis=1) < 0.0
     pose[1:, 3:] *= np.where(np.cumsum(turned) % 2, -1.0, 1.0)[:, None]
     pose[:, 3:] *= 2.0
-    return _ordered(name, time_s, pose, command_s, command, 0)
+    return _ordered(name, time_s, pose, command_s, command, load)
 
 
 def _check_counts(name: str, time_s: np.ndarray, command_s: np.ndarray) -> None:

@@ -24,7 +24,7 @@ from fulmar_core.states.attitude import (
 )
 from fulmar_core.states.spatial import SpatialState
 from fulmar_evaluation.identification.drives import Windows
-from fulmar_evaluation.identification.held_input import for_each_copy, valve_wrench
+from fulmar_evaluation.identification.held_input import valve_inputs
 from fulmar_evaluation.identification.model import USEFUL_DELAY_S, USEFUL_PLACE_M, Unknown, Values
 
 INERTIAS = ("roll_inertia", "pitch_inertia", "yaw_inertia")
@@ -49,13 +49,12 @@ class FreeFlyerModel:
     )
     spans_s: tuple[float, ...] = (2.0, 5.0)  # ten unknowns ask for many windows
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, robot: Robot, thrusters: Thrusters) -> None:
         """Prepare; the places and directions of the robot's nozzles are taken for true."""
-        assert isinstance(robot.actuators, Thrusters)
-        self._thrusters, self._products = robot.actuators, robot.body.tensor[3:]
-        delays = {"delay": robot.actuators.response.delay_s, "opening_delay": 0.0}
+        self._thrusters, self._products = thrusters, robot.body.tensor[3:]
+        delays = {"delay": thrusters.response.delay_s, "opening_delay": 0.0}
         self.unknowns = (
-            Unknown("thrust", robot.actuators.thrust, "N"),
+            Unknown("thrust", thrusters.thrust, "N"),
             Unknown("mass", robot.body.mass, "kg"),
             *(
                 Unknown(name, value, "s", positive=False, useful=USEFUL_DELAY_S)
@@ -87,7 +86,7 @@ class FreeFlyerModel:
         products = tuple(product * np.ones_like(mass) for product in self._products)
         inertia = inertia_of(moments + products if any(self._products) else moments)
         com: Vector = (values[PLACES[0]], values[PLACES[1]], values[PLACES[2]])
-        inputs = self._inputs(values, windows) * values["thrust"]
+        inputs = valve_inputs(windows, self._wrench, values) * values["thrust"]
         place, rotation, velocity, rate, push, twist = map(_vector, np.split(own, 6))
         state = shifted(SpatialState(*place, *exponential(rotation), *velocity, *rate), com)
         back = scaled(-1.0, com)
@@ -106,14 +105,6 @@ class FreeFlyerModel:
                     state, force, plus(torque, around), outside, mass, inertia, windows.dt
                 )
         return poses
-
-    def _inputs(self, values: Values, windows: Windows) -> np.ndarray:
-        """Wrench of 1 N valves in each step, shape (steps, 6, copies, windows)."""
-        return for_each_copy(
-            lambda delay, opening: valve_wrench(windows, self._wrench, delay, opening),
-            values["delay"],
-            values["opening_delay"],
-        )
 
     def _wrench(self, command: np.ndarray) -> np.ndarray:
         """Force and torque if one open valve gave 1 N, shape (k, 6)."""

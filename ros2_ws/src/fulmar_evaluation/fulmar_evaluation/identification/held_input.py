@@ -6,7 +6,7 @@ an input that is late by any amount has them: it is a difference of the input's 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -66,6 +66,17 @@ def valve_wrench(
                 event_s, change, windows.begin_s[mine], steps=windows.steps, dt=windows.dt
             )
     return held
+
+
+def valve_inputs(
+    windows: Windows, wrench: Callable[[np.ndarray], np.ndarray], values: Mapping[str, np.ndarray]
+) -> np.ndarray:
+    """The same for each copy of a fit, by its `delay` and `opening_delay`, shape (steps, c, copies, w)."""
+    return for_each_copy(
+        lambda delay, opening: valve_wrench(windows, wrench, delay, opening),
+        values["delay"],
+        values["opening_delay"],
+    )
 
 
 def _valve_events(

@@ -8,19 +8,13 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from fulmar_core.config.errors import ConfigError, UnknownNameError
-from fulmar_core.robots.actuators.differential_drive import DifferentialDrive
-from fulmar_core.robots.actuators.propellers import Propellers
-from fulmar_core.robots.actuators.thrusters import Thrusters
 from fulmar_core.robots.calibration import Calibration, Measured
 from fulmar_core.robots.robot import Robot
-from fulmar_core.states.spatial import SpatialState
-from fulmar_evaluation.identification.boat import BoatModel
+from fulmar_evaluation.identification.by_kind import MODELS
 from fulmar_evaluation.identification.drives import Drive
 from fulmar_evaluation.identification.fit import Estimate, Fit, fit
-from fulmar_evaluation.identification.free_flyer import FreeFlyerModel
 from fulmar_evaluation.identification.model import Known, Model, Unknown
-from fulmar_evaluation.identification.platform import PlatformModel, ballast_name
-from fulmar_evaluation.identification.wheels import WheelModel
+from fulmar_evaluation.identification.platform import ballast_name
 
 EXACT = 1e-6  # relative standard deviation of what is said to be known without an error
 NO_MOTION = "the runs show nothing of the robot: it hardly moved. Drive it, as with --controller excite."
@@ -119,39 +113,35 @@ def _prepared(
     robot: Robot, known: list[Known], ballasts: Mapping[int, Weight]
 ) -> tuple[Model, str, bool, list[Known]]:
     """Model, what sets the scale, whether that was measured, and everything known."""
-    if isinstance(robot.actuators, Thrusters):
-        in_space = robot.state_type is SpatialState
-        if in_space and ballasts:
-            raise ConfigError(
-                f"--ballast is for robots in the plane; weigh '{robot.name}' and give --known mass=KG+-KG."
-            )
-        for load, weight in ballasts.items():
-            std = max(weight.error / SIGMAS, EXACT * weight.mass)
-            known.append(Known(ballast_name(load), weight.mass, std))
-        loads = {load: weight.mass for load, weight in ballasts.items()}
-        model: Model = FreeFlyerModel(robot) if in_space else PlatformModel(robot, loads)
-        named = sorted({each.name for each in known} & {"mass", "thrust"})
-        if named or ballasts:
-            said = [f"a known {name}" for name in named] + (["a ballast of known mass"] if ballasts else [])
-            return model, f"mass and thrust rest on {' and '.join(said)}", True, known
-        low, high = robot.uncertainty.mass
-        known.append(Known("mass", robot.body.mass, (high - low) / (2.0 * SIGMAS)))
-        scale = (
-            f"mass and thrust rest on the mass of the robot's YAML, {low:g} to {high:g} kg, since motion shows only "
-            "their ratio: weigh the robot (--known mass=KG+-KG)"
-        )
-        scale += "" if in_space else ", or record another run with a ballast (--ballast BAG=KG+-KG)"
-        return model, scale, False, known
-    if ballasts:
+    family = robot.actuators.kind
+    how = MODELS.get((robot.kind.name, family))
+    weighed = how is not None and not how.scale
+    if ballasts and not weighed:
+        raise ConfigError(f"--ballast is for robots with thrusters; '{robot.name}' has {family}.")
+    if how is None or (how.afloat and robot.hydrodynamics is None):
         raise ConfigError(
-            f"--ballast is for robots with thrusters; '{robot.name}' has {robot.actuators.kind}."
+            f"there is no model to identify '{robot.name}' ({family}) by; "
+            "there is one for thrusters, propellers on water and differential_drive."
         )
-    if isinstance(robot.actuators, Propellers) and robot.hydrodynamics is not None:
-        scale = "mass, inertia and drag rest on the thrust curve of the robot's YAML"
-        return BoatModel(robot), scale, True, known
-    if isinstance(robot.actuators, DifferentialDrive):
-        return WheelModel(robot), "speeds need no scale", True, known
-    raise ConfigError(
-        f"there is no model to identify '{robot.name}' ({robot.actuators.kind}) by; "
-        "there is one for thrusters, propellers on water and differential_drive."
+    if ballasts and not how.ballast:
+        raise ConfigError(
+            f"--ballast is for robots in the plane; weigh '{robot.name}' and give --known mass=KG+-KG."
+        )
+    loads = ({load: weight.mass for load, weight in ballasts.items()},) if how.ballast else ()
+    model = how.model(robot, robot.actuators, *loads)
+    if not weighed:
+        return model, how.scale, True, known
+    for load, weight in ballasts.items():
+        known.append(Known(ballast_name(load), weight.mass, max(weight.error / SIGMAS, EXACT * weight.mass)))
+    named = sorted({each.name for each in known} & {"mass", "thrust"})
+    if named or ballasts:
+        said = [f"a known {name}" for name in named] + (["a ballast of known mass"] if ballasts else [])
+        return model, f"mass and thrust rest on {' and '.join(said)}", True, known
+    low, high = robot.uncertainty.mass
+    known.append(Known("mass", robot.body.mass, (high - low) / (2.0 * SIGMAS)))
+    scale = (
+        f"mass and thrust rest on the mass of the robot's YAML, {low:g} to {high:g} kg, since motion shows only "
+        "their ratio: weigh the robot (--known mass=KG+-KG)"
     )
+    scale += ", or record another run with a ballast (--ballast BAG=KG+-KG)" if how.ballast else ""
+    return model, scale, False, known

@@ -84,6 +84,18 @@ class Model(Protocol):
         ...
 
 
+class PushedModel:
+    """What models of bodies that something pushes in the plane have in common."""
+
+    kinds: tuple[int, ...] = IN_PLANE
+    channels: tuple[str, ...] = PLANE_CHANNELS
+    own = 9  # six of the state; a constant push along the world's x and y [m/s²] (wind, slope) and in yaw [rad/s²]
+
+    def own_of(self, states: np.ndarray) -> np.ndarray:
+        """See `Model.own_of`."""
+        return np.concatenate((states, np.zeros((3, states.shape[1]))))
+
+
 def nominal_world(robot: Robot, **instead: np.ndarray) -> World:
     """A still world around the nominal robot; arrays in `instead` take the place of nominal values."""
     calm = Scenario("calm", sensor_noise=False, body="nominal")

@@ -18,12 +18,11 @@ from fulmar_core.robots.actuators.thrusters import Thrusters
 from fulmar_core.robots.robot import Robot
 from fulmar_core.states.planar import PlanarState
 from fulmar_evaluation.identification.drives import Windows
-from fulmar_evaluation.identification.held_input import for_each_copy, valve_wrench
+from fulmar_evaluation.identification.held_input import valve_inputs
 from fulmar_evaluation.identification.model import (
-    IN_PLANE,
-    PLANE_CHANNELS,
     USEFUL_DELAY_S,
     USEFUL_PLACE_M,
+    PushedModel,
     Unknown,
     Values,
     nominal_world,
@@ -40,28 +39,25 @@ def of_load(quantity: str, load: int) -> str:
     return f"{quantity}_with_ballast_{load}" if load else quantity
 
 
-class PlatformModel:
+class PlatformModel(PushedModel):
     """Unknowns: thrust, mass, delays; and for each load inertia and centre of mass."""
 
-    kinds: tuple[int, ...] = IN_PLANE
-    channels: tuple[str, ...] = PLANE_CHANNELS
-    own = 9  # six of the state; a constant push along the world's x and y [m/s²] and in yaw [rad/s²]
     spans_s: tuple[float, ...] = (2.0, 5.0, 10.0)
 
-    def __init__(self, robot: Robot, ballasts: Mapping[int, float]) -> None:
+    def __init__(self, robot: Robot, thrusters: Thrusters, ballasts: Mapping[int, float]) -> None:
         """Prepare.
 
         Args:
-            robot: The nominal robot; its nozzles' places and directions are taken for true.
+            robot: The nominal robot.
+            thrusters: Its nozzles, whose places and directions are taken for true.
             ballasts: Mass of each load that was aboard in some run, from 1 on [kg].
         """
-        assert isinstance(robot.actuators, Thrusters)
-        self._robot, self._thrusters = robot, robot.actuators
+        self._robot, self._thrusters = robot, thrusters
         body = robot.body
         unknowns = [
-            Unknown("thrust", robot.actuators.thrust, "N"),
+            Unknown("thrust", thrusters.thrust, "N"),
             Unknown("mass", body.mass, "kg"),
-            Unknown("delay", robot.actuators.response.delay_s, "s", positive=False, useful=USEFUL_DELAY_S),
+            Unknown("delay", thrusters.response.delay_s, "s", positive=False, useful=USEFUL_DELAY_S),
             Unknown("opening_delay", 0.0, "s", positive=False, useful=USEFUL_DELAY_S),
         ]
         for load in (0, *ballasts):
@@ -74,10 +70,6 @@ class PlatformModel:
         self.unknowns = tuple(unknowns)
         self._loads = tuple(ballasts)
 
-    def own_of(self, states: np.ndarray) -> np.ndarray:
-        """See `Model.own_of`."""
-        return np.concatenate((states, np.zeros((3, states.shape[1]))))
-
     def predict(self, values: Values, own: np.ndarray, windows: Windows) -> np.ndarray:
         """See `Model.predict`."""
         load = windows.load
@@ -88,7 +80,7 @@ class PlatformModel:
             self._by_load(values, name, load)
             for name in ("yaw_inertia", "center_of_mass_x", "center_of_mass_y")
         )
-        inputs = self._inputs(values, windows) * values["thrust"]
+        inputs = valve_inputs(windows, self._wrench, values) * values["thrust"]
         world = nominal_world(self._robot, mass=mass, yaw_inertia=inertia, com_x=cx, com_y=cy)
         # Pushes are fitted as accelerations: a sloping floor gives the same one whatever the mass.
         outside = own[6] * mass, own[7] * mass, own[8] * inertia
@@ -105,14 +97,6 @@ class PlatformModel:
 
     def _by_load(self, values: Values, name: str, load: np.ndarray) -> np.ndarray:
         return np.asarray(sum(values[of_load(name, each)] * (load == each) for each in (0, *self._loads)))
-
-    def _inputs(self, values: Values, windows: Windows) -> np.ndarray:
-        """Wrench of 1 N valves in each step, shape (steps, 3, copies, windows)."""
-        return for_each_copy(
-            lambda delay, opening: valve_wrench(windows, self._wrench, delay, opening),
-            values["delay"],
-            values["opening_delay"],
-        )
 
     def _wrench(self, command: np.ndarray) -> np.ndarray:
         """Forces and moment if one open valve gave 1 N, shape (k, 3)."""

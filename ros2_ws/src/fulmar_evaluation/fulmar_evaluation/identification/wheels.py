@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fulmar_core.robots.actuators.differential_drive import DifferentialDrive
+from fulmar_core.robots.actuators.family import Actuators
 from fulmar_core.robots.actuators.rolling import SERVO_S
 from fulmar_core.robots.robot import Robot
 from fulmar_evaluation.identification.drives import Windows
@@ -27,11 +27,9 @@ class WheelModel:
     own = 6
     spans_s: tuple[float, ...] = (3.0, 8.0, 15.0)
 
-    def __init__(self, robot: Robot) -> None:
-        """Prepare for the nominal robot; its limits and slew are taken for true."""
-        assert isinstance(robot.actuators, DifferentialDrive)
-        self._drive = robot.actuators
-        response = robot.actuators.response
+    def __init__(self, _robot: Robot, wheels: Actuators) -> None:
+        """Prepare for nominal wheels; their limits and slew are taken for true."""
+        self._response = response = wheels.response
         self.unknowns: tuple[Unknown, ...] = (
             Unknown("wheel_scale", 1.0, "-"),
             Unknown("turn_scale", 1.0, "-"),
@@ -52,9 +50,7 @@ class WheelModel:
         then, and slopes exist everywhere. A simulation may move a whole step with the speed of its end; that is half a
         step too early, and would be taken for delay here.
         """
-        targets = for_each_copy(
-            lambda delay: followed(windows, delay, self._drive.response.slew), values["delay"]
-        )
+        targets = for_each_copy(lambda delay: followed(windows, delay, self._response.slew), values["delay"])
         x, y, yaw, speed, _, rate = own
         share = np.minimum(windows.dt / values["lag"], 1.0)
         poses = np.empty((windows.steps + 1, 3, *own.shape[1:]))
