@@ -16,8 +16,9 @@ from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool
 
-from fulmar_bringup.commissioning.commission import PULSED, WIRINGS, Request, commission, is_right, rewired
-from fulmar_bringup.commissioning.hardware_file import command_of, line_of, wires_of, with_line, write_line
+from fulmar_bringup.commissioning.by_kind import PULSED
+from fulmar_bringup.commissioning.commission import WIRINGS, Request, commission, is_right, rewired
+from fulmar_bringup.commissioning.hardware_file import line_of, wires_of, with_line, write_line
 from fulmar_bringup.commissioning.session import Session
 from fulmar_core.config.errors import ConfigError, RunFailed
 from fulmar_core.config.paths import OWN_FOLDERS, config_names
@@ -60,7 +61,7 @@ def test_a_wire_s_command_reaches_that_wire_alone(name):
     hardware = load_hardware(name)
     robot = load_robot(hardware.robot)
     for number, wire in enumerate(wires_of(hardware)):
-        command = command_of(robot, wire, 0.5)
+        command = PULSED[robot.actuators.kind].command(robot.actuators, wire, 0.5)
         order = getattr(hardware.driver, "order", None)
         if order is not None:
             sent = np.array(to_message(command, bearing=False, order=order)[1:], dtype=float)

@@ -45,7 +45,7 @@ def floated(robot, order, *, seed, dead=(), inverted=False, inertia=None, push=(
 def matched(robot, order, **how):
     track, pulses = floated(robot, order, **how)
     found = responses(track, pulses, "floating")
-    return match_nozzles(robot, found, [LASTS_S] * len(pulses), range(len(order)))
+    return match_nozzles(robot, robot.actuators, found, [LASTS_S] * len(pulses), range(len(order)))
 
 
 @pytest.mark.parametrize("name", PLATFORMS)
@@ -93,18 +93,17 @@ def test_a_nozzle_that_the_robot_file_does_not_have_is_reported():
     assert not match.problems
     track, pulses = floated(PLATFORMS["floating_platform_roboran"], list(range(8)), seed=0)
     found = responses(track, pulses, "floating")
-    match = match_nozzles(PLATFORMS["floating_platform"], found, [LASTS_S] * 8, range(8))
+    robot = PLATFORMS["floating_platform"]
+    match = match_nozzles(robot, robot.actuators, found, [LASTS_S] * 8, range(8))
     assert any("as none of its nozzles would" in problem for problem in match.problems)
 
 
 def test_nozzles_of_one_force_and_torque_cannot_be_distinguished():
     robot = PLATFORMS["floating_platform"]
-    assert indistinct(robot) == []
+    assert indistinct(robot.actuators) == []
     nozzles = robot.actuators.nozzles
     twin = replace(nozzles[0], name="twin")
-    assert indistinct(replace(robot, actuators=replace(robot.actuators, nozzles=(*nozzles, twin)))) == [
-        ("thruster_1", "twin")
-    ]
+    assert indistinct(replace(robot.actuators, nozzles=(*nozzles, twin))) == [("thruster_1", "twin")]
 
 
 @pytest.mark.parametrize(

@@ -13,9 +13,10 @@ from typing import Any
 
 import yaml
 
-from fulmar_bringup.commissioning.hardware_file import Wire, actuator_names, wires_of
-from fulmar_bringup.commissioning.match import indistinct, left_over
-from fulmar_bringup.commissioning.procedure import Outcome, click, measure
+from fulmar_bringup.commissioning.by_kind import PULSED
+from fulmar_bringup.commissioning.hardware_file import Wire, wires_of
+from fulmar_bringup.commissioning.match import left_over
+from fulmar_bringup.commissioning.procedure import Outcome, click
 from fulmar_bringup.commissioning.session import Session
 from fulmar_bringup.domains import claimed_domain
 from fulmar_bringup.emulation import Emulation, emulation_of
@@ -24,7 +25,6 @@ from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.system import Guards
 from fulmar_bringup.system_rows import system_rows
 from fulmar_core.config.errors import ConfigError
-from fulmar_core.robots.actuators.thrusters import Thrusters
 from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_ros.runtime import ros_node
@@ -33,7 +33,6 @@ from hardware_drivers.settings import GpioValves
 from hardware_drivers.wiring import SIDES
 from policy_server.controllers import EXTERNAL
 
-PULSED = ("thrusters", "propellers", "differential_drive")  # families that `procedure.py` moves
 WIRINGS = ("as_written", "shuffled", "inverted", "dead")  # of an emulated device
 CONTROL_HZ = 10.0  # that the driver's watchdog follows from: 0.2 s
 Say = Callable[[str], None]
@@ -98,6 +97,7 @@ def _session(
         What was measured; None after clicks.
     """
     robot, wires = load_robot(hardware.robot), wires_of(hardware)
+    how = PULSED[robot.actuators.kind]
     plan = RunPlan(
         robot.name, "go_to_position", EXTERNAL, "hardware", CONTROL_HZ, hardware=path, seed=request.seed,
         emulated=emulation is not None, arm=request.arm, guards=Guards(estop=True),
@@ -119,9 +119,9 @@ def _session(
                 group.start(replace(row, quiet=row.name == "estop"))
             session.until_ready()
             if not request.pulses:
-                click(session, robot, wires, say)
+                click(session, {wire.name: how.command(robot.actuators, wire) for wire in wires}, say)
                 return None
-            return measure(session, robot, wires, say)
+            return how.measure(session, robot, robot.actuators, wires, say)
         finally:
             with contextlib.suppress(Exception):  # the driver makes safe by itself at its end
                 session.make_safe()
@@ -130,8 +130,8 @@ def _session(
 
 
 def _findings(robot: Robot, hardware: Hardware, outcome: Outcome, *, flipped: bool) -> dict[str, Any]:
-    match, wires = outcome.match, wires_of(hardware)
-    names, valves = actuator_names(robot), isinstance(robot.actuators, Thrusters)
+    match, wires, how = outcome.match, wires_of(hardware), PULSED[robot.actuators.kind]
+    names = how.names(robot)
     drives = list(match.drives)
     guessed = left_over(match, len(names))
     if guessed is not None:
@@ -145,25 +145,21 @@ def _findings(robot: Robot, hardware: Hardware, outcome: Outcome, *, flipped: bo
     for wire in match.dead:
         more = f"; by elimination it is {names[guessed]}'s" if guessed is not None else ""
         problems.append(f"{wires[wire].name} does not answer{more}")
-    key = "order" if valves else "wiring"
-    value: list[Any] | None = None
-    if None not in drives and not [text for text in match.problems]:
-        value = [
-            drive if valves else f"{'-' if sign < 0 else ''}{SIDES[drive]}"  # type: ignore[index]
-            for drive, sign in zip(drives, match.signs, strict=True)
-        ]
-    written = [wire.actuator for wire in wires] if valves else list(hardware.driver.wiring)  # type: ignore[union-attr]
+    value = [
+        how.entry(drive, sign) for drive, sign in zip(drives, match.signs, strict=True) if drive is not None
+    ]
+    known = None not in drives and not match.problems
     return {
         "wires": [_wire(wire, drive, sign, one, names, number in match.dead)
                   for number, (wire, drive, sign, one) in enumerate(
                       zip(wires, match.drives, match.signs, outcome.found, strict=True))],
-        "key": key,
-        key: value,
-        "as_written": value == written and not flipped,
+        "key": how.key,
+        how.key: value if known else None,
+        "as_written": known and not flipped and value == [how.entry(wire.actuator, wire.sign) for wire in wires],
         "dead": [wires[wire].name for wire in match.dead],
         "inverted": flipped or any("inverted" in text for text in match.problems),
         "active_low": (not hardware.driver.active_low) if flipped else None,  # type: ignore[union-attr]
-        "indistinguishable": [list(group) for group in indistinct(robot)],
+        "indistinguishable": [list(group) for group in how.indistinct(robot.actuators)],
         "problems": problems,
         "success": not problems,
     }  # fmt: skip
@@ -172,7 +168,8 @@ def _findings(robot: Robot, hardware: Hardware, outcome: Outcome, *, flipped: bo
 def is_right(hardware: Hardware, emulated: Mapping[str, Any], found: Mapping[str, Any]) -> bool:
     """Whether the findings are the emulated wiring, by the hardware file and the parameters of the emulator."""
     driver = hardware.driver
-    names = actuator_names(load_robot(hardware.robot))
+    robot = load_robot(hardware.robot)
+    names = PULSED[robot.actuators.kind].names(robot)
     dead = [int(wire) for wire in emulated.get("dead", [])]
     if isinstance(driver, GpioValves) or "inverted" in emulated:
         level = getattr(driver, "active_low", None)

@@ -12,8 +12,7 @@ import numpy as np
 from fulmar_core.config.atomic_write import write_whole
 from fulmar_core.config.errors import ConfigError
 from fulmar_core.robots.actuators.differential_drive import DifferentialDrive
-from fulmar_core.robots.actuators.thrusters import Thrusters
-from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.actuators.family import Actuators
 from hardware_drivers.hardware import Hardware
 from hardware_drivers.settings import GpioValves, OwnDriver, ValveTopic, XPlane
 from hardware_drivers.wiring import SIDES
@@ -46,26 +45,22 @@ def wires_of(hardware: Hardware) -> list[Wire]:
     ]
 
 
-def command_of(robot: Robot, wire: Wire, level: float = 1.0) -> np.ndarray:
-    """The robot's command, shape (n,), that gives one wire a positive value and the others none.
+def valve_command(valves: Actuators, wire: Wire, _level: float = 1.0) -> np.ndarray:
+    """The command, shape (n,), that opens the valve of one wire."""
+    return np.eye(len(valves.names))[wire.actuator]
 
-    `level` is the share of full thrust of a propeller; wheels and valves have one level.
-    """
-    actuators = robot.actuators
-    if isinstance(actuators, Thrusters):
-        return np.eye(len(actuators.names))[wire.actuator]
+
+def propeller_command(_propellers: Actuators, wire: Wire, level: float = 1.0) -> np.ndarray:
+    """The command, shape (2,), that gives one wire a positive share of full thrust, and the other none."""
     sides = np.zeros(2)
-    sides[wire.actuator] = wire.sign * (WHEEL_SPEED if isinstance(actuators, DifferentialDrive) else level)
-    if isinstance(actuators, DifferentialDrive):
-        return np.array([0.5 * sides.sum(), (sides[1] - sides[0]) / actuators.track])
+    sides[wire.actuator] = wire.sign * level
     return sides
 
 
-def actuator_names(robot: Robot) -> Sequence[str]:
-    """What wires can drive: nozzles or propellers by their names, or the wheels."""
-    if isinstance(robot.actuators, DifferentialDrive):
-        return tuple(f"{side} wheel" for side in SIDES)
-    return robot.actuators.names
+def wheel_command(wheels: DifferentialDrive, wire: Wire, _level: float = 1.0) -> np.ndarray:
+    """The command, shape (2,), that turns the wheel of one wire ahead, at the one speed that is used."""
+    sides = propeller_command(wheels, wire, WHEEL_SPEED)
+    return np.array([0.5 * sides.sum(), (sides[1] - sides[0]) / wheels.track])
 
 
 def line_of(key: str, values: Sequence[object]) -> str:

@@ -45,12 +45,17 @@ class Match:
 
 
 def match_nozzles(
-    robot: Robot, found: Sequence[Response], lasts_s: Sequence[float], order: Sequence[int]
+    robot: Robot,
+    thrusters: Thrusters,
+    found: Sequence[Response],
+    lasts_s: Sequence[float],
+    order: Sequence[int],
 ) -> Match:
     """Find the nozzle that each wire opens: the assignment whose forces and torques fit the changes best.
 
     Args:
-        robot: With thrusters.
+        robot: The robot.
+        thrusters: Its actuators.
         found: Change of velocity by each wire's pulse.
         lasts_s: How long each pulse was [s].
         order: What the hardware file says; it decides between nozzles of equal force and torque.
@@ -58,8 +63,6 @@ def match_nozzles(
     Returns:
         Which nozzle each wire opens.
     """
-    thrusters = robot.actuators
-    assert isinstance(thrusters, Thrusters)
     wrenches = thrusters.wrench_per_newton[:, [0, 1, 5]]
     arm = float(np.sqrt(np.mean(wrenches[:, 2] ** 2))) or 1.0
     nozzles = wrenches / (1.0, 1.0, arm)
@@ -133,11 +136,8 @@ def left_over(match: Match, count: int) -> int | None:
     return missing
 
 
-def indistinct(robot: Robot) -> list[tuple[str, ...]]:
+def indistinct(thrusters: Thrusters) -> list[tuple[str, ...]]:
     """Groups of nozzles whose forces and torques are equal, so that no motion distinguishes them."""
-    thrusters = robot.actuators
-    if not isinstance(thrusters, Thrusters):
-        return []
     wrenches = thrusters.wrench_per_newton
     groups: dict[int, list[str]] = {}
     for name, wrench in zip(thrusters.names, wrenches, strict=True):

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from fulmar_bringup.commissioning.hardware_file import Wire, command_of
+from fulmar_bringup.commissioning.hardware_file import Wire, propeller_command, valve_command, wheel_command
 from fulmar_bringup.commissioning.match import CLEARLY, Match, match_nozzles, match_sides
 from fulmar_bringup.commissioning.response import Motion, Pulse, Response, Track, responses
 from fulmar_bringup.commissioning.session import Session
 from fulmar_core.config.errors import RunFailed
 from fulmar_core.robots.actuators.differential_drive import DifferentialDrive
+from fulmar_core.robots.actuators.family import Actuators
 from fulmar_core.robots.actuators.thrusters import Thrusters
 from fulmar_core.robots.robot import Robot
 
@@ -42,88 +43,85 @@ class Outcome:
     found: tuple[Response, ...]
 
 
-def click(session: Session, robot: Robot, wires: Sequence[Wire], say: Say) -> None:
+def click(session: Session, commands: Mapping[str, np.ndarray], say: Say) -> None:
     """Open one valve after another for a moment, with the air closed, for a person who listens."""
-    for wire in wires:
-        say(wire.name)
-        session.pulse(command_of(robot, wire), CLICK_S)
+    for name, command in commands.items():
+        say(name)
+        session.pulse(command, CLICK_S)
         session.rest(BETWEEN_CLICKS_S)
 
 
-def measure(session: Session, robot: Robot, wires: Sequence[Wire], say: Say) -> Outcome:
-    """Pulse one wire after another, in a session that is ready, and identify the actuator behind each.
-
-    Raises:
-        RunFailed: Something ended it; see `Session.pulse`.
-    """
+# Each pulses one wire after another, in a session that is ready, and identifies the actuator behind each.
+# Raises RunFailed where something ended it; see `Session.pulse`.
+def valves(session: Session, robot: Robot, thrusters: Thrusters, wires: Sequence[Wire], say: Say) -> Outcome:
+    """Each nozzle by the change of motion that fits it best."""
     session.rest(STILL_S)
-    if isinstance(robot.actuators, Thrusters):
-        return _valves(session, robot, wires, say)
-    sides = _wheels if isinstance(robot.actuators, DifferentialDrive) else _propellers
-    found = sides(session, robot, wires, say)
-    return Outcome(match_sides(found), tuple(found))
-
-
-def _valves(session: Session, robot: Robot, wires: Sequence[Wire], say: Say) -> Outcome:
     pulses = []
     for wire in wires:
         say(wire.name)
-        pulses.append(session.pulse(command_of(robot, wire), VALVE_PULSE_S))
+        pulses.append(session.pulse(valve_command(thrusters, wire), VALVE_PULSE_S))
         session.rest(BETWEEN_S["floating"] - 0.1)
     track = session.track(pulses[0].begin_s - STILL_S)
     found = _responses(track, pulses, "floating")
     lasts_s = [pulse.end_s - pulse.begin_s for pulse in pulses]
-    match = match_nozzles(robot, found, lasts_s, [wire.actuator for wire in wires])
+    match = match_nozzles(robot, thrusters, found, lasts_s, [wire.actuator for wire in wires])
     return Outcome(match, tuple(found))
 
 
-def _wheels(session: Session, robot: Robot, wires: Sequence[Wire], say: Say) -> list[Response]:
+def wheels(
+    session: Session, _robot: Robot, drive: DifferentialDrive, wires: Sequence[Wire], say: Say
+) -> Outcome:
+    """Each wheel by how far the base goes and turns."""
+    session.rest(STILL_S)
     found = []
     for wire in wires:
         say(wire.name)
-        found.append(_response(session, robot, command_of(robot, wire), "rolling"))
-    return found
+        found.append(_response(session, drive, wheel_command(drive, wire), "rolling"))
+    return Outcome(match_sides(found), tuple(found))
 
 
-def _propellers(session: Session, robot: Robot, wires: Sequence[Wire], say: Say) -> list[Response]:
-    """Response of each propeller to a positive share, at the lowest share that shows one."""
+def propellers(
+    session: Session, _robot: Robot, pushing: Actuators, wires: Sequence[Wire], say: Say
+) -> Outcome:
+    """Each propeller by the response to a positive share, at the lowest share that shows one."""
+    session.rest(STILL_S)
     found: list[Response] = []
     shares: Sequence[float] = SHARES
     for wire in wires:
         for share, sign in [(share, sign) for share in shares for sign in (1.0, -1.0)]:
             say(f"{wire.name} at {100.0 * sign * share:+.0f} %")
-            one = _response(session, robot, command_of(robot, wire, sign * share), "coasting")
+            one = _response(session, pushing, propeller_command(pushing, wire, sign * share), "coasting")
             if min(one.clearly[0], one.clearly[2]) > CLEARLY:
                 first = SHARES.index(share)
                 shares = SHARES[first : first + ALIKE]
-                _brake(session, robot, wire, share, ahead=float(np.sign(one.change[0])) * sign)
+                _brake(session, pushing, wire, share, ahead=float(np.sign(one.change[0])) * sign)
                 break
         found.append(Response(sign * one.change, one.sigma))
-    return found
+    return Outcome(match_sides(found), tuple(found))
 
 
-def _brake(session: Session, robot: Robot, wire: Wire, share: float, *, ahead: float) -> None:
+def _brake(session: Session, pushing: Actuators, wire: Wire, share: float, *, ahead: float) -> None:
     """Stop a boat that coasts, by the propeller that has moved it; `ahead` is the sign that drives it ahead."""
     for harder in BRAKES:
         session.rest(SPEED_OVER_S)
         speed = session.speed_ahead(SPEED_OVER_S)
         if abs(speed) < CREEPS:
             return
-        command = command_of(robot, wire, -np.sign(speed) * ahead * min(1.0, harder * share))
-        session.pulse(command, _ramp_s(robot, command) + HOLD_S)
-        session.rest(_ramp_s(robot, command))
+        command = propeller_command(pushing, wire, -np.sign(speed) * ahead * min(1.0, harder * share))
+        session.pulse(command, _ramp_s(pushing, command) + HOLD_S)
+        session.rest(_ramp_s(pushing, command))
 
 
-def _response(session: Session, robot: Robot, command: np.ndarray, motion: Motion) -> Response:
-    pulse = session.pulse(command, _ramp_s(robot, command) + HOLD_S)
+def _response(session: Session, actuators: Actuators, command: np.ndarray, motion: Motion) -> Response:
+    pulse = session.pulse(command, _ramp_s(actuators, command) + HOLD_S)
     session.rest(BETWEEN_S[motion])
     (one,) = _responses(session.track(pulse.begin_s - LOOK_BACK_S), [pulse], motion)
     return one
 
 
-def _ramp_s(robot: Robot, command: np.ndarray) -> float:
+def _ramp_s(actuators: Actuators, command: np.ndarray) -> float:
     """How long the driver's slew needs to reach a command [s]."""
-    slew = robot.actuators.response.slew
+    slew = actuators.response.slew
     return float(np.max(np.abs(command) / np.asarray(slew))) if slew else 0.0
 
 
