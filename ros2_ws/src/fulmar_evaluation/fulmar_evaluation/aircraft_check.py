@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
-
-import numpy as np
 
 from fulmar_core.config.errors import ConfigError
 from fulmar_core.dynamics.flight_modes import Mode, continuous_model, modes_of
@@ -123,11 +121,12 @@ def check_aircraft(
     Raises:
         ConfigError: There is no trim at the speed or height that was asked for, or none at all.
     """
-    assert robot.airframe is not None  # as of `Robot.flies`
-    cruise = robot.airframe.speed
+    frame = robot.airframe
+    assert frame is not None  # of every aircraft
+    cruise = frame.speed
     asked = [(speed, height)] if speed is not None else [(share * cruise, height) for share in SPEEDS]
-    if speed is None and height is None and robot.airframe.ground_effect is not None:
-        asked += [(cruise, share * robot.airframe.span) for share in HEIGHTS]
+    if speed is None and height is None and frame.ground_effect is not None:
+        asked += [(cruise, share * frame.span) for share in HEIGHTS]
     found, missing = [], []
     for at_speed, at_height in asked:
         try:
@@ -156,22 +155,3 @@ def _mode_line(mode: Mode) -> str:
     kind = "time constant" if mode.real < 0.0 else "doubles in"
     seconds = -1.0 / mode.real if mode.real < 0.0 else math.log(2.0) / mode.real
     return f"{mode.name}: {mode.real:.3g} 1/s, {kind} {seconds:.3g} s"
-
-
-def envelope(
-    robot: Robot, heights: Sequence[float | None], altitude: float = 0.0
-) -> dict[float | None, np.ndarray]:
-    """Trims over speed at some heights, columns speed, α [deg], elevator [deg] and throttle; where there are any."""
-    assert robot.airframe is not None  # as of `Robot.flies`
-    found = {}
-    for height in heights:
-        rows = []
-        for speed in np.linspace(0.5, 1.8, 40) * robot.airframe.speed:
-            try:
-                trim = find_trim(robot, float(speed), height, altitude)
-            except ConfigError:
-                continue
-            if abs(math.degrees(trim.alpha)) <= robot.airframe.stall_deg:
-                rows.append([speed, math.degrees(trim.alpha), math.degrees(trim.elevator), trim.throttle])
-        found[height] = np.array(rows).reshape(-1, 4)
-    return found

@@ -51,7 +51,7 @@ class Flights:
             ConfigError: The robot is none.
         """
         robot = load_robot(self.robot)
-        if not robot.flies:
+        if robot.kind.stops:
             raise ConfigError(f"'{self.robot}' does not fly: what stops at once needs no descent.")
         return robot
 

@@ -9,7 +9,15 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_benchmarks.inertia.simulated_runs import LEVELS, SAMPLE_S, WHEEL_STD, Run, measured, simulate
+from fulmar_benchmarks.inertia.simulated_runs import (
+    LEVELS,
+    SAMPLE_S,
+    WHEEL_STD,
+    Run,
+    measured,
+    simulate,
+    wheels_of,
+)
 from fulmar_benchmarks.workers import mapped
 from fulmar_core.estimators.inertia.batch import batch_fit
 from fulmar_core.estimators.inertia.ekf import EkfSettings, InertiaFilter
@@ -170,8 +178,7 @@ def _information(satellite: str, run: Run) -> dict[str, float]:
 
 def _facts(satellite: str) -> tuple[np.ndarray, ReactionWheels]:
     robot = load_robot(satellite)
-    assert isinstance(robot.actuators, ReactionWheels)
-    return np.array(robot.body.inertia[:3]), robot.actuators
+    return np.array(robot.body.inertia[:3]), wheels_of(robot)
 
 
 def requirements(document: dict[str, Any]) -> list[tuple[str, str, bool]]:

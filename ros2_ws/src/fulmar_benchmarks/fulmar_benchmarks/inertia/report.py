@@ -10,8 +10,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from fulmar_benchmarks.inertia.campaign import METHODS, requirements
+from fulmar_benchmarks.inertia.simulated_runs import wheels_of
 from fulmar_benchmarks.inertia.tables import lines
-from fulmar_core.robots.actuators.reaction_wheels import ReactionWheels
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.tasks.torque_profiles import PROFILES, gain_of, profile_of
 from fulmar_evaluation.report.page import Part, Plot, headline
@@ -45,8 +45,7 @@ def write_report(document: dict[str, Any], out: Path) -> Path:
 
 def draw_profiles() -> Figure:
     """Torques of every profile over time."""
-    wheels = load_robot("cubesat_wheels").actuators
-    assert isinstance(wheels, ReactionWheels)
+    wheels = wheels_of(load_robot("cubesat_wheels"))
     figure = Figure(figsize=(7.2, 5.4), layout="constrained")
     panels = figure.subplots(3, 3, sharex=True, sharey=True).ravel()
     times = np.arange(0.0, 300.0, 0.5)

@@ -9,6 +9,7 @@ import numpy as np
 
 from fulmar_core.dynamics.gyrostat import Flywheels, gyrostat_step
 from fulmar_core.robots.actuators.reaction_wheels import ReactionWheels
+from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.states.attitude import Vector, cross, plus, turn_back
 from fulmar_core.states.spatial import SpatialState
@@ -56,8 +57,7 @@ def simulate(
         seed: Of the pseudorandom binary sequence.
     """
     robot = load_robot(satellite)
-    wheels = robot.actuators
-    assert isinstance(wheels, ReactionWheels)
+    wheels = wheels_of(robot)
     gain, flywheels = gain_of(satellite, wheels), Flywheels(wheels.axes, wheels.spin_inertia)
     played = [profile_of(name, wheels, gain=gain, seed=seed, saturate=True) for name in profiles]
     zero = np.zeros(len(played))
@@ -84,6 +84,12 @@ def simulate(
         name: Run(times, rates[:, i], spins[:, i], grown, float(full[i] / steps))
         for i, name in enumerate(profiles)
     }
+
+
+def wheels_of(robot: Robot) -> ReactionWheels:
+    """The wheels of a satellite."""
+    assert isinstance(robot.actuators, ReactionWheels)
+    return robot.actuators
 
 
 @dataclass(frozen=True)

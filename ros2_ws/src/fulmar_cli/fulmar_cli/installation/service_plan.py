@@ -139,7 +139,7 @@ def plan_service(wanted: Wanted, root: Path, *, dry_run: bool) -> PlannedService
         user,
         known,
         whole_paths(os.environ) | module_path(own, os.environ),
-        lands=load_robot(chosen.robot).flies,
+        lands=not load_robot(chosen.robot).kind.stops,
     )
     files = Files(root, service.name)
     return PlannedService(files, texts_of(files, unit_text(service, os.environ), rules))

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from fulmar_core.robots.actuators.control_surfaces import ControlSurfaces, is_throttle
+from fulmar_core.robots.actuators.control_surfaces import is_throttle
 from fulmar_core.tasks.follow_reference import FollowReference
 from fulmar_evaluation.report.run_view import View, evaluated
 from fulmar_evaluation.report.style import BODY_AXES, CONTROLLER_COLOURS, DASHED, INK, legend, quiet_grid
@@ -80,7 +80,6 @@ def reference_places(result: RunResult) -> np.ndarray | None:
 def _energy(result: RunResult) -> np.ndarray:
     """Mean square of the throttles, added up: seconds at full throttle that would cost as much, shape (n,) [s]."""
     craft = result.robot.actuators
-    assert isinstance(craft, ControlSurfaces)  # as of `Robot.flies`
     throttles = result.run.shares[0, :, craft.positions :]
     return np.asarray(np.cumsum(np.mean(throttles**2, axis=-1)) * result.run.control_dt)
 

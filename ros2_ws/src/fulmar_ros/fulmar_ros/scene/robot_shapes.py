@@ -7,9 +7,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fulmar_core.robots.actuators.ackermann import Ackermann
 from fulmar_core.robots.actuators.pushing import Pushing
 from fulmar_core.robots.actuators.reaction_wheels import ReactionWheels
+from fulmar_core.robots.actuators.rolling import Rolling
 from fulmar_core.robots.robot import Robot
 from fulmar_ros.scene.shape import Color, Kind, Shape, arrow, circle, line
 
@@ -34,28 +34,9 @@ def body_shapes(robot: Robot) -> list[Shape]:
     return [Shape(BODY, 0, kind, True, (*across, high - low), GREY, place)]
 
 
-def applied_shapes(robot: Robot, effort: Sequence[float]) -> list[Shape]:
-    """What the actuators do: a plume for each that pushes, the torque of reaction wheels, or where wheels drive to.
-
-    Args:
-        robot: The robot.
-        effort: What was applied, in the order of the actuators' names.
-    """
-    if isinstance(robot.actuators, Pushing):
-        return _plumes(robot, robot.actuators, np.asarray(effort, dtype=float))
-    if isinstance(robot.actuators, ReactionWheels):
-        return _torques(robot, robot.actuators, np.asarray(effort, dtype=float))
-    if robot.flies:
-        return []
-    speed, turn = effort
-    if isinstance(robot.actuators, Ackermann):
-        turn = speed * math.tan(turn) / robot.actuators.wheelbase
-    return velocity_shapes(DRIVE, (speed, 0.0, 0.0, 0.0, 0.0, turn), robot, YELLOW)
-
-
-def _plumes(robot: Robot, actuators: Pushing, effort: np.ndarray) -> list[Shape]:
+def plumes(robot: Robot, actuators: Pushing, effort: Sequence[float]) -> list[Shape]:
     """What leaves a nozzle, a propeller or a fan: against its push, at full thrust as long as the body's radius."""
-    shares = np.asarray(actuators.thrusts(effort)) / actuators.full_thrust
+    shares = np.asarray(actuators.thrusts(np.asarray(effort, dtype=float))) / actuators.full_thrust
     color = WATER if robot.hydrodynamics is not None else FLAME
     shapes = []
     for number, (push, share) in enumerate(zip(actuators.pushes, shares.tolist(), strict=True)):
@@ -67,15 +48,22 @@ def _plumes(robot: Robot, actuators: Pushing, effort: np.ndarray) -> list[Shape]
     return shapes
 
 
-def _torques(robot: Robot, wheels: ReactionWheels, effort: np.ndarray) -> list[Shape]:
+def torques(robot: Robot, wheels: ReactionWheels, effort: Sequence[float]) -> list[Shape]:
     """Torque of each actuator on the body, along its axis: at full torque as long as the body's radius."""
-    tips = robot.body.radius * (effort / wheels.scale)[:, None] * wheels.torque_per_command
+    shares = np.asarray(effort, dtype=float) / wheels.scale
+    tips = robot.body.radius * shares[:, None] * wheels.torque_per_command
     origin = (0.0, 0.0, 0.0)
     return [
         arrow(THRUST, number, origin, tip.tolist(), YELLOW, in_body=True)
         for number, tip in enumerate(tips)
         if np.linalg.norm(tip) >= LEAST * robot.body.radius
     ]
+
+
+def drive(robot: Robot, wheels: Rolling, effort: Sequence[float]) -> list[Shape]:
+    """Where wheels drive to."""
+    speed, turn = effort
+    return velocity_shapes(DRIVE, (speed, 0.0, 0.0, 0.0, 0.0, wheels.turn_rate(speed, turn)), robot, YELLOW)
 
 
 def velocity_shapes(group: str, twist: Sequence[float], robot: Robot, color: Color) -> list[Shape]:

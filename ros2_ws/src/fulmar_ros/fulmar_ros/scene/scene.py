@@ -12,8 +12,9 @@ from fulmar_core.robots.robot import Robot
 from fulmar_core.safety.arbiter import Mode
 from fulmar_core.safety.geofence import NO_AREA
 from fulmar_core.tasks import Task
+from fulmar_ros.scene.by_kind import APPLIED
 from fulmar_ros.scene.goal_shapes import area_shapes, geofence_shapes, goal_shapes, obstacle_shapes
-from fulmar_ros.scene.robot_shapes import applied_shapes, body_shapes
+from fulmar_ros.scene.robot_shapes import body_shapes
 from fulmar_ros.scene.shape import Shape
 
 REMEMBERED = 200  # goals: velocities come up to a hundred ahead of their time
@@ -115,4 +116,4 @@ class Scene:
             # All or nothing: what goes to rest is drawn at rest.
             if moved.any() or not mean.any():
                 self._shown = mean
-        return applied_shapes(self._robot, self._shown.tolist())
+        return APPLIED[self._robot.kind.name](self._robot, self._robot.actuators, self._shown.tolist())

@@ -94,6 +94,10 @@ class Ackermann(Rolling):
         """The most that all wheels push together [N]."""
         return self.wheel_force
 
+    def turn_rate(self, speed: float, turn: float) -> float:
+        """See `Rolling.turn_rate` [rad/s]."""
+        return speed * math.tan(turn) / self.wheelbase
+
     def next_yaw_rate(
         self, state: PlanarState, speed: Array, turn: Array, twist: Array, yaw_inertia: Array, dt: float
     ) -> Array:

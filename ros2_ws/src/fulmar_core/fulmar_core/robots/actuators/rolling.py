@@ -79,6 +79,10 @@ class Rolling(Actuators):
             dt: Integration step, > 0 [s].
         """
 
+    def turn_rate(self, speed: float, turn: float) -> float:
+        """Of a command [rad/s]."""
+        return turn
+
     @property
     def own_response(self) -> Response:
         """Without the lag, which the wheels' own servos bring in; see `Actuators.own_response`."""
