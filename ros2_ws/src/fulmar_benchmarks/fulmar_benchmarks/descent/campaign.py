@@ -98,12 +98,13 @@ def words(row: dict[str, Any], way: str) -> str:
     found = row[way]
     return (
         f"{way:8} {row['height_m']:g} m: {found['good']} of {found['flights']} good, bank at most "
-        f"{_number(found['bank_max_deg'])} deg, sink at touch-down {_number(found['sink_median_m_s'])} m/s, at most "
-        f"{_number(found['sink_max_m_s'])} m/s"
+        f"{written(found['bank_max_deg'])} deg, sink at touch-down {written(found['sink_median_m_s'])} m/s, at most "
+        f"{written(found['sink_max_m_s'])} m/s"
     )
 
 
-def _number(value: float | None) -> str:
+def written(value: float | None) -> str:
+    """A number, or a dash."""
     return "-" if value is None else f"{value:.2f}"
 
 

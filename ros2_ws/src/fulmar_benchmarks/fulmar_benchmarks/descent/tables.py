@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from fulmar_benchmarks.descent.campaign import WAYS, words
+from fulmar_benchmarks.descent.campaign import WAYS, words, written
 
 
 def print_tables(document: dict[str, Any], write: Callable[[str], None]) -> None:
@@ -16,7 +16,7 @@ def print_tables(document: dict[str, Any], write: Callable[[str], None]) -> None
             for each in row[way]["each"]:
                 write(
                     f"  {way:8} {row['height_m']:g} m, flight {each['number']:3}: bank {each['bank_deg']:5.2f} deg, "
-                    f"sink {_number(each['sink_m_s'])} m/s after {each['seconds']:.1f} s"
+                    f"sink {written(each['sink_m_s'])} m/s after {each['seconds']:.1f} s"
                 )
             for sentence in row[way]["not_flown"]:
                 write(f"  {way:8} {row['height_m']:g} m, {sentence}")
@@ -28,7 +28,3 @@ def print_tables(document: dict[str, Any], write: Callable[[str], None]) -> None
             f"{'met' if line['passed'] else 'NOT MET':8} {line['what']}: {line['good']} of {line['flights']} "
             f"(limit {line['limit']:.4f} of them)"
         )
-
-
-def _number(value: float | None) -> str:
-    return "-" if value is None else f"{value:.2f}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from fulmar_benchmarks.cells import BAD, GOOD, NOTHING
+from fulmar_benchmarks.cells import NOTHING, tone_of
 from fulmar_benchmarks.drift.targets import DIGITS, FIGURES
 
 DISPLAY_NAMES = {"policy": "policy", "lqr": "LQR", "lqr_drift": "LQR of DRIFT", "mpc": "MPC"}
@@ -132,9 +132,8 @@ def missing(document: dict[str, Any]) -> list[str]:
 
 def _tones(document: dict[str, Any]) -> dict[tuple[str, str, str], str]:
     return {
-        (check["row"], check["controller"], check["figure"]): GOOD if check["met"] else BAD
+        (check["row"], check["controller"], check["figure"]): tone_of(check["met"])
         for check in document["requirements"]
-        if check["met"] is not None
     }
 
 

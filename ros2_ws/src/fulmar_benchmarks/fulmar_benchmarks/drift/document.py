@@ -9,14 +9,13 @@ from typing import Any
 
 import numpy as np
 
+from fulmar_benchmarks.cells import heading_of, tally
 from fulmar_benchmarks.drift.bounds import Physics
 from fulmar_benchmarks.drift.conditions import CONDITIONS, PATHS
 from fulmar_benchmarks.drift.targets import FIGURES, TRACKING, band_of, drop_percent, published, requirements
 from fulmar_benchmarks.pairs import Pair
 from fulmar_benchmarks.results import PairResult
-from fulmar_core.config.provenance import fulmar_version, git_revision
 
-FORMAT = 1
 Key = tuple[str, str]  # row and controller
 # Names of our figures by those of the thesis.
 OURS = {
@@ -83,20 +82,14 @@ def document_of(
     steps = sum(one.about["control_steps"] for one in results)
     busy_s = sum(one.about["wall_s"] for one in results)
     return {
-        "benchmark": "drift",
-        "format": FORMAT,
-        "fulmar_version": fulmar_version(),
-        "git_revision": git_revision(),
-        "command": request.command,
+        **heading_of("drift", request.command),
         "through": request.through,
         "seed": request.seed,
         "episodes": request.episodes,
         "controllers": list(request.controllers),
         "rows": rows,
         "requirements": checks,
-        "asked": len(checks),
-        "met": sum(check["met"] is True for check in checks),
-        "open": sum(check["met"] is None for check in checks),
+        **tally(check["met"] for check in checks),
         "control_steps": steps,
         "steps_per_s": steps / busy_s if busy_s else None,
         "wall_s": round(wall_s, 1),

@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from fulmar_benchmarks.cells import BAD, GOOD
+from fulmar_benchmarks.cells import BAD, GOOD, wide
 from fulmar_benchmarks.drift.cells import (
     PATH_HEADS,
     Cell,
@@ -31,17 +31,17 @@ _WIDTH = 170  # columns, where the output is not a terminal
 
 def print_tables(document: dict[str, Any], output: Console) -> None:
     """Print both tables, what their figures are, what is not met, and the conclusion."""
-    wide = output if output.is_terminal else Console(highlight=False, emoji=False, width=_WIDTH)
+    console = wide(output, _WIDTH)
     poses, paths = pose_lines(document), path_lines(document)
     if poses:
-        wide.print(_table("Go to pose under disturbances", pose_heads(), poses))
-        wide.print(_key())
+        console.print(_table("Go to pose under disturbances", pose_heads(), poses))
+        console.print(_key())
     if paths:
-        wide.print(_table("Paths followed at 0.2 m/s", PATH_HEADS, paths))
+        console.print(_table("Paths followed at 0.2 m/s", PATH_HEADS, paths))
     for line in [*missing(document), *unmet(document)]:
-        wide.print(line, markup=False, style="yellow", soft_wrap=True)
+        console.print(line, markup=False, style="yellow", soft_wrap=True)
     for line in [*notes(document), conclusion(document)]:
-        wide.print(line, markup=False, soft_wrap=True)
+        console.print(line, markup=False, soft_wrap=True)
 
 
 def conclusion(document: dict[str, Any]) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 NAMES = {
@@ -66,9 +65,3 @@ def _pointing(found: dict[str, Any]) -> list[str]:
         f"  star tracker: {found['star_tracker']}",
         f"  without it after the first minute: {without['end_deg']:.3f}° off in the end",
     ]
-
-
-def print_tables(document: dict[str, Any], write: Callable[[str], None]) -> None:
-    """Write every line."""
-    for line in lines(document):
-        write(line)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
+from fulmar_benchmarks.cells import number
 from fulmar_benchmarks.falcon.campaign import requirements
 
 
@@ -25,11 +25,11 @@ def lines(document: dict[str, Any]) -> list[str]:
                 crash = "*" if each["thesis"].get("crashed") else ""
                 beside = f"({thesis:.3f}{crash})" if thesis is not None else ""
                 found.append(
-                    f"{task:5} {controller:7} {scenario:8} {_number(each['rmse_per_axis_m'], 4):>8}{beside:>9} "
-                    f"{_number(each['rmse_per_axis_worst_m'], 4):>8} {_number(each['altitude_rmse_m'], 4):>8} "
-                    f"{_number(each['peak_error_m'], 3):>7} {_number(each['settling_s'], 2):>8} "
-                    f"{_number(each['energy'], 3):>7} {each['survival']:>6.2f} "
-                    f"{_number(each['wall_s'], 1):>7}"
+                    f"{task:5} {controller:7} {scenario:8} {number(each['rmse_per_axis_m'], 4, '-'):>8}{beside:>9} "
+                    f"{number(each['rmse_per_axis_worst_m'], 4, '-'):>8} {number(each['altitude_rmse_m'], 4, '-'):>8} "
+                    f"{number(each['peak_error_m'], 3, '-'):>7} {number(each['settling_s'], 2, '-'):>8} "
+                    f"{number(each['energy'], 3, '-'):>7} {each['survival']:>6.2f} "
+                    f"{number(each['wall_s'], 1, '-'):>7}"
                 )
     ground = document["ground_effect"]
     found.append("mean squared throttle in level flight over height, and of the thesis (Table 5.2):")
@@ -53,13 +53,3 @@ def lines(document: dict[str, Any]) -> list[str]:
     for name, asked, shown, good in requirements(document):
         found.append(f"{'met' if good else 'NOT MET':8} {name}: {shown} ({asked})")
     return found
-
-
-def print_tables(document: dict[str, Any], write: Callable[[str], None]) -> None:
-    """Print them."""
-    for line in lines(document):
-        write(line)
-
-
-def _number(value: float | None, digits: int) -> str:
-    return "-" if value is None else f"{value:.{digits}f}"

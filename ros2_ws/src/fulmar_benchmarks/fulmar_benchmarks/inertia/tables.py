@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 from fulmar_benchmarks.inertia.campaign import METHODS, requirements
@@ -47,9 +46,3 @@ def lines(document: dict[str, Any]) -> list[str]:
     for name, text, good in requirements(document):
         found.append(f"{'met   ' if good else 'NOT   '} {name}: {text}")
     return found
-
-
-def print_tables(document: dict[str, Any], write: Callable[[str], None]) -> None:
-    """Write every line."""
-    for line in lines(document):
-        write(line)

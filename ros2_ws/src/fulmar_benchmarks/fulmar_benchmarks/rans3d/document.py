@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from fulmar_benchmarks.cells import heading_of, tally
 from fulmar_benchmarks.pairs import Pair
 from fulmar_benchmarks.rans3d.targets import (
     AIMED_RATIO,
@@ -37,10 +38,8 @@ from fulmar_benchmarks.rans3d.targets import (
 from fulmar_benchmarks.rans3d.unit import HELD
 from fulmar_benchmarks.results import PairResult
 from fulmar_benchmarks.roboran.document import wilson
-from fulmar_core.config.provenance import fulmar_version, git_revision
 from fulmar_core.simulation.metrics import summarise
 
-FORMAT = 1
 PARTS = ("tasks", "dead", "integrator", "throughput")
 Key = tuple[str, str, str, str]  # robot, task, controller, scenario
 Cells = dict[str, dict[str, dict[str, Any]]]  # by task and controller
@@ -110,11 +109,7 @@ def document_of(
     ]
     requirements = [*_of_cells(cells), *_of_integrator(integrator), *_of_pace(throughput)]
     return {
-        "benchmark": "rans3d",
-        "format": FORMAT,
-        "fulmar_version": fulmar_version(),
-        "git_revision": git_revision(),
-        "command": request.command,
+        **heading_of("rans3d", request.command),
         "seed": request.seed,
         "through": "mujoco",
         "episodes": request.episodes,
@@ -128,9 +123,7 @@ def document_of(
         "throughput": throughput,
         "requirements": requirements,
         "aims": [*_aims_of_cells(cells, dead), *_aims_of_pace(throughput)],
-        "asked": len(requirements),
-        "met": sum(one["met"] is True for one in requirements),
-        "open": sum(one["met"] is None for one in requirements),
+        **tally(one["met"] for one in requirements),
         "wall_s": round(wall_s, 1),
     }
 

@@ -7,7 +7,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from fulmar_benchmarks.cells import BAD, GOOD, MARKS, NOTHING, Cell, display_name
+from fulmar_benchmarks.cells import BAD, GOOD, MARKS, NOTHING, Cell, display_name, number, tone_of, wide
 from fulmar_benchmarks.rans3d.targets import (
     RANDOMISED,
     RANS_ATTITUDE_RAD,
@@ -34,7 +34,7 @@ HEADS = (
 
 def print_tables(document: dict[str, Any], output: Console) -> None:
     """Print one table a robot, the other parts line by line, what is not met, and the conclusion."""
-    wide = output if output.is_terminal else Console(highlight=False, emoji=False, width=_WIDTH)
+    console = wide(output, _WIDTH)
     for robot, tasks in robots_of(document).items():
         table = Table(title=display_name(robot), title_justify="left")
         for head in ("", ""):
@@ -46,11 +46,11 @@ def print_tables(document: dict[str, Any], output: Console) -> None:
                 cells = cells_of(document, robot, task, name, cell)
                 texts = [_STYLES[each.tone].format(each.text + MARKS[each.tone]) for each in cells]
                 table.add_row(display_name(task), name, *texts, end_section=name == list(controllers)[-1])
-        wide.print(table)
+        console.print(table)
     for line in missing(document):
-        wide.print(line, markup=False, style="yellow", soft_wrap=True)
+        console.print(line, markup=False, style="yellow", soft_wrap=True)
     for line in [*notes(document), *other_lines(document), conclusion(document)]:
-        wide.print(line, markup=False, soft_wrap=True)
+        console.print(line, markup=False, soft_wrap=True)
 
 
 def robots_of(document: dict[str, Any]) -> dict[str, Any]:
@@ -59,12 +59,12 @@ def robots_of(document: dict[str, Any]) -> dict[str, Any]:
     return {robot: tasks for robot, tasks in every.items() if tasks}
 
 
-def tone_of(document: dict[str, Any], robot: str, task: str, name: str, *, held: bool) -> str:
+def _tone(document: dict[str, Any], robot: str, task: str, name: str, *, held: bool) -> str:
     """Whether a cell meets what is required of it."""
     for line in document["requirements"]:
         place = (line.get("robot"), line.get("task"), line.get("controller"), line.get("among_holdable"))
-        if place == (robot, task, name, held) and line["met"] is not None:
-            return GOOD if line["met"] else BAD
+        if place == (robot, task, name, held):
+            return tone_of(line["met"])
     return ""
 
 
@@ -73,7 +73,7 @@ def cells_of(document: dict[str, Any], robot: str, task: str, name: str, cell: d
     disturbed = cell.get(RANDOMISED, {})
     held = disturbed.get("holdable", {})
     return [
-        Cell(number(cell["success_rate"], 3), tone_of(document, robot, task, name, held=False)),
+        Cell(number(cell["success_rate"], 3), _tone(document, robot, task, name, held=False)),
         Cell(_spread(cell, "final_position_error_m", 3)),
         Cell(_spread(cell, "final_attitude_error_deg", 1)),
         Cell(_spread(cell, "velocity_error_m_s", 3)),
@@ -85,7 +85,7 @@ def cells_of(document: dict[str, Any], robot: str, task: str, name: str, cell: d
         Cell(number(cell["rans_success_rate"], 3)),
         Cell(number(cell["duty"], 2)),
         Cell(number(disturbed.get("success_rate"), 3)),
-        Cell(number(held.get("success_rate"), 3), tone_of(document, robot, task, name, held=True)),
+        Cell(number(held.get("success_rate"), 3), _tone(document, robot, task, name, held=True)),
     ]
 
 
@@ -95,11 +95,6 @@ def _spread(cell: dict[str, Any], figure: str, digits: int) -> str:
     if found is None or found["median"] is None:
         return NOTHING
     return f"{number(found['median'], digits)} ({number(found['p95'], digits)})"
-
-
-def number(value: float | None, digits: int) -> str:
-    """A number, or a dash."""
-    return NOTHING if value is None else f"{value:.{digits}f}"
 
 
 def missing(document: dict[str, Any]) -> list[str]:

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from fulmar_benchmarks.cells import heading_of, tally
 from fulmar_benchmarks.pairs import Pair, find_pair, units_of
 from fulmar_benchmarks.results import PairResult
-from fulmar_benchmarks.roboran.document import FORMAT, pair_entry
+from fulmar_benchmarks.roboran.document import pair_entry
 from fulmar_benchmarks.unit import Unit
 from fulmar_benchmarks.workers import Outcome, evaluate_units
-from fulmar_core.config.provenance import fulmar_version, git_revision
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.simulation.counts import check_episodes
 from fulmar_core.tasks import load_task
@@ -120,17 +120,11 @@ def document_of(
         if entry["kind"] == "policy":
             met.setdefault((entry["robot"], entry["task"]), []).append(entry["met"])
     return {
-        "benchmark": "roboran",
-        "format": FORMAT,
-        "fulmar_version": fulmar_version(),
-        "git_revision": git_revision(),
-        "command": command,
+        **heading_of("roboran", command),
         "seed": seed,
         "scenario": scenario,
         "episodes": dict(episodes),
         "pairs": entries,
-        "asked": len(met),
-        "met": sum(True in each for each in met.values()),
-        "open": sum(True not in each and None in each for each in met.values()),
+        **tally(True if True in each else None if None in each else False for each in met.values()),
         "wall_s": round(wall_s, 1),
     }

@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from fulmar_benchmarks.cells import BAD, GOOD, NOTHING, Cell, display_name
+from fulmar_benchmarks.cells import BAD, GOOD, NOTHING, Cell, display_name, number, tone_of, wide
 
 LAWS = {"lqr": "LQR", "polar": "polar law", "line_of_sight": "line of sight", "pure_pursuit": "pure pursuit"}
 WAYS = {"batch": "batch", "mujoco": "MuJoCo", "ros": "ROS"}
@@ -99,7 +99,7 @@ def rows(task: str, entries: list[dict[str, Any]]) -> list[Row]:
         Row("batch and MuJoCo apart by", tuple(_gap(entry) for entry in entries)),
         Row(
             "batch, of MuJoCo's episodes",
-            tuple(Cell(_number(entry["judged_in_batch_on_mujocos_episodes"], 3)) for entry in entries),
+            tuple(Cell(number(entry["judged_in_batch_on_mujocos_episodes"], 3)) for entry in entries),
         ),
         Row("trained in, on two cores", tuple(_training(entry) for entry in entries)),
     ]
@@ -113,8 +113,14 @@ def _checks(entry: dict[str, Any]) -> dict[str, dict[str, Any]]:
     return {check["name"]: check for check in entry["verdicts"]}
 
 
+def _met(entry: dict[str, Any], name: str) -> bool | None:
+    """Whether a requirement is met; None: it was not measured, or there is none."""
+    met: bool | None = _checks(entry).get(name, {}).get("met")
+    return met
+
+
 def _evaluated(entry: dict[str, Any], way: str) -> Cell:
-    return Cell(_number(entry["judged"].get(way), 3), _tone(_checks(entry).get(way)))
+    return Cell(number(entry["judged"].get(way), 3), tone_of(_met(entry, way)))
 
 
 def _required(entry: dict[str, Any]) -> Cell:
@@ -130,8 +136,10 @@ def _thesis_success(entry: dict[str, Any]) -> Cell:
 def _gap(entry: dict[str, Any]) -> Cell:
     check = _checks(entry).get("batch_minus_mujoco")
     if check is None and {"batch", "mujoco"} <= set(entry["judged"]):
-        return Cell(_number(abs(entry["judged"]["batch"] - entry["judged"]["mujoco"]), 3))
-    return Cell(_number(None if check is None else check["measured"], 3), _tone(check))
+        return Cell(number(abs(entry["judged"]["batch"] - entry["judged"]["mujoco"]), 3))
+    return Cell(
+        number(None if check is None else check["measured"], 3), tone_of(_met(entry, "batch_minus_mujoco"))
+    )
 
 
 def _training(entry: dict[str, Any]) -> Cell:
@@ -139,7 +147,7 @@ def _training(entry: dict[str, Any]) -> Cell:
     if ours is None:
         return Cell(NOTHING)
     text = f"{ours:.0f} s" if theirs is None else f"{ours:.0f} s ({60.0 * theirs:.0f} s)"
-    return Cell(text, _tone(_checks(entry).get("training_s")))
+    return Cell(text, tone_of(_met(entry, "training_s")))
 
 
 def _beside(entry: dict[str, Any], quantity: Quantity) -> Cell:
@@ -147,18 +155,8 @@ def _beside(entry: dict[str, Any], quantity: Quantity) -> Cell:
     mean = way.get(quantity.figure, {}).get("mean")
     if mean is None:
         return Cell(NOTHING)
-    ours, theirs = _number(quantity.factor * mean, quantity.digits), entry["thesis"].get(quantity.thesis)
+    ours, theirs = number(quantity.factor * mean, quantity.digits), entry["thesis"].get(quantity.thesis)
     return Cell(ours if theirs is None else f"{ours} ({theirs:.{min(quantity.digits, 2)}f})")
-
-
-def _tone(check: dict[str, Any] | None) -> str:
-    if check is None or check["met"] is None:
-        return ""
-    return GOOD if check["met"] else BAD
-
-
-def _number(value: float | None, digits: int) -> str:
-    return NOTHING if value is None else f"{value:.{digits}f}"
 
 
 _MARKS = {GOOD: "[green]{} ✓[/]", BAD: "[bold red]{} ✗[/]", "": "{}"}
@@ -168,21 +166,20 @@ _WIDTH = 140  # columns, where the output is not a terminal
 
 def print_tables(document: dict[str, Any], output: Console) -> None:
     """Print one table a task, what the figures are, and the conclusion."""
-    width = None if output.is_terminal else _WIDTH
-    wide = output if width is None else Console(highlight=False, emoji=False, width=width)
+    console = wide(output, _WIDTH)
     for task in dict.fromkeys(entry["task"] for entry in document["pairs"]):
         entries = [entry for entry in document["pairs"] if entry["task"] == task]
         shown = [entry for entry in entries if entry["ways"]]
         if shown:
-            wide.print(_table(task, shown))
+            console.print(_table(task, shown))
         for entry in entries:
             if missing(entry):
-                wide.print(
+                console.print(
                     f"{display_name(task)}, {missing(entry)}", markup=False, style="yellow", soft_wrap=True
                 )
     for line in notes(document):
-        wide.print(line, markup=False, soft_wrap=True)
-    wide.print(conclusion(document), markup=False, soft_wrap=True)
+        console.print(line, markup=False, soft_wrap=True)
+    console.print(conclusion(document), markup=False, soft_wrap=True)
 
 
 def conclusion(document: dict[str, Any]) -> str:

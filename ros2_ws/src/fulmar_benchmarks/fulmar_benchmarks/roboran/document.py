@@ -14,7 +14,6 @@ from fulmar_benchmarks.roboran.targets import checks_of, main_figure, thesis_row
 from fulmar_core.simulation.metrics import summarise
 from fulmar_evaluation.evaluation import share_of_mean
 
-FORMAT = 1
 Z95 = 1.96
 
 

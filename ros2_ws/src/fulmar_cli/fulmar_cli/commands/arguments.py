@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import time
 from pathlib import Path
@@ -46,7 +47,6 @@ NameOption = Annotated[
 ]
 TASK_HELP = "A name from `fulmar list tasks`, or your own class: mypackage.mymodule:MyTask."
 TaskArgument = Annotated[str, argument("TASK", TASK_HELP)]
-TaskOption = Annotated[str, option("T", TASK_HELP, "--task")]
 CONTROLLER_HELP = (
     "policy, a classical controller such as lqr, or your own class: mypackage.mymodule:MyController. "
     "With `fulmar run` also external: a node that you start."
@@ -88,7 +88,10 @@ ControlHzOption = Annotated[float | None, option("HZ", "Command rate; the robot'
 RecordOption = Annotated[
     Path | None, option("DIR", "Folder of the bag; runs/<time>... by default.", "--record")
 ]
-JobsOption = Annotated[int | None, option("N", "Parallel processes; one for each core by default.", min=1)]
+CORES = len(os.sched_getaffinity(0))
+JobsOption = Annotated[
+    int, option("N", "Parallel processes; one for each core by default.", min=1, show_default=False)
+]
 BagArgument = Annotated[Path, argument("BAG", "A bag folder, or the .mcap or .db3 file in it.")]
 OdometryOption = Annotated[str | None, option("TOPIC", "The odometry to use, where a bag has several.")]
 JsonOption = Annotated[bool, flag("--json", "Print one JSON object and nothing else.")]

@@ -1,4 +1,4 @@
-"""What `fulmar benchmark drift` and `fulmar benchmark roboran` share: options, progress, and what is written."""
+"""What benchmarks share: options, progress, and what is written."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.console import Console
 
-from fulmar_bringup.console import log_line, output, print_result
+from fulmar_bringup.console import log_line, output, print_json, print_result, write_line
 from fulmar_bringup.progress import work_bar
-from fulmar_cli.commands.arguments import flag
+from fulmar_cli.commands.arguments import flag, invoked_command
 from fulmar_core.config.errors import FAILED
 
 if TYPE_CHECKING:
@@ -73,3 +73,25 @@ def run_campaign(
     log_line(f"written: {path}")
     if check and document["met"] < document["asked"]:
         raise typer.Exit(FAILED)
+
+
+def finish(
+    name: str,
+    document: dict[str, Any],
+    folder: Path,
+    *,
+    lines_of: Callable[[dict[str, Any]], list[str]],
+    write_report: Callable[[], Path] | None,
+    as_json: bool,
+) -> None:
+    """Write the document of a benchmark, with its command, and its report below a folder, and print it."""
+    document["command"] = invoked_command()
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / f"{name}.json").write_text(json.dumps(document, indent=1), encoding="utf-8")
+    if write_report is not None:
+        log_line(f"report: {write_report()}")
+    if as_json:
+        print_json(document)
+        return
+    for line in lines_of(document):
+        write_line(line)

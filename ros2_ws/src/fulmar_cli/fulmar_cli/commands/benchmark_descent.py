@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Annotated
 
@@ -11,6 +10,7 @@ import typer
 from fulmar_bringup.console import print_result, write_line
 from fulmar_bringup.progress import work_bar
 from fulmar_cli.commands.arguments import (
+    CORES,
     JobsOption,
     JsonOption,
     PolicyOption,
@@ -37,7 +37,7 @@ def descent(
     real_time: Annotated[int, option("N", "Flights in real time at each height.", min=1)] = 4,
     seed: SeedOption = EVALUATION_SEED,
     scenario: ScenarioOption = "nominal",
-    jobs: JobsOption = None,
+    jobs: JobsOption = CORES,
     as_json: JsonOption = False,
 ) -> None:
     """Kill the controller of an aircraft in flight, and measure how the safe controller brings it down.
@@ -63,8 +63,7 @@ def descent(
     )
     for one in each:
         one.check()
-    cores = jobs or len(os.sched_getaffinity(0))
-    request = Request(each, tuple(read_names(through, "way", WAYS)), real_time, cores)
+    request = Request(each, tuple(read_names(through, "way", WAYS)), real_time, jobs)
     with work_bar("flights") as progress:
         document = run_descents(request, progress)
     print_result(document, lambda found: print_tables(found, write_line), as_json=as_json)

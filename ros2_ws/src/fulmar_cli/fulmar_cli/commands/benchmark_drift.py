@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from fulmar_cli.commands.arguments import (
+    CORES,
     JobsOption,
     JsonOption,
     PolicyOption,
@@ -49,7 +49,7 @@ def drift(
         Path | None, option("DIR", "Policy bundle for the paths; the shipped one by default.")
     ] = None,
     out: Annotated[Path, option("DIR", OUT_HELP, "--out", "--output")] = Path("runs/benchmark/drift"),
-    jobs: JobsOption = None,
+    jobs: JobsOption = CORES,
     fresh: FreshOption = False,
     report: ReportOption = True,
     check: CheckOption = False,
@@ -80,7 +80,7 @@ def drift(
     request = Request(
         rows=ROWS if rows is None else read_names(rows, "row", ROWS), controllers=names, through=through,
         episodes=episodes, seed=seed, folder=out, policy=policy, tracking_policy=tracking_policy,
-        jobs=jobs or len(os.sched_getaffinity(0)), fresh=fresh, command=invoked_command(),
+        jobs=jobs, fresh=fresh, command=invoked_command(),
     )  # fmt: skip
     if report:
         require("matplotlib")

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import json
-import os
 from pathlib import Path
 from typing import Annotated
 
-from fulmar_bringup.console import log_line, print_result, write_line
 from fulmar_bringup.progress import work_bar
-from fulmar_cli.commands.arguments import JobsOption, JsonOption, SeedOption, invoked_command, option
-from fulmar_cli.commands.benchmark_campaign import ReportOption
+from fulmar_cli.commands.arguments import CORES, JobsOption, JsonOption, SeedOption, option
+from fulmar_cli.commands.benchmark_campaign import ReportOption, finish
 from fulmar_cli.commands.values import read_names
 from fulmar_cli.installation.extras import require
 from fulmar_core.config.seeds import EVALUATION_SEED
@@ -30,7 +27,7 @@ def events(
     out: Annotated[Path, option("DIR", "Folder of the report and its figures.")] = Path(
         "runs/benchmark/events"
     ),
-    jobs: JobsOption = None,
+    jobs: JobsOption = CORES,
     report: ReportOption = True,
     as_json: JsonOption = False,
 ) -> None:
@@ -48,22 +45,18 @@ def events(
     """
     require("mujoco")
     from fulmar_benchmarks.events.campaign import PARTS, Request, run_events
-    from fulmar_benchmarks.events.tables import print_tables
+    from fulmar_benchmarks.events.tables import lines
     from fulmar_core.robots.sensors.catalogue import load_stars
 
     load_stars()
     chosen = read_names(parts, "part", PARTS)
-    request = Request(
-        runs, seed, tuple(chosen), pointing_runs, pointing_s, jobs or len(os.sched_getaffinity(0))
-    )
-    with work_bar("windows") as progress:
-        document = run_events(request, progress)
-    document["command"] = invoked_command()
-    out.mkdir(parents=True, exist_ok=True)
-    (out / "events.json").write_text(json.dumps(document, indent=1), encoding="utf-8")
+    request = Request(runs, seed, tuple(chosen), pointing_runs, pointing_s, jobs)
     if report:
         require("matplotlib")
         from fulmar_benchmarks.events.report import write_report
-
-        log_line(f"report: {write_report(document, out)}")
-    print_result(document, lambda found: print_tables(found, write_line), as_json=as_json)
+    with work_bar("windows") as progress:
+        document = run_events(request, progress)
+    finish(
+        "events", document, out, lines_of=lines, as_json=as_json,
+        write_report=(lambda: write_report(document, out)) if report else None,
+    )  # fmt: skip

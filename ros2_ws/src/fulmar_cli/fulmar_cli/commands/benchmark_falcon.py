@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-import json
-import os
 from pathlib import Path
 from typing import Annotated
 
-from fulmar_bringup.console import log_line, print_result, write_line
 from fulmar_bringup.progress import work_bar
 from fulmar_cli.commands.arguments import (
+    CORES,
     JobsOption,
     JsonOption,
     PolicyOption,
     SeedOption,
-    invoked_command,
     option,
 )
-from fulmar_cli.commands.benchmark_campaign import ReportOption
+from fulmar_cli.commands.benchmark_campaign import ReportOption, finish
 from fulmar_cli.commands.values import read_names
 from fulmar_cli.installation.extras import require
 from fulmar_core.config.seeds import EVALUATION_SEED
@@ -39,7 +36,7 @@ def falcon(
     out: Annotated[Path, option("DIR", "Folder of the report and its figures.")] = Path(
         "runs/benchmark/falcon"
     ),
-    jobs: JobsOption = None,
+    jobs: JobsOption = CORES,
     report: ReportOption = True,
     as_json: JsonOption = False,
 ) -> None:
@@ -65,7 +62,7 @@ def falcon(
     """
     from fulmar_benchmarks.falcon.campaign import Request, run_falcon
     from fulmar_benchmarks.falcon.cells import CONTROLLERS, SCENARIOS, TASKS
-    from fulmar_benchmarks.falcon.tables import print_tables
+    from fulmar_benchmarks.falcon.tables import lines
 
     chosen: tuple[str, ...] = ()
     if scenarios != "usual":
@@ -77,17 +74,15 @@ def falcon(
         chosen,
         episodes,
         seed,
-        jobs or len(os.sched_getaffinity(0)),
+        jobs,
         str(policy or ""),
     )
-    with work_bar("flights") as progress:
-        document, flights = run_falcon(request, progress)
-    document["command"] = invoked_command()
-    out.mkdir(parents=True, exist_ok=True)
-    (out / "falcon.json").write_text(json.dumps(document, indent=1), encoding="utf-8")
     if report:
         require("matplotlib")
         from fulmar_benchmarks.falcon.report import write_report
-
-        log_line(f"report: {write_report(document, flights, out)}")
-    print_result(document, lambda found: print_tables(found, write_line), as_json=as_json)
+    with work_bar("flights") as progress:
+        document, flights = run_falcon(request, progress)
+    finish(
+        "falcon", document, out, lines_of=lines, as_json=as_json,
+        write_report=(lambda: write_report(document, flights, out)) if report else None,
+    )  # fmt: skip

@@ -9,6 +9,7 @@ import typer
 from fulmar_bringup.console import print_result, write_line
 from fulmar_bringup.progress import work_bar
 from fulmar_cli.commands.arguments import (
+    CORES,
     ControlHzOption,
     JobsOption,
     JsonOption,
@@ -32,7 +33,7 @@ def flights(
     seed: SeedOption = EVALUATION_SEED,
     scenario: ScenarioOption = "nominal",
     control_hz: ControlHzOption = None,
-    jobs: JobsOption = None,
+    jobs: JobsOption = CORES,
     as_json: JsonOption = False,
 ) -> None:
     """Fly an aircraft through ROS nodes, in lock step and in real time, beside the same flights in the batch.

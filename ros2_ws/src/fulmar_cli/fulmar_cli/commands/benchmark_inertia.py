@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import json
-import os
 from pathlib import Path
 from typing import Annotated
 
-from fulmar_bringup.console import log_line, print_result, write_line
 from fulmar_bringup.progress import work_bar
-from fulmar_cli.commands.arguments import JobsOption, JsonOption, SeedOption, invoked_command, option
-from fulmar_cli.commands.benchmark_campaign import ReportOption
+from fulmar_cli.commands.arguments import CORES, JobsOption, JsonOption, SeedOption, option
+from fulmar_cli.commands.benchmark_campaign import ReportOption, finish
 from fulmar_cli.commands.values import read_names
 from fulmar_cli.installation.extras import require
 from fulmar_core.config.seeds import EVALUATION_SEED
@@ -30,7 +27,7 @@ def inertia(
     out: Annotated[Path, option("DIR", "Folder of the report and its figures.")] = Path(
         "runs/benchmark/inertia"
     ),
-    jobs: JobsOption = None,
+    jobs: JobsOption = CORES,
     report: ReportOption = True,
     as_json: JsonOption = False,
 ) -> None:
@@ -47,18 +44,16 @@ def inertia(
     fulmar benchmark inertia --satellites microsat --profiles chirp,persistent --json
     """
     from fulmar_benchmarks.inertia.campaign import PROFILES, SATELLITES, Request, run_inertia
-    from fulmar_benchmarks.inertia.tables import print_tables
+    from fulmar_benchmarks.inertia.tables import lines
 
     names = read_names(satellites, "satellite", SATELLITES), read_names(profiles, "profile", PROFILES)
-    request = Request(tuple(names[0]), tuple(names[1]), draws, seed, jobs or len(os.sched_getaffinity(0)))
-    with work_bar("satellites") as progress:
-        document = run_inertia(request, progress)
-    document["command"] = invoked_command()
-    out.mkdir(parents=True, exist_ok=True)
-    (out / "inertia.json").write_text(json.dumps(document, indent=1), encoding="utf-8")
+    request = Request(tuple(names[0]), tuple(names[1]), draws, seed, jobs)
     if report:
         require("matplotlib")
         from fulmar_benchmarks.inertia.report import write_report
-
-        log_line(f"report: {write_report(document, out)}")
-    print_result(document, lambda found: print_tables(found, write_line), as_json=as_json)
+    with work_bar("satellites") as progress:
+        document = run_inertia(request, progress)
+    finish(
+        "inertia", document, out, lines_of=lines, as_json=as_json,
+        write_report=(lambda: write_report(document, out)) if report else None,
+    )  # fmt: skip

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from fulmar_cli.commands.arguments import JobsOption, JsonOption, SeedOption, invoked_command, option
+from fulmar_cli.commands.arguments import CORES, JobsOption, JsonOption, SeedOption, invoked_command, option
 from fulmar_cli.commands.benchmark_campaign import (
     OUT_HELP,
     CheckOption,
@@ -45,7 +44,7 @@ def rans3d(
     worlds: Annotated[int, option("N", "Worlds of the batch whose pace is measured.", min=1)] = 4096,
     seconds: Annotated[float, option("S", "Time of each measurement of the pace [s].", min=0.05)] = 1.0,
     out: Annotated[Path, option("DIR", OUT_HELP)] = Path("runs/benchmark/rans3d"),
-    jobs: JobsOption = None,
+    jobs: JobsOption = CORES,
     fresh: FreshOption = False,
     report: ReportOption = True,
     check: CheckOption = False,
@@ -74,7 +73,7 @@ def rans3d(
         folder=out, episodes=episodes, seed=seed, parts=read_names(parts, "part", PARTS),
         robots=read_names(robots, "robot", ROBOTS), tasks=read_names(tasks, "task", TASKS), controllers=names,
         scenarios=read_names(scenarios, "scenario", SCENARIOS), policies=policies,
-        jobs=jobs or len(os.sched_getaffinity(0)), fresh=fresh, tumble_s=tumble_s, worlds=worlds, seconds=seconds,
+        jobs=jobs, fresh=fresh, tumble_s=tumble_s, worlds=worlds, seconds=seconds,
         command=invoked_command(),
     )  # fmt: skip
     require("mujoco", *(["onnxruntime"] if "policy" in names else []))

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Annotated
 
 from fulmar_cli.commands.arguments import (
+    CORES,
     JobsOption,
     JsonOption,
     ScenarioOption,
@@ -46,7 +46,7 @@ def roboran(
     seed: SeedOption = EVALUATION_SEED,
     scenario: ScenarioOption = "nominal",
     out: Annotated[Path, option("DIR", OUT_HELP)] = Path("runs/benchmark/roboran"),
-    jobs: JobsOption = None,
+    jobs: JobsOption = CORES,
     fresh: FreshOption = False,
     report: ReportOption = True,
     check: CheckOption = False,
@@ -81,7 +81,7 @@ def roboran(
         robots=ROBOTS if robots is None else read_names(robots, "robot", config_names("robots")),
         tasks=TASKS if tasks is None else read_names(tasks, "task", config_names("tasks")),
         kinds=kinds, episodes={way: episodes or EPISODES[way] for way in ways}, seed=seed, scenario=scenario,
-        folder=out, policies=policies, jobs=jobs or len(os.sched_getaffinity(0)), fresh=fresh,
+        folder=out, policies=policies, jobs=jobs, fresh=fresh,
         command=invoked_command(),
     )  # fmt: skip
 

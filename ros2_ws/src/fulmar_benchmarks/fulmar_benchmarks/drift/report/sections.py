@@ -8,11 +8,10 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from fulmar_benchmarks.cells import MARKS
+from fulmar_benchmarks.cells import as_html
 from fulmar_benchmarks.drift.campaign import CampaignResult
 from fulmar_benchmarks.drift.cells import (
     PATH_HEADS,
-    Cell,
     Line,
     display_name,
     missing,
@@ -130,14 +129,11 @@ def _plots(result: CampaignResult) -> list[Plot]:
 def _table(heads: Sequence[str], lines: Sequence[Line]) -> str:
     rows = (
         f'<tr class="{line.kind}{" first" if line.title else ""}"><td>{escape(line.title)}</td>'
-        f"<td>{escape(line.controller)}</td>{''.join(map(_cell, line.cells))}</tr>"
+        f"<td>{escape(line.controller)}</td>"
+        f"{''.join(as_html(cell.text, cell.tone, cell.band) for cell in line.cells)}</tr>"
         for line in lines
     )
     return table([cells(["", "", *heads], "th")], rows)
-
-
-def _cell(cell: Cell) -> str:
-    return f'<td class="{f"{cell.tone} {cell.band}".strip()}">{escape(cell.text + MARKS[cell.tone])}</td>'
 
 
 def _key() -> str:

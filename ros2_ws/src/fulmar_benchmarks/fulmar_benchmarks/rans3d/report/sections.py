@@ -6,7 +6,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from fulmar_benchmarks.cells import MARKS, display_name
+from fulmar_benchmarks.cells import as_html, display_name, tone_of
 from fulmar_benchmarks.rans3d.campaign import CampaignResult
 from fulmar_benchmarks.rans3d.report.plots import draw_glance, draw_over_time, shown
 from fulmar_benchmarks.rans3d.tables import (
@@ -62,10 +62,7 @@ def _parts(result: CampaignResult) -> list[Part]:
 def _table(document: dict[str, Any], robot: str, tasks: dict[str, Any]) -> str:
     body = [
         f"<tr>{cells([f'{display_name(task)}, {name}'])}"
-        + "".join(
-            f'<td class="{each.tone}">{escape(each.text + MARKS[each.tone])}</td>'
-            for each in cells_of(document, robot, task, name, cell)
-        )
+        + "".join(as_html(each.text, each.tone) for each in cells_of(document, robot, task, name, cell))
         + "</tr>"
         for task, controllers in tasks.items()
         for name, cell in controllers.items()
@@ -79,8 +76,7 @@ def _lines(lines: list[dict[str, Any]], *, required: int) -> str:
         sign = "≥" if line["better"] == "more" else "≤"
         measured = "–" if line["measured"] is None else f"{line['measured']:.3g}"
         kind = "required" if place < required else "aim"
-        tone = "" if line["met"] is None else "good" if line["met"] else "bad"
-        cell = f'<td class="{tone}">{escape(measured + MARKS[tone])}</td>'
+        cell = as_html(measured, tone_of(line["met"]))
         limit = f"{sign} {line['limit']:g}"
         rows.append(f"<tr>{cells([line['name']])}{cell}{cells([limit, kind])}</tr>")
     return table([cells(["", "measured", "limit", ""], "th")], rows)

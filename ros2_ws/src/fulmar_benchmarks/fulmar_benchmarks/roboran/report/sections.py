@@ -9,7 +9,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from fulmar_benchmarks.cells import MARKS, display_name
+from fulmar_benchmarks.cells import as_html, display_name
 from fulmar_benchmarks.roboran.campaign import CampaignResult
 from fulmar_benchmarks.roboran.cells import conclusion, head, missing, notes, rows
 from fulmar_benchmarks.roboran.report.glance_plot import draw_glance
@@ -79,11 +79,7 @@ def _table(task: str, entries: Sequence[dict[str, Any]]) -> list[str]:
         return lines
     heads = cells(["", *map(head, shown)], "th")
     body = (
-        f"<tr>{cells([row.title])}"
-        + "".join(
-            f'<td class="{cell.tone}">{escape(cell.text + MARKS[cell.tone])}</td>' for cell in row.cells
-        )
-        + "</tr>"
+        f"<tr>{cells([row.title])}" + "".join(as_html(cell.text, cell.tone) for cell in row.cells) + "</tr>"
         for row in rows(task, shown)
     )
     return [table([heads], body), *lines]
