@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import signal
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
 from fulmar_core.robots.robot import Robot
 from fulmar_evaluation.faults.by_kind import FAULTS
@@ -137,6 +140,7 @@ class Fault:
     why_not: Callable[[Robot], str] = possible
     begins: bool = True  # whether the system is under way when it is done
     launchers: tuple[str, ...] = (RUN,)  # under which it is done; both where they differ
+    called: str = ""  # where it is not the name of `do`
 
     def inapplicable(self, robot: Robot) -> str:
         """Why a robot, or this machine, cannot have it, by the system that it is done to too; empty if it can."""
@@ -146,4 +150,14 @@ class Fault:
     @property
     def name(self) -> str:
         """What people call it."""
-        return self.do.__name__
+        return self.called or self.do.__name__
+
+
+def killed_and_stopped(
+    do: Callable[..., Outcome], killed: str, stopped: str, **more: Any
+) -> tuple[Fault, Fault]:
+    """Two faults that send SIGKILL or SIGSTOP to a process, by their names; `more` as of `Fault`."""
+    return (
+        Fault(partial(do, number=signal.SIGKILL), called=killed, **more),
+        Fault(partial(do, number=signal.SIGSTOP), called=stopped, **more),
+    )

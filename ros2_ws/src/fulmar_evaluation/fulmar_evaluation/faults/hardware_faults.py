@@ -13,7 +13,7 @@ from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.topics import AIR_BEARING, TRUTH
 from fulmar_core.safety.arbiter import BEARING_OFF
 from fulmar_core.worlds.scenario import load_scenario
-from fulmar_evaluation.faults.fault import Fault, Outcome
+from fulmar_evaluation.faults.fault import Fault, Outcome, killed_and_stopped
 from fulmar_evaluation.faults.fault_environment import FaultEnvironment, goal_of
 from fulmar_evaluation.faults.live_system import LiveSystem
 from fulmar_evaluation.faults.observer import wait_for
@@ -76,17 +76,8 @@ OWN_TIMEOUT_S = {Kobuki: kobuki.TIMEOUT_S, KingfisherNmea: kingfisher.TIMEOUT_S}
 REPORTS_S = 0.05  # an emulator moves and reports at its own rate
 
 
-def driver_killed(live: LiveSystem) -> Outcome:
-    """SIGKILL of the node that owns the device: the device's own watchdog stops it."""
-    return _driver(live, signal.SIGKILL)
-
-
-def driver_hangs(live: LiveSystem) -> Outcome:
-    """SIGSTOP of the same."""
-    return _driver(live, signal.SIGSTOP)
-
-
 def _driver(live: LiveSystem, number: signal.Signals) -> Outcome:
+    """The node that owns the device: the device's own watchdog stops it."""
     own_s = OWN_TIMEOUT_S[type(load_hardware(live.plan.hardware).driver)]
     return signalled(live, "plant", number, own_s + live.tick_s + REPORTS_S)
 
@@ -101,7 +92,9 @@ def _without_watchdog(robot: Robot) -> str:
 
 
 HARDWARE_FAULTS = (
-    Fault(driver_killed, FaultEnvironment(emulated=True), _without_watchdog),
-    Fault(driver_hangs, FaultEnvironment(emulated=True), _without_watchdog),
+    *killed_and_stopped(
+        _driver, "driver_killed", "driver_hangs",
+        about=FaultEnvironment(emulated=True), why_not=_without_watchdog,
+    ),
     Fault(bearing_late, FaultEnvironment(scenario=SCENARIO), _without_bearing, begins=False),
-)
+)  # fmt: skip

@@ -48,6 +48,19 @@ def changing(change: Callable[[Any], None]) -> Injection:
     return changed
 
 
+def frozen() -> Injection:
+    """The first message again and again, each with its own stamp."""
+    kept: list[Any] = []
+
+    def change(message: Any) -> Any:
+        kept.append(kept[0] if kept else copy.deepcopy(message))
+        again = copy.deepcopy(kept[0])
+        again.header.stamp = message.header.stamp
+        return again
+
+    return change
+
+
 def odometry_silent(live: LiveSystem) -> Outcome:
     """Nothing comes any more."""
     return intercept(live, lost, live.watchdog_s)
@@ -55,15 +68,7 @@ def odometry_silent(live: LiveSystem) -> Outcome:
 
 def odometry_frozen(live: LiveSystem) -> Outcome:
     """The same measurement with new stamps."""
-    kept: list[Odometry] = []
-
-    def change(message: Odometry) -> Odometry:
-        kept.append(kept[0] if kept else copy.deepcopy(message))
-        frozen = copy.deepcopy(kept[0])
-        frozen.header.stamp = message.header.stamp
-        return frozen
-
-    return intercept(live, change, (FROZEN_AFTER + 1) * live.tick_s)
+    return intercept(live, frozen(), (FROZEN_AFTER + 1) * live.tick_s)
 
 
 def odometry_not_a_number(live: LiveSystem) -> Outcome:

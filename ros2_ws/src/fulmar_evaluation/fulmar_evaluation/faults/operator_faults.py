@@ -14,7 +14,7 @@ from std_msgs.msg import Bool
 from fulmar_core.config.errors import RunFailed
 from fulmar_core.loop.teleop import JoyLayout
 from fulmar_core.robots.topics import ESTOP, JOY
-from fulmar_evaluation.faults.fault import Fault, Outcome, stopped
+from fulmar_evaluation.faults.fault import Fault, Outcome, killed_and_stopped, stopped
 from fulmar_evaluation.faults.fault_environment import FaultEnvironment
 from fulmar_evaluation.faults.live_system import LiveSystem
 from fulmar_evaluation.faults.observer import wait_for
@@ -45,18 +45,8 @@ TAKES_S = 10.0  # for a gamepad to be received, on a busy machine
 LAYOUT = JoyLayout()
 
 
-def teleop_killed(live: LiveSystem) -> Outcome:
-    """SIGKILL of the node that carries a hand, while it drives."""
-    return _hand(live, signal.SIGKILL)
-
-
-def teleop_hangs(live: LiveSystem) -> Outcome:
-    """SIGSTOP of the same."""
-    return _hand(live, signal.SIGSTOP)
-
-
 def _hand(live: LiveSystem, number: signal.Signals) -> Outcome:
-    """The robot stops, and the controller, which goes on commanding, does not get it back by that."""
+    """The node that carries a hand, while it drives: the robot stops, and the controller does not get it back."""
     live.until_it_moves()
     with _held_gamepad(live):
         if not wait_for(lambda: _commanded_by(live) == "person", TAKES_S):
@@ -95,6 +85,5 @@ def _held_gamepad(live: LiveSystem) -> Iterator[None]:
 
 OPERATOR_FAULTS = (
     Fault(estop_pressed_once_by_a_volatile_publisher),
-    Fault(teleop_killed, FaultEnvironment(by_hand=True)),
-    Fault(teleop_hangs, FaultEnvironment(by_hand=True)),
+    *killed_and_stopped(_hand, "teleop_killed", "teleop_hangs", about=FaultEnvironment(by_hand=True)),
 )

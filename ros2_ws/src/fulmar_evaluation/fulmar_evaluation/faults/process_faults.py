@@ -5,13 +5,21 @@ from __future__ import annotations
 import math
 import signal
 import time
-from collections.abc import Callable
+from functools import partial
 
 import psutil
 
 from fulmar_core.estimators.kinds import default_estimator, load_estimator
 from fulmar_core.robots.topics import MOCAP
-from fulmar_evaluation.faults.fault import STAYS_S, WORDS_S, Fault, Outcome, stopped, went_on
+from fulmar_evaluation.faults.fault import (
+    STAYS_S,
+    WORDS_S,
+    Fault,
+    Outcome,
+    killed_and_stopped,
+    stopped,
+    went_on,
+)
 from fulmar_evaluation.faults.fault_environment import FaultEnvironment, lost
 from fulmar_evaluation.faults.launched import LAUNCHERS
 from fulmar_evaluation.faults.live_system import LiveSystem
@@ -23,14 +31,9 @@ AGAIN_S = 30.0  # for a recorder to be started again, on a busy computer
 PROBLEM_S = 10.0  # a recorder looks at its disk now and then
 
 
-def controller_killed(live: LiveSystem) -> Outcome:
-    """SIGKILL of the node that commands."""
-    return signalled(live, "controller", signal.SIGKILL, live.silenced_s)
-
-
-def controller_hangs(live: LiveSystem) -> Outcome:
-    """SIGSTOP of the node that commands."""
-    return signalled(live, "controller", signal.SIGSTOP, live.silenced_s)
+def _controller(live: LiveSystem, number: signal.Signals) -> Outcome:
+    """The node that commands."""
+    return signalled(live, "controller", number, live.silenced_s)
 
 
 def estop_killed(live: LiveSystem) -> Outcome:
@@ -46,14 +49,9 @@ def estop_hangs(live: LiveSystem) -> Outcome:
     return signalled(live, "estop", signal.SIGSTOP, live.estop_silent_s)
 
 
-def estimator_killed(live: LiveSystem) -> Outcome:
-    """SIGKILL of the node that says where the robot is."""
-    return signalled(live, "estimator", signal.SIGKILL, live.watchdog_s + live.corrected_s)
-
-
-def estimator_hangs(live: LiveSystem) -> Outcome:
-    """SIGSTOP of the node that says where the robot is."""
-    return signalled(live, "estimator", signal.SIGSTOP, live.watchdog_s + live.corrected_s)
+def _estimator(live: LiveSystem, number: signal.Signals) -> Outcome:
+    """The node that says where the robot is."""
+    return signalled(live, "estimator", number, live.watchdog_s + live.corrected_s)
 
 
 def mocap_lost(live: LiveSystem) -> Outcome:
@@ -72,18 +70,11 @@ def signalled(live: LiveSystem, name: str, number: signal.Signals, limit_s: floa
     return stopped(live, since_s, limit_s)
 
 
-def plant_killed(live: LiveSystem) -> Outcome:
-    """SIGKILL of the plant: no actuator receives anything any more, and the controller commands what is safe."""
-    return _plant(live, signal.SIGKILL)
-
-
-def plant_hangs(live: LiveSystem) -> Outcome:
-    """SIGSTOP of the plant."""
-    return _plant(live, signal.SIGSTOP)
-
-
 def _plant(live: LiveSystem, number: signal.Signals) -> Outcome:
-    """Nothing is applied from then on; what a device then does by itself is another matter."""
+    """The plant: no actuator receives anything any more, and the controller commands what is safe.
+
+    What a device then does by itself is another matter.
+    """
     node = live.process("plant")
     since_s = live.until_it_moves()
     node.send_signal(number)
@@ -98,27 +89,7 @@ def _plant(live: LiveSystem, number: signal.Signals) -> Outcome:
     return Outcome(status.who if status else "", status.text if status else "", passed, last_s, limit_s)
 
 
-def goals_killed(live: LiveSystem) -> Outcome:
-    """SIGKILL of the goal node: the robot goes on to the last goal, and another goal node follows."""
-    return helper_lost(live, "goals", signal.SIGKILL)
-
-
-def goals_hang(live: LiveSystem) -> Outcome:
-    """SIGSTOP of the goal node."""
-    return helper_lost(live, "goals", signal.SIGSTOP)
-
-
-def markers_killed(live: LiveSystem) -> Outcome:
-    """SIGKILL of the node that draws for viewers: control goes on, and another one draws."""
-    return helper_lost(live, "markers", signal.SIGKILL)
-
-
-def markers_hang(live: LiveSystem) -> Outcome:
-    """SIGSTOP of the node that draws for viewers."""
-    return helper_lost(live, "markers", signal.SIGSTOP)
-
-
-def helper_lost(live: LiveSystem, name: str, number: signal.Signals) -> Outcome:
+def helper_lost(live: LiveSystem, number: signal.Signals, *, name: str) -> Outcome:
     """Send a signal to a node without which the robot goes on; the launcher has to start it again."""
     lost = live.process(name)
     since_s = live.until_it_moves()
@@ -138,17 +109,8 @@ def _is_started_again(live: LiveSystem, lost: psutil.Process, name: str) -> bool
     return True
 
 
-def recorder_killed(live: LiveSystem) -> Outcome:
-    """SIGKILL of the recorder, a power cut to the bag: control goes on, and another recorder goes on with the bag."""
-    return _recorder_lost(live, signal.SIGKILL)
-
-
-def recorder_stopped(live: LiveSystem) -> Outcome:
-    """SIGSTOP of the recorder for good: the same."""
-    return _recorder_lost(live, signal.SIGSTOP)
-
-
-def _recorder_lost(live: LiveSystem, number: signal.Signals) -> Outcome:
+def _recorder(live: LiveSystem, number: signal.Signals) -> Outcome:
+    """The recorder, a power cut to the bag: control goes on, and another recorder goes on with the bag."""
     since_s = live.until_it_moves()
     time.sleep(PAUSE_S)  # the bag gets something to lose
     lost = live.process("recorder")
@@ -220,26 +182,27 @@ def _problem(live: LiveSystem, since_s: float) -> HealthStatus | None:
     return next((status for status in statuses if status.level != "ok"), None)
 
 
-PLAIN: tuple[Callable[[LiveSystem], Outcome], ...] = (
-    controller_killed,
-    controller_hangs,
-    plant_killed,
-    plant_hangs,
-    estop_killed,
-    estop_hangs,
-    recorder_killed,
-    recorder_stopped,
-    recorder_hangs,
-    disk_full,
-)
 PROCESS_FAULTS = (
-    *(Fault(do, launchers=LAUNCHERS) for do in PLAIN),
-    *(
-        Fault(do, FaultEnvironment(by_goal_node=True), launchers=LAUNCHERS)
-        for do in (goals_killed, goals_hang)
+    *killed_and_stopped(_controller, "controller_killed", "controller_hangs", launchers=LAUNCHERS),
+    *killed_and_stopped(_plant, "plant_killed", "plant_hangs", launchers=LAUNCHERS),
+    Fault(estop_killed, launchers=LAUNCHERS),
+    Fault(estop_hangs, launchers=LAUNCHERS),
+    *killed_and_stopped(_recorder, "recorder_killed", "recorder_stopped", launchers=LAUNCHERS),
+    Fault(recorder_hangs, launchers=LAUNCHERS),
+    Fault(disk_full, launchers=LAUNCHERS),
+    # The robot goes on to the last goal, and another goal node follows.
+    *killed_and_stopped(
+        partial(helper_lost, name="goals"), "goals_killed", "goals_hang",
+        about=FaultEnvironment(by_goal_node=True), launchers=LAUNCHERS,
     ),
-    *(Fault(do, FaultEnvironment(drawn=True), launchers=LAUNCHERS) for do in (markers_killed, markers_hang)),
-    Fault(estimator_killed, FaultEnvironment(estimated=True), launchers=LAUNCHERS),
-    Fault(estimator_hangs, FaultEnvironment(estimated=True), launchers=LAUNCHERS),
+    # Control goes on, and another node draws.
+    *killed_and_stopped(
+        partial(helper_lost, name="markers"), "markers_killed", "markers_hang",
+        about=FaultEnvironment(drawn=True), launchers=LAUNCHERS,
+    ),
+    *killed_and_stopped(
+        _estimator, "estimator_killed", "estimator_hangs",
+        about=FaultEnvironment(estimated=True), launchers=LAUNCHERS,
+    ),
     Fault(mocap_lost, FaultEnvironment(estimated=True, intercepted=MOCAP)),
-)
+)  # fmt: skip

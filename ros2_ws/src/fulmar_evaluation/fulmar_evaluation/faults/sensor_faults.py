@@ -22,7 +22,7 @@ from fulmar_evaluation.faults.command_faults import DISCOVERY_S
 from fulmar_evaluation.faults.endurance import DistanceWatch, complaint, endured
 from fulmar_evaluation.faults.fault import Fault, Outcome, stopped
 from fulmar_evaluation.faults.fault_environment import ATTITUDE, RELAYED, FaultEnvironment, Injection
-from fulmar_evaluation.faults.input_faults import intercept
+from fulmar_evaluation.faults.input_faults import frozen, intercept
 from fulmar_evaluation.faults.live_system import LiveSystem, NothingShown
 from fulmar_evaluation.faults.observer import wait_for
 from fulmar_ros.qos import publisher_qos
@@ -34,19 +34,6 @@ SAID_S = 20.0  # until a drift that slow has left the noise of gyroscope and whe
 ASIDE_M = 0.5  # of a second odometry
 STRANGER_S = 0.02  # between its messages
 FIRST_S = 5.0  # for a message that it repeats
-
-
-def frozen() -> Injection:
-    """The first message again and again, each with its own stamp."""
-    kept: list[Any] = []
-
-    def change(message: Any) -> Any:
-        kept.append(kept[0] if kept else copy.deepcopy(message))
-        again = copy.deepcopy(kept[0])
-        again.header.stamp = message.header.stamp
-        return again
-
-    return change
 
 
 def since_first(change: Callable[[Any, float], None]) -> Injection:
