@@ -9,8 +9,9 @@
 
 from __future__ import annotations
 
+from fulmar_evaluation.bounds.by_kind import motions_of
 from fulmar_evaluation.bounds.choice import NamedBound, bound_of
-from fulmar_evaluation.bounds.motions import Motions, motions_of
+from fulmar_evaluation.bounds.motions import Motions
 from fulmar_evaluation.bounds.time_optimal import time_optimal_bound
 from fulmar_evaluation.bounds.top_speed import shortest_lengths, top_speed_bound
 from fulmar_evaluation.bounds.turn_limited import turn_limited_bound

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fulmar_core.robots.robot import Robot
-from fulmar_evaluation.bounds.motions import motions_of
+from fulmar_evaluation.bounds.by_kind import motions_of
 from fulmar_evaluation.bounds.time_optimal import time_optimal_bound
 from fulmar_evaluation.bounds.top_speed import top_speed_bound
 from fulmar_evaluation.bounds.turn_limited import turn_limited_bound

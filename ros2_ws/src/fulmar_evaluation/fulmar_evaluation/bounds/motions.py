@@ -9,7 +9,7 @@ import numpy as np
 from fulmar_core.robots.actuators.ackermann import Ackermann
 from fulmar_core.robots.actuators.differential_drive import DifferentialDrive
 from fulmar_core.robots.actuators.propellers import Propellers
-from fulmar_core.robots.actuators.response import Response
+from fulmar_core.robots.actuators.rolling import Rolling
 from fulmar_core.robots.robot import Robot
 from fulmar_core.states.gravity import GRAVITY
 from fulmar_evaluation.bounds.surge import Surge
@@ -45,33 +45,12 @@ class Motions:
         return np.concatenate((left, left * [1.0, -1.0]))
 
 
-def motions_of(robot: Robot) -> Motions | None:
-    """Steady speeds and turn rates of a robot of a family that moves along its heading.
+def in_water(robot: Robot, propellers: Propellers) -> Motions | None:
+    """Along the edge of what all propellers can do together, from the largest force to the largest moment and back.
 
-    Propellers: surge and yaw drag balance the thrusts; that a turning boat also slides sideways, slower and in a
-    tighter circle, is left out. Wheels: the limits of the drive, for cars also the friction of the tyres; they speed up
-    and stop by their slew, or by their motors' force if that is less.
-
-    Returns:
-        What it can hold; None for robots that move in all directions, or that nothing in the water slows down.
+    Surge and yaw drag balance the thrusts; that a turning boat also slides sideways, slower and in a tighter circle, is
+    left out. None for a robot that nothing in the water slows down.
     """
-    match robot.actuators:
-        case Propellers():
-            return _in_water(robot, robot.actuators)
-        case DifferentialDrive():
-            wheels = robot.actuators
-            return _on_two_wheels(
-                wheels, _rolling(wheels.response, 2.0 * wheels.wheel_force / robot.body.mass)
-            )
-        case Ackermann():
-            car = robot.actuators
-            return _on_steered_wheels(car, _rolling(car.response, car.wheel_force / robot.body.mass))
-        case _:
-            return None
-
-
-def _in_water(robot: Robot, propellers: Propellers) -> Motions | None:
-    """Along the edge of what all propellers can do together, from the largest force to the largest moment and back."""
     water = robot.hydrodynamics
     if water is None:
         return None
@@ -127,13 +106,16 @@ def _largest_moment(arms: np.ndarray, least: float, most: float) -> float:
     return float(np.sum(arms * np.asarray(found.x))) if found.success else 0.0
 
 
-def _rolling(response: Response, acceleration: float) -> Surge:
-    """Wheels on a straight; the lag of their servos changes no speed faster."""
-    most = min((acceleration, *response.slew[:1]))
+def _rolling(robot: Robot, wheels: Rolling) -> Surge:
+    """Wheels on a straight, by their slew, or by their motors' force if that is less.
+
+    The lag of their servos changes no speed faster.
+    """
+    most = min((wheels.pull / robot.body.mass, *wheels.response.slew[:1]))
     return Surge(1.0, _NO_DRAG, most, most)
 
 
-def _on_two_wheels(drive: DifferentialDrive, straight: Surge) -> Motions:
+def on_two_wheels(robot: Robot, drive: DifferentialDrive) -> Motions:
     """Corners of the box of speed and turn rate, cut where a wheel would be too fast."""
     half, rim = 0.5 * drive.track, drive.max_wheel_speed * drive.wheel_radius
     top, turn = min(drive.max_speed, rim), min(drive.max_yaw_rate, rim / half)
@@ -141,14 +123,14 @@ def _on_two_wheels(drive: DifferentialDrive, straight: Surge) -> Motions:
     both = [(sign * v, w) for v, w in corners for sign in (1.0, -1.0)]
     both.append((0.0, turn))
     turns = tuple(dict.fromkeys((v, w) for v, w in both if w > 0.0))
-    return Motions(top, top, turns, straight)
+    return Motions(top, top, turns, _rolling(robot, drive))
 
 
-def _on_steered_wheels(car: Ackermann, straight: Surge) -> Motions:
+def on_steered_wheels(robot: Robot, car: Ackermann) -> Motions:
     """The tightest circle, as fast as the tyres hold, and wider ones at higher speeds."""
     tightest, grip = np.tan(car.max_steering) / car.wheelbase, car.friction * GRAVITY
     turns = []
     for speed in np.linspace(min(car.max_speed, np.sqrt(grip / tightest)), car.max_speed, 4):
         rate = float(min(speed * tightest, grip / speed))
         turns += [(float(speed), rate), (-float(speed), rate)]
-    return Motions(car.max_speed, car.max_speed, tuple(dict.fromkeys(turns)), straight)
+    return Motions(car.max_speed, car.max_speed, tuple(dict.fromkeys(turns)), _rolling(robot, car))
