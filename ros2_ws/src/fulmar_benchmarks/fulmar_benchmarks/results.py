@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic, Self, TypeVar
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from fulmar_core.simulation.episode import Episode
 from fulmar_evaluation.evaluation import Trial
 from fulmar_evaluation.waypoint_score import WaypointBound, waypoint_bound
 
+Key = TypeVar("Key")
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)  # of what is kept over time
 FIGURE, MORE = "figure:", "more:"  # prefixes of figures and of further arrays in a file
 
@@ -65,6 +67,19 @@ class PairResult:
                 more=named[MORE],
                 **{name: file[name] for name in _ARRAYS},
             )
+
+
+@dataclass(frozen=True)
+class CampaignResult(Generic[Key]):
+    """The document of a benchmark, and what plots are drawn from: the outcomes that there are."""
+
+    document: dict[str, Any]
+    outcomes: dict[Key, PairResult]
+
+    @classmethod
+    def of(cls, document: dict[str, Any], found: Mapping[Key, PairResult | str]) -> Self:
+        """Of everything that was found, or why it was not."""
+        return cls(document, {key: one for key, one in found.items() if isinstance(one, PairResult)})
 
 
 _ARRAYS = tuple(each.name for each in fields(PairResult) if each.name not in ("about", "figures", "more"))

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import replace
 
 from fulmar_benchmarks.drift.bounds import physics_of
 from fulmar_benchmarks.drift.conditions import (
@@ -18,13 +17,12 @@ from fulmar_benchmarks.drift.conditions import (
     POSE_TASK,
     ROBOT,
 )
-from fulmar_benchmarks.drift.document import Request, document_of
+from fulmar_benchmarks.drift.document import Key, Request, document_of
 from fulmar_benchmarks.drift.unit import DriftUnit
-from fulmar_benchmarks.pairs import Pair, code_hash, hash_of, with_law, with_policy
-from fulmar_benchmarks.results import PairResult
+from fulmar_benchmarks.pairs import Pair, code_hash, hash_of, plan_of, with_law, with_policy
+from fulmar_benchmarks.results import CampaignResult
 from fulmar_benchmarks.unit import Unit
 from fulmar_benchmarks.workers import Outcome, evaluate_units
-from fulmar_bringup.run_plan import RunPlan
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.simulation.counts import check_episodes
 from fulmar_core.simulation.episode import episode_steps
@@ -33,20 +31,12 @@ from fulmar_evaluation.evaluation import Trial
 from policy_server.controllers import policies_directory
 
 
-@dataclass(frozen=True)
-class CampaignResult:
-    """The document, and what plots are drawn from."""
-
-    document: dict[str, Any]
-    outcomes: dict[tuple[str, str], PairResult]  # by row and controller
-
-
 def run_drift(
     request: Request,
     *,
     progress: Callable[[float, float], None],
     on_done: Callable[[Unit, Outcome, bool], None],
-) -> CampaignResult:
+) -> CampaignResult[Key]:
     """Evaluate every controller in every row, but for what was evaluated before with the same code and configuration.
 
     Arguments beside the request as of `evaluate_units`.
@@ -93,7 +83,7 @@ def run_drift(
         },
         wall_s=time.monotonic() - began,
     )
-    return CampaignResult(document, {key: one for key, one in found.items() if isinstance(one, PairResult)})
+    return CampaignResult.of(document, found)
 
 
 def _task_of_row(row: str) -> str:
@@ -120,18 +110,12 @@ def _unit(request: Request, row: str, controller: str, pair: Pair, code: str) ->
 def _trial(request: Request, row: str, pair: Pair) -> Trial:
     condition = next((one for one in CONDITIONS if one.name == row), None)
     path = next((one for one in PATHS if one.name == row), None)
-    plan = RunPlan(
-        robot=ROBOT,
-        task=pair.task,
-        controller=pair.controller,
-        backend="mujoco",
-        control_hz=load_robot(ROBOT).timing.control_hz,
-        policy=pair.policy,
+    plan = plan_of(
+        pair,
         scenario=condition.scenario if condition else PATH_SCENARIO,
         seed=request.seed,
-        duration_s=PATH_EPISODE_S if path else load_task(pair.task).episode_s,
-        lockstep=True,
-        goals=path.goals if path else "",
+        duration_s=PATH_EPISODE_S if path else None,
     )
+    plan = replace(plan, goals=path.goals if path else "")
     episodes = min(request.episodes, PATH_EPISODES) if path else request.episodes
     return Trial(plan, request.through, episodes, episodes, request.jobs)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from typing import Any, cast
 
 from fulmar_benchmarks.pairs import Pair, code_hash, hash_of, plan_of, with_law, with_policy
@@ -21,7 +20,7 @@ from fulmar_benchmarks.rans3d.targets import (
     how_to_make,
 )
 from fulmar_benchmarks.rans3d.unit import SpaceTrial, SpaceUnit
-from fulmar_benchmarks.results import PairResult
+from fulmar_benchmarks.results import CampaignResult
 from fulmar_benchmarks.unit import Unit
 from fulmar_benchmarks.workers import Outcome, evaluate_units
 from fulmar_core.robots.robot_file import load_robot
@@ -33,20 +32,12 @@ from policy_server.controllers import policies_directory
 WAY = "mujoco"
 
 
-@dataclass(frozen=True)
-class CampaignResult:
-    """The document, and what plots are drawn from."""
-
-    document: dict[str, Any]
-    outcomes: dict[Key, PairResult] = field(default_factory=dict)  # by robot, task, controller and scenario
-
-
 def run_rans3d(
     request: Request,
     *,
     progress: Callable[[float, float], None],
     on_done: Callable[[Unit, Outcome, bool], None],
-) -> CampaignResult:
+) -> CampaignResult[Key]:
     """Measure everything that is asked for; evaluations with the same code and configuration are not repeated.
 
     Arguments beside the request as of `evaluate_units`.
@@ -83,7 +74,7 @@ def run_rans3d(
     document = document_of(
         request, pairs=pairs, keys=keys, found=found, wall_s=time.monotonic() - began, **parts
     )
-    return CampaignResult(document, {key: one for key, one in found.items() if isinstance(one, PairResult)})
+    return CampaignResult.of(document, found)
 
 
 def _keys(request: Request) -> list[Key]:

@@ -12,11 +12,11 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Polygon
 from matplotlib.patheffects import withStroke
-from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
+from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullLocator
 
 from fulmar_core.robots.robot import Body
 from fulmar_core.tasks.terms import Tolerance
-from fulmar_evaluation.report.style import DASHED, FAINT, INK, PAPER
+from fulmar_evaluation.report.style import DASHED, FAINT, INK, PAPER, quiet_grid
 
 WIDTH = 9.2  # of a figure that fills the page of a benchmark [inch]
 LENGTHS = {0.001: "1 mm", 0.01: "1 cm", 0.1: "10 cm", 1.0: "1 m", 10.0: "10 m"}
@@ -52,6 +52,16 @@ def log_scale(axis: Axis, marks: dict[float, str] | Sequence[float]) -> None:
     axis.set_major_locator(FixedLocator(list(labels)))
     axis.set_major_formatter(FuncFormatter(lambda value, _: labels.get(value, "")))
     axis.set_minor_locator(NullLocator())
+
+
+def share_axis(axes: Axes, ticks: MaxNLocator) -> None:
+    """A horizontal axis of shares in percent over rows with names of their own."""
+    axes.xaxis.set_major_locator(ticks)
+    axes.xaxis.set_major_formatter(lambda value, _: f"{100.0 * value:.0f} %")
+    quiet_grid(axes)
+    axes.grid(False, axis="y")
+    axes.spines["left"].set_visible(False)
+    axes.tick_params(axis="y", length=0.0)
 
 
 def limit_line(axes: Axes, value: float, label: str = "") -> None:

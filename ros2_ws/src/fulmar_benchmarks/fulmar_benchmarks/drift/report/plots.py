@@ -11,9 +11,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from fulmar_benchmarks.drift.campaign import CampaignResult
 from fulmar_benchmarks.drift.cells import display_name
-from fulmar_benchmarks.results import PairResult
+from fulmar_benchmarks.drift.document import Key
+from fulmar_benchmarks.results import CampaignResult, PairResult
 from fulmar_evaluation.report.drawing import (
     ANGLES,
     LENGTHS,
@@ -45,7 +45,7 @@ class View:
         return float(self.outcome.about["control_dt"]) * np.arange(1, steps + 1)
 
 
-def views(result: CampaignResult, kind: str) -> dict[str, list[View]]:
+def views(result: CampaignResult[Key], kind: str) -> dict[str, list[View]]:
     """By row, every controller that has a result in it."""
     document: dict[str, Any] = result.document
     colour = dict(zip(document["controllers"], colours(document["controllers"]), strict=True))

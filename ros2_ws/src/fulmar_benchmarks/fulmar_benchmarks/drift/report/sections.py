@@ -9,7 +9,6 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from fulmar_benchmarks.cells import as_html
-from fulmar_benchmarks.drift.campaign import CampaignResult
 from fulmar_benchmarks.drift.cells import (
     PATH_HEADS,
     Line,
@@ -20,10 +19,12 @@ from fulmar_benchmarks.drift.cells import (
     pose_lines,
     unmet,
 )
+from fulmar_benchmarks.drift.document import Key
 from fulmar_benchmarks.drift.report.path_plots import draw_paths, draw_starts
 from fulmar_benchmarks.drift.report.plots import draw_glance, draw_row, draw_rows, views
 from fulmar_benchmarks.drift.tables import conclusion, notes
 from fulmar_benchmarks.drift.targets import BANDS
+from fulmar_benchmarks.results import CampaignResult
 from fulmar_evaluation.report.page import Part, Plot, cells, faint, headline, origin, table
 from fulmar_evaluation.report.style import house_style
 from fulmar_evaluation.report.writer import write_benchmark
@@ -40,13 +41,13 @@ tr.first td { border-top: 2px solid var(--rule) }
 )
 
 
-def write_report(result: CampaignResult, out: Path) -> Path:
+def write_report(result: CampaignResult[Key], out: Path) -> Path:
     """Write the page and its plots into a folder; returns the page."""
     with house_style():
         return write_benchmark(out, "Fulmar beside DRIFT", _parts(result), style=_STYLE)
 
 
-def _parts(result: CampaignResult) -> list[Part]:
+def _parts(result: CampaignResult[Key]) -> list[Part]:
     document = result.document
     who = " and ".join(display_name(name) for name in document["controllers"])
     poses, paths = pose_lines(document), path_lines(document)
@@ -64,7 +65,7 @@ def _parts(result: CampaignResult) -> list[Part]:
     return [*parts, "<h2>Plots</h2>", *_plots(result), *origin(document, "drift.json")]
 
 
-def _plots(result: CampaignResult) -> list[Plot]:
+def _plots(result: CampaignResult[Key]) -> list[Plot]:
     drawn: list[Plot] = []
 
     def add(name: str, title: str, caption: str, figure: Figure) -> None:

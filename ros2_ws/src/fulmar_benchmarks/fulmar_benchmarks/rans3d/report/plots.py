@@ -27,6 +27,7 @@ from fulmar_evaluation.report.drawing import (
     key,
     limit_line,
     log_scale,
+    share_axis,
 )
 from fulmar_evaluation.report.style import FAINT, INK, colours, quiet_grid
 
@@ -67,13 +68,8 @@ def draw_glance(document: dict[str, Any]) -> Figure:
         axes.set_ylim(at - 0.4, -0.6)
         low = _lowest(tasks)
         axes.set_xlim(low - 0.02 * (1.0 - low), 1.0 + 0.02 * (1.0 - low))
-        axes.xaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
         axes.set_yticks(ticks, labels)
-        axes.xaxis.set_major_formatter(lambda value, _: f"{100.0 * value:.0f} %")
-        quiet_grid(axes)
-        axes.grid(False, axis="y")
-        axes.spines["left"].set_visible(False)
-        axes.tick_params(axis="y", length=0.0)
+        share_axis(axes, MaxNLocator(5, steps=[1, 2, 5, 10]))
     key(figure, _KEY)
     return figure
 

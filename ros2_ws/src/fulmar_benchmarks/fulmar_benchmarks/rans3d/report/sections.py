@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from fulmar_benchmarks.cells import as_html, display_name, tone_of
-from fulmar_benchmarks.rans3d.campaign import CampaignResult
+from fulmar_benchmarks.rans3d.document import Key
 from fulmar_benchmarks.rans3d.report.plots import draw_glance, draw_over_time, shown
 from fulmar_benchmarks.rans3d.tables import (
     HEADS,
@@ -18,6 +18,7 @@ from fulmar_benchmarks.rans3d.tables import (
     other_lines,
     robots_of,
 )
+from fulmar_benchmarks.results import CampaignResult
 from fulmar_evaluation.report.page import Part, Plot, cells, faint, headline, origin, table
 from fulmar_evaluation.report.style import house_style
 from fulmar_evaluation.report.writer import write_benchmark
@@ -31,13 +32,13 @@ The median of all nominal episodes, with the band of nine in ten; the dashed lin
 make an episode a success. At track velocities the errors jump where a new target comes."""
 
 
-def write_report(result: CampaignResult, out: Path) -> Path:
+def write_report(result: CampaignResult[Key], out: Path) -> Path:
     """Write the page and its plots into a folder; returns the page."""
     with house_style():
         return write_benchmark(out, "Fulmar at the 3-D tasks of RANS", _parts(result))
 
 
-def _parts(result: CampaignResult) -> list[Part]:
+def _parts(result: CampaignResult[Key]) -> list[Part]:
     document = result.document
     parts: list[Part] = [headline(conclusion(document))]
     robots = robots_of(document)

@@ -12,8 +12,8 @@ from matplotlib.ticker import MaxNLocator
 from fulmar_benchmarks.cells import display_name
 from fulmar_benchmarks.roboran.cells import head
 from fulmar_benchmarks.roboran.report.view import ROBOT_COLOURS
-from fulmar_evaluation.report.drawing import WIDTH, key, ring
-from fulmar_evaluation.report.style import ALARM, FAINT, INK, PAPER, quiet_grid
+from fulmar_evaluation.report.drawing import WIDTH, key, ring, share_axis
+from fulmar_evaluation.report.style import ALARM, FAINT, INK, PAPER
 
 _ROW = 0.27  # height of a row [inch]
 
@@ -50,12 +50,7 @@ def draw_glance(document: dict[str, Any]) -> Figure:
     low = _lowest(document)
     axes.set_xlim(low, 1.012)
     axes.set_yticks(ticks, labels)
-    axes.xaxis.set_major_locator(MaxNLocator(steps=[1, 2, 5, 10]))  # at whole percents, as they are printed
-    axes.xaxis.set_major_formatter(lambda value, _: f"{100.0 * value:.0f} %")
-    quiet_grid(axes)
-    axes.grid(False, axis="y")
-    axes.spines["left"].set_visible(False)
-    axes.tick_params(axis="y", length=0.0)
+    share_axis(axes, MaxNLocator(steps=[1, 2, 5, 10]))  # at whole percents, as they are printed
     key(figure, _KEY)
     return figure
 
