@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from fulmar_core.config.errors import ConfigError
-from fulmar_core.robots.actuators.thrusters import Thrusters
 from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.topics import SIMULATION_START_NS
 from fulmar_core.simulation.episode import draw_episode
@@ -100,7 +99,7 @@ def _without_parts(scenario: str) -> Callable[[Robot], str]:
 
 
 def _without_valves(robot: Robot) -> str:
-    return "" if isinstance(robot.actuators, Thrusters) else "no valves feed it from one supply"
+    return "" if robot.actuators.opens_late else "no valves feed it from one supply"
 
 
 def _fault(do: Callable[[LiveSystem], Outcome]) -> Fault:

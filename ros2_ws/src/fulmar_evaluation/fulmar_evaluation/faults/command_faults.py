@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import math
-import threading
 import time
 from dataclasses import replace
 
-import rclpy
 from geometry_msgs.msg import TwistStamped
 from sensor_msgs.msg import JointState
 
@@ -15,7 +13,7 @@ from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.topics import VELOCITY_COMMAND, command_wire
 from fulmar_evaluation.faults.fault import STAYS_S, Fault, Outcome, stopped, went_on
 from fulmar_evaluation.faults.fault_environment import COMMANDS, FaultEnvironment, delayed
-from fulmar_evaluation.faults.live_system import LiveSystem
+from fulmar_evaluation.faults.live_system import LiveSystem, repeated
 from fulmar_evaluation.faults.two_hosts import CUT, LOSSY, why_not
 from fulmar_ros.qos import publisher_qos
 
@@ -55,25 +53,11 @@ def commands_from_another_node(live: LiveSystem) -> Outcome:
     """A second node publishes good commands while the controller goes on: the plant obeys neither, and names both."""
     wire, robot = command_wire(live.robot), live.robot
     message = _message(live, list(robot.actuators.names), [1.0] * len(robot.actuators.names))
-    node = rclpy.create_node("stranger", namespace=live.plan.namespace)
-    over = threading.Event()
-    try:
+    with live.stranger() as node:
         since_s = live.until_a_move_is_on_record()
         publisher = node.create_publisher(type(message), wire.name, publisher_qos(wire))
-
-        def talk() -> None:
-            while not over.wait(STRANGER_S):
-                publisher.publish(message)
-
-        thread = threading.Thread(target=talk, name="stranger", daemon=True)
-        thread.start()
-        try:
+        with repeated(lambda: publisher.publish(message), STRANGER_S):
             outcome = stopped(live, since_s, DISCOVERY_S + live.tick_s + live.ramp_s)
-        finally:
-            over.set()
-            thread.join()
-    finally:
-        node.destroy_node()
     names = ", ".join(f"{live.plan.namespace}/{node}" for node in ("controller", "stranger"))
     return replace(outcome, passed=outcome.passed and names in outcome.reaction)
 

@@ -7,7 +7,6 @@ import signal
 import time
 
 import psutil
-import rclpy
 from rcl_interfaces.srv import GetParameters
 
 from fulmar_core.robots.robot import Robot
@@ -77,8 +76,7 @@ def _lives(process: psutil.Process) -> bool:
 
 def out_of_memory(live: LiveSystem) -> Outcome:
     """The controller gets no more memory than it has, and a request of 64 MB comes: it goes on, or ends in words."""
-    node = rclpy.create_node("stranger", namespace=live.plan.namespace)
-    try:
+    with live.stranger() as node:
         # Of its parameters, which no other node reads and no recorder records.
         client = node.create_client(GetParameters, "controller/get_parameters")
         client.wait_for_service(MATCH_S)
@@ -87,8 +85,6 @@ def out_of_memory(live: LiveSystem) -> Outcome:
         controller.rlimit(psutil.RLIMIT_AS, (controller.memory_info().vms, psutil.RLIM_INFINITY))
         client.call_async(request)
         return _safe_or_on(live, since_s, live.silenced_s)
-    finally:
-        node.destroy_node()
 
 
 def _safe_or_on(live: LiveSystem, since_s: float, limit_s: float) -> Outcome:

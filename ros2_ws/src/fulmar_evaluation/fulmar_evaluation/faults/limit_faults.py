@@ -10,7 +10,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import rclpy
 from nav_msgs.msg import Odometry
 
 from fulmar_bags.message_reader import stamp_ns
@@ -152,16 +151,13 @@ def _offer_goal(live: LiveSystem, numbers: list[float], change: Callable[[Any], 
     goal = goal_at(form.target_at(numbers).tolist())
     message = goal_message(goal, wire.name, SIMULATION_START_NS + 1, live.plan.frames, form=form)
     change(message)
-    node = rclpy.create_node("stranger", namespace=live.plan.namespace)
-    try:
+    with live.stranger() as node:
         publisher = node.create_publisher(TYPES[wire.name], wire.name, publisher_qos(wire))
         wait_for(lambda: publisher.get_subscription_count() > 0, MATCH_S)
         since_s = live.until_it_moves()
         publisher.publish(message)
         wait_for(lambda: bool(_refusal(live, since_s)), WORDS_S)
         time.sleep(STAYS_S)
-    finally:
-        node.destroy_node()
     reaction = _refusal(live, since_s)
     return went_on(
         live,

@@ -5,11 +5,13 @@ from __future__ import annotations
 import contextlib
 import os
 import signal
+import threading
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import psutil
+import rclpy
 from rclpy.node import Node
 
 from fulmar_bringup.launched_command import LaunchedCommand
@@ -222,6 +224,15 @@ class LiveSystem:
             raise NothingShown("the robot stopped by itself before the fault; the fault would show nothing")
         return since_s
 
+    @contextlib.contextmanager
+    def stranger(self) -> Iterator[Node]:
+        """Another node in the namespace of the robot."""
+        node = rclpy.create_node("stranger", namespace=self.plan.namespace)
+        try:
+            yield node
+        finally:
+            node.destroy_node()
+
     def signal_launcher(self, number: signal.Signals) -> None:
         """Send a signal to the launcher, if it still runs."""
         if not self.has_ended:
@@ -236,6 +247,24 @@ class LiveSystem:
     def send(self, name: str, number: signal.Signals) -> None:
         """Send a signal to a node."""
         self.process(name).send_signal(number)
+
+
+@contextlib.contextmanager
+def repeated(publish: Callable[[], None], every_s: float) -> Iterator[None]:
+    """Publish something again and again meanwhile, in a thread of its own [s]."""
+    over = threading.Event()
+
+    def talk() -> None:
+        while not over.wait(every_s):
+            publish()
+
+    thread = threading.Thread(target=talk, name="repeated", daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        over.set()
+        thread.join()
 
 
 @contextlib.contextmanager

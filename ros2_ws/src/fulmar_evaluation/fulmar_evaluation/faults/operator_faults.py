@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import signal
-import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 
-import rclpy
 from sensor_msgs.msg import Joy
 from std_msgs.msg import Bool
 
@@ -16,7 +13,7 @@ from fulmar_core.loop.teleop import JoyLayout
 from fulmar_core.robots.topics import ESTOP, JOY
 from fulmar_evaluation.faults.fault import Fault, Outcome, killed_and_stopped, stopped
 from fulmar_evaluation.faults.fault_environment import FaultEnvironment
-from fulmar_evaluation.faults.live_system import LiveSystem
+from fulmar_evaluation.faults.live_system import LiveSystem, repeated
 from fulmar_evaluation.faults.observer import wait_for
 from fulmar_ros.qos import publisher_qos
 
@@ -27,8 +24,7 @@ MATCH_S = 10.0
 
 def estop_pressed_once_by_a_volatile_publisher(live: LiveSystem) -> Outcome:
     """One message; the e-stop node, which goes on publishing, must not end it."""
-    node = rclpy.create_node("stranger", namespace=live.plan.namespace)
-    try:
+    with live.stranger() as node:
         publisher = node.create_publisher(Bool, ESTOP.name, DEFAULT_QOS)
         # A volatile publisher matches one of the two subscriptions of each node.
         if not wait_for(lambda: publisher.get_subscription_count() >= NODES, MATCH_S):
@@ -36,8 +32,6 @@ def estop_pressed_once_by_a_volatile_publisher(live: LiveSystem) -> Outcome:
         since_s = live.until_a_move_is_on_record()
         publisher.publish(Bool(data=True))
         return stopped(live, since_s, live.silenced_s)
-    finally:
-        node.destroy_node()
 
 
 GAMEPAD_S = 0.05  # between its messages
@@ -62,25 +56,12 @@ def _commanded_by(live: LiveSystem) -> str:
     return statuses[-1].values.get("commanded_by", "") if statuses else ""
 
 
-@contextmanager
-def _held_gamepad(live: LiveSystem) -> Iterator[None]:
+def _held_gamepad(live: LiveSystem) -> AbstractContextManager[None]:
     """A gamepad whose switch is held and whose stick is pushed ahead."""
     axes, buttons = [0.0] * (max(LAYOUT.axes) + 1), [0] * (LAYOUT.give_back_button + 1)
     axes[LAYOUT.ahead_axis], buttons[LAYOUT.deadman_button] = 1.0, 1
     publisher = live.bystander.create_publisher(Joy, JOY.name, publisher_qos(JOY))
-    over = threading.Event()
-
-    def hold() -> None:
-        while not over.wait(GAMEPAD_S):
-            publisher.publish(Joy(axes=axes, buttons=buttons))
-
-    thread = threading.Thread(target=hold, name="gamepad", daemon=True)
-    thread.start()
-    try:
-        yield
-    finally:
-        over.set()
-        thread.join()
+    return repeated(lambda: publisher.publish(Joy(axes=axes, buttons=buttons)), GAMEPAD_S)
 
 
 OPERATOR_FAULTS = (

@@ -7,7 +7,6 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
-import rclpy
 from std_msgs.msg import String
 
 from fulmar_core.config.errors import RunFailed
@@ -123,8 +122,7 @@ def _resealed(live: LiveSystem, **changes: object) -> Path:
 
 
 def _offer(live: LiveSystem, folder: Path, *, wanted: str) -> Outcome:
-    node = rclpy.create_node("stranger", namespace=live.plan.namespace)
-    try:
+    with live.stranger() as node:
         publisher = node.create_publisher(String, SWAP.name, publisher_qos(SWAP))
         wait_for(lambda: publisher.get_subscription_count() > 0, ANSWER_S)
         since_s = live.until_it_moves()
@@ -136,8 +134,6 @@ def _offer(live: LiveSystem, folder: Path, *, wanted: str) -> Outcome:
 
         reported = wait_for(lambda: answer().startswith(("done", "refused")), ANSWER_S)
         time.sleep(GOES_ON_S)
-    finally:
-        node.destroy_node()
     reaction = answer().replace(str(folder), "the bundle")
     return went_on(
         live,

@@ -1,32 +1,32 @@
-"""Sensors that freeze, drift or creep while a robot moves, and a second source of what it follows."""
+"""Sensors that die, freeze, drift or creep while a robot moves, and a second source of what it follows."""
 
 from __future__ import annotations
 
 import copy
 import math
-import threading
 import time
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-import rclpy
 from nav_msgs.msg import Odometry
 
 from fulmar_bags.message_reader import stamp_ns
 from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.sensors.repetition import FEWEST
-from fulmar_core.robots.topics import MOCAP, ODOMETRY
+from fulmar_core.robots.topics import IMU, MOCAP, ODOMETRY
 from fulmar_evaluation.faults.by_kind import FAULTS
 from fulmar_evaluation.faults.command_faults import DISCOVERY_S
 from fulmar_evaluation.faults.endurance import DistanceWatch, complaint, endured
-from fulmar_evaluation.faults.fault import Fault, Outcome, stopped
-from fulmar_evaluation.faults.fault_environment import ATTITUDE, RELAYED, FaultEnvironment, Injection
+from fulmar_evaluation.faults.fault import Fault, Outcome, stopped, went_on
+from fulmar_evaluation.faults.fault_environment import ATTITUDE, RELAYED, FaultEnvironment, Injection, lost
 from fulmar_evaluation.faults.input_faults import frozen, intercept
-from fulmar_evaluation.faults.live_system import LiveSystem, NothingShown
+from fulmar_evaluation.faults.live_system import LiveSystem, NothingShown, repeated
 from fulmar_evaluation.faults.observer import wait_for
 from fulmar_ros.qos import publisher_qos
 
+REPLACED_S = 10.0  # until the estimator has replaced a gyroscope that it lacks
+GOES_ON_S = 5.0  # in which it is seen whether the controller goes on
 NOISE_S = 1.0  # beyond the watchdog: what repeats of a noisy value, or slow drifts, take to tell
 REPEATS = FEWEST + 2  # readings of a slow sensor until it is known to be frozen, the one under way among them
 DRIFT_DEG = 0.05  # per second, of a star tracker [deg/s]
@@ -95,28 +95,19 @@ def two_odometries(live: LiveSystem) -> Outcome:
         return message
 
     live.injector.change = listen
-    node, over = rclpy.create_node("stranger", namespace=live.plan.namespace), threading.Event()
-    try:
+    with live.stranger() as node:
         since_s = live.until_a_move_is_on_record()
         if not wait_for(lambda: bool(newest), FIRST_S):
             raise NothingShown("no odometry came, so a second one would show nothing")
         publisher = node.create_publisher(Odometry, ODOMETRY.name, publisher_qos(ODOMETRY))
 
         def talk() -> None:
-            while not over.wait(STRANGER_S):
-                message = copy.deepcopy(newest[0])
-                message.pose.pose.position.y += ASIDE_M
-                publisher.publish(message)
+            message = copy.deepcopy(newest[0])
+            message.pose.pose.position.y += ASIDE_M
+            publisher.publish(message)
 
-        thread = threading.Thread(target=talk, name="stranger", daemon=True)
-        thread.start()
-        try:
+        with repeated(talk, STRANGER_S):
             outcome = stopped(live, since_s, DISCOVERY_S + live.watchdog_s + live.corrected_s)
-        finally:
-            over.set()
-            thread.join()
-    finally:
-        node.destroy_node()
     named = complaint(live, since_s, lambda words: "stranger" in words and "bystander" in words)
     if named is None:
         return replace(outcome, passed=False)
@@ -132,12 +123,44 @@ def _said(live: LiveSystem, change: Injection, limit_s: float) -> Outcome:
     return endured(live, since_s, limit_s, distance)
 
 
+def gyroscope_dies(live: LiveSystem) -> Outcome:
+    """The gyroscope falls silent: the attitude goes on with the turn rate that event cameras see in the stars."""
+    since_s = live.until_it_moves()
+    wait_for(lambda: _rate_source(live, since_s) == "gyroscope", REPLACED_S)
+    live.injector.change = lost
+    died_s = time.monotonic()
+    replaced = wait_for(lambda: _rate_source(live, died_s) == "events", REPLACED_S)
+    time.sleep(GOES_ON_S)
+    source = _rate_source(live, died_s) or "nothing"
+    return went_on(
+        live,
+        died_s,
+        detected_by="estimator" if replaced else "",
+        reaction=f"turn rate from {source}; control goes on",
+        correct=replaced and source == "events",
+    )
+
+
+def _rate_source(live: LiveSystem, since_s: float) -> str:
+    """What the estimator has last said that its turn rate comes from; empty if nothing since then."""
+    statuses = live.observer.statuses_since(since_s)
+    return next((each.values["rate_from"] for each in reversed(statuses) if "rate_from" in each.values), "")
+
+
+def _without_events(robot: Robot) -> str:
+    return "" if robot.event_cameras else f"'{robot.name}' has no event camera"
+
+
 def _without_satellites(robot: Robot) -> str:
     outdoors = robot.kind.outdoors or robot.hydrodynamics is not None
     return "" if outdoors else "no satellite navigation is in its loop"
 
 
 SENSOR_FAULTS = (
+    # With event cameras at work; their scenario kills its own gyroscope later.
+    Fault(
+        gyroscope_dies, FaultEnvironment(scenario="gyro_dies", intercepted=IMU, nadir=True), _without_events
+    ),
     Fault(mocap_frozen, FaultEnvironment(estimated=True, intercepted=MOCAP)),
     Fault(star_tracker_frozen, FaultEnvironment(estimated=True, intercepted=ATTITUDE)),
     Fault(star_tracker_drifts, FaultEnvironment(estimated=True, intercepted=ATTITUDE)),

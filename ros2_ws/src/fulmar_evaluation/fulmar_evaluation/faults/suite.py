@@ -30,7 +30,6 @@ from fulmar_evaluation.faults.observer import BagEvidence, bag_evidence, wait_fo
 from fulmar_evaluation.faults.operator_faults import OPERATOR_FAULTS
 from fulmar_evaluation.faults.policy_faults import POLICY_FAULTS
 from fulmar_evaluation.faults.process_faults import PROCESS_FAULTS
-from fulmar_evaluation.faults.satellite_faults import SATELLITE_FAULTS
 from fulmar_evaluation.faults.sensor_faults import SENSOR_FAULTS
 from fulmar_evaluation.faults.two_hosts import ACROSS, TwoHosts, inside, two_hosts
 
@@ -43,7 +42,6 @@ EVERY = (
     *COMMAND_FAULTS,
     *POLICY_FAULTS,
     *CABLE_FAULTS,
-    *SATELLITE_FAULTS,
     *SENSOR_FAULTS,
     *ACTUATOR_FAULTS,
     *HOST_FAULTS,

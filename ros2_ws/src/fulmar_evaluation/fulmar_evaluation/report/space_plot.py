@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -14,8 +15,14 @@ from matplotlib.patches import Circle
 from fulmar_core.states.rotation import rotate
 from fulmar_evaluation.report.drawing import colour_lines, spaced
 from fulmar_evaluation.report.run_view import View, evaluated
-from fulmar_evaluation.report.style import BODY_AXES, DASHED, FAINT, INK, PAPER, quiet_grid
-from fulmar_evaluation.report.trajectory_plot import OUTLINES, draw_near, given_targets, has_place
+from fulmar_evaluation.report.style import BODY_AXES, DASHED, INK, PAPER, quiet_grid
+from fulmar_evaluation.report.trajectory_plot import (
+    OUTLINES,
+    draw_near,
+    draw_waypoints,
+    given_targets,
+    has_place,
+)
 from fulmar_evaluation.run_evaluation import RunResult
 
 PANEL = 2.5  # width of one of the two views on a page [inch]
@@ -135,10 +142,11 @@ def _path(axes: Axes, runs: Sequence[View], side: Side, *, reach: float) -> None
             above = bool(seen[0, 1] >= float(np.mean(seen[:, 1])))
             _word(axes, "start", seen[0], 1.3 * length, up=above)
         if result.counts:
-            _waypoints(axes, result, columns, length, named=order == 0)
+            draw = partial(_target, axes, result, columns=columns, length=length)
+            draw_waypoints(axes, result, draw, columns, named=order == 0)
         elif has_place(result):
             for target in given_targets(result):
-                _target(axes, result, target, columns, 1.3 * length, PAPER)
+                _target(axes, result, target, PAPER, columns=columns, length=1.3 * length)
             if order == 0:
                 goal = result.targets[-1, columns]
                 over = bool(goal[1] >= float(np.mean(np.append(seen[:, 1], goal[1]))))
@@ -166,7 +174,7 @@ def _body_axes(
 
 
 def _target(
-    axes: Axes, result: RunResult, target: np.ndarray, columns: list[int], length: float, fill: str
+    axes: Axes, result: RunResult, target: np.ndarray, fill: str, *, columns: list[int], length: float
 ) -> None:
     """A target as large as its tolerance, with the wanted axes where an attitude is asked for."""
     tolerance = result.task.tolerance
@@ -175,14 +183,3 @@ def _target(
     axes.add_patch(Circle(place, tolerance.position, **look))
     if tolerance.attitude_deg > 0.0:
         _body_axes(axes, target[:3], target[3:], columns, length, 0.7)
-
-
-def _waypoints(axes: Axes, result: RunResult, columns: list[int], length: float, *, named: bool) -> None:
-    """Every waypoint with its number; those that were reached are filled."""
-    reached = int(result.run.goals[0, -1])
-    axes.plot(*result.targets[:, columns].T, color=FAINT, linestyle=DASHED, linewidth=0.7, zorder=1)
-    for number, target in enumerate(result.targets, start=1):
-        _target(axes, result, target, columns, length, FAINT if number <= reached else PAPER)
-        if named:
-            place, offset = tuple(target[columns]), {"xytext": (5, 5), "textcoords": "offset points"}
-            axes.annotate(str(number), place, **offset, fontsize=8, zorder=7)

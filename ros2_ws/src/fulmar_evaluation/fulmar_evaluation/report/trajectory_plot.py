@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -39,7 +40,7 @@ def draw_trajectory(axes: Axes, runs: Sequence[View]) -> None:
         if order == 0 and len(result.path):
             axes.plot(*result.path.T, color=INK, linestyle=DASHED, linewidth=0.8, zorder=3)
         if result.counts:
-            _waypoints(axes, result, named=order == 0)
+            draw_waypoints(axes, result, partial(_waypoint, axes, result), named=order == 0)
         elif has_place(result):
             for target in given_targets(result):
                 draw_goal(axes, target, result.task.tolerance, arrow=1.6 * radius)
@@ -92,21 +93,31 @@ def _word(axes: Axes, text: str, place: np.ndarray, away: float, *, va: str) -> 
     axes.plot(x, y + 1.5 * away, linestyle="none")
 
 
-def _waypoints(axes: Axes, result: RunResult, *, named: bool) -> None:
-    """Every waypoint with its number; those that were reached are filled."""
-    reached = int(result.run.goals[0, -1])
-    radius = result.task.tolerance.position
-    axes.plot(*result.targets[:, :2].T, color=FAINT, linestyle=DASHED, linewidth=0.7, zorder=1)
-    for number, (x, y, yaw) in enumerate(result.targets, start=1):
-        fill = FAINT if number <= reached else PAPER
-        axes.add_patch(Circle((x, y), radius, facecolor=fill, edgecolor=INK, linewidth=1.0, zorder=6))
-        if result.task.tolerance.heading_deg > 0.0:
-            tip = np.array([x + 2.5 * radius * np.cos(yaw), y + 2.5 * radius * np.sin(yaw)])
-            axes.plot([x, tip[0]], [y, tip[1]], color=INK, linewidth=1.0, zorder=6)
+def draw_waypoints(
+    axes: Axes,
+    result: RunResult,
+    draw: Callable[[np.ndarray, str], None],
+    columns: Sequence[int] = (0, 1),
+    *,
+    named: bool,
+) -> None:
+    """Every waypoint with its number; those that were reached are filled. `draw` takes a target and its colour."""
+    reached, shown = int(result.run.goals[0, -1]), list(columns)
+    axes.plot(*result.targets[:, shown].T, color=FAINT, linestyle=DASHED, linewidth=0.7, zorder=1)
+    for number, target in enumerate(result.targets, start=1):
+        draw(target, FAINT if number <= reached else PAPER)
         if named:
-            axes.annotate(
-                str(number), (x, y), xytext=(5, 5), textcoords="offset points", fontsize=8, zorder=7
-            )
+            place, offset = tuple(target[shown]), {"xytext": (5, 5), "textcoords": "offset points"}
+            axes.annotate(str(number), place, **offset, fontsize=8, zorder=7)
+
+
+def _waypoint(axes: Axes, result: RunResult, target: np.ndarray, fill: str) -> None:
+    """A circle as large as the tolerance, with a stroke where a heading is asked for."""
+    (x, y, yaw), radius = target, result.task.tolerance.position
+    axes.add_patch(Circle((x, y), radius, facecolor=fill, edgecolor=INK, linewidth=1.0, zorder=6))
+    if result.task.tolerance.heading_deg > 0.0:
+        tip = np.array([x + 2.5 * radius * np.cos(yaw), y + 2.5 * radius * np.sin(yaw)])
+        axes.plot([x, tip[0]], [y, tip[1]], color=INK, linewidth=1.0, zorder=6)
 
 
 def given_targets(result: RunResult) -> np.ndarray:
