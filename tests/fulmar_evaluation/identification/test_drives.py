@@ -11,7 +11,9 @@ from fulmar_evaluation.identification.drives import cut, drive_of
 
 def drive(t, *, yaw=None):
     xy = np.stack((1.0 + 0.5 * t + 0.1 * t**2, 0.0 * t), axis=1)
-    return drive_of("run", t, xy, 0.0 * t if yaw is None else yaw, np.array([0.0]), np.zeros((1, 2)))
+    return drive_of(
+        "run", t, np.column_stack((xy, 0.0 * t if yaw is None else yaw)), np.array([0.0]), np.zeros((1, 2))
+    )
 
 
 def test_windows_fill_a_run_and_leave_the_rest():
@@ -49,6 +51,6 @@ def test_a_run_that_is_too_short_is_refused_with_what_to_do():
 def test_a_bag_without_commands_or_with_broken_poses_is_refused():
     t = np.arange(0.0, 5.0, 0.05)
     with pytest.raises(ConfigError, match="100 poses and 0 commands"):
-        drive_of("run", t, np.zeros((100, 2)), 0.0 * t, np.zeros(0), np.zeros((0, 2)))
+        drive_of("run", t, np.zeros((100, 3)), np.zeros(0), np.zeros((0, 2)))
     with pytest.raises(ConfigError, match="not finite"):
         drive(t, yaw=np.full(100, np.nan))

@@ -14,7 +14,7 @@ from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.simulation.simulation import BatchSimulation
 from fulmar_core.tasks import load_task
 from fulmar_core.worlds.scenario import load_scenario
-from fulmar_evaluation.identification.drives import Drive, drive_in_space
+from fulmar_evaluation.identification.drives import Drive, drive_of
 from fulmar_evaluation.identification.identify import Weight, calibration_of, identify
 from fulmar_evaluation.identification.model import Known
 
@@ -59,7 +59,7 @@ def drive(nominal) -> Drive:
         commands.append(command)
         simulation.step(command[None])
     time_s = STEP_S * np.arange(len(poses))
-    return drive_in_space("run", time_s, np.array(poses), time_s, np.array(commands))
+    return drive_of("run", time_s, np.array(poses), time_s, np.array(commands))
 
 
 def _chosen(rng: np.random.Generator, robot: Robot, rate: np.ndarray) -> np.ndarray:
@@ -91,7 +91,7 @@ def test_a_body_in_space_is_found_within_its_intervals(nominal, drive):
 def test_a_sign_of_the_quaternion_says_nothing(nominal, drive):
     flipped = np.where(np.arange(len(drive.pose)) % 7 < 3, -0.5, 0.5)[:, None] * drive.pose[:, 3:]
     pose = np.concatenate((drive.pose[:, :3], flipped), axis=1)
-    again = drive_in_space("run", drive.time_s, pose, drive.switch_s, drive.command)
+    again = drive_of("run", drive.time_s, pose, drive.switch_s, drive.command)
     np.testing.assert_allclose(again.pose[:, 3:], -drive.pose[:, 3:], err_msg="as the first pose has it")
 
 

@@ -33,7 +33,7 @@ def test_it_has_a_slope_between_whole_steps():
 
 def test_slow_actuators_ramp_and_remember_what_came_before_a_window():
     t = np.arange(0.0, 4.0 + DT / 2, DT)
-    drive = drive_of("ramp", t, np.zeros((len(t), 2)), np.zeros(len(t)), np.array([0.5]), np.array([[1.0]]))
+    drive = drive_of("ramp", t, np.zeros((len(t), 3)), np.array([0.5]), np.array([[1.0]]))
     windows = cut([drive], length_s=1.0, dt=DT)
     applied = followed(windows, 0.1, (0.5,))[:, 0, :]
     assert applied.shape == (50, 4)
@@ -46,7 +46,7 @@ def test_a_staircase_as_fast_as_an_actuator_can_go_still_shows_its_delay():
     """Commands are limited to the slew of the actuators, so that their steps join to one ramp without a flat part."""
     switch_s, wanted = np.arange(0.0, 1.0, 0.1), 0.1 * np.arange(1.0, 11.0)
     t = np.arange(0.0, 2.0 + DT / 2, DT)
-    drive = drive_of("stairs", t, np.zeros((len(t), 2)), np.zeros(len(t)), switch_s, wanted[:, None])
+    drive = drive_of("stairs", t, np.zeros((len(t), 3)), switch_s, wanted[:, None])
     windows = cut([drive], length_s=2.0, dt=DT)
     early, late = (followed(windows, delay, (1.0,))[:, 0, 0] for delay in (0.005, 0.006))
     ramp = (early > 0.0) & (early < 1.0)

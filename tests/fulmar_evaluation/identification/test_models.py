@@ -40,7 +40,14 @@ def driven(true, nominal, *, duration_s=120.0, seed=1, load=0, spoil=None):
     yaw = np.array([pose.yaw[0] for pose in poses])
     if spoil is not None:
         xy[spoil] += 1.0
-    return drive_of("run", np.array(times), xy, yaw, np.array(times[:-1]), np.array(commands), load=load)
+    return drive_of(
+        "run",
+        np.array(times),
+        np.column_stack((xy, yaw)),
+        np.array(times[:-1]),
+        np.array(commands),
+        load=load,
+    )
 
 
 def platform(*, thrust=1.15, mass=4.9, inertia=0.16, center=(0.012, -0.007), delay=0.06, opening=0.02):
@@ -178,6 +185,8 @@ def test_what_cannot_be_asked_is_refused_in_words(bare, robot, more, message):
 def test_a_robot_that_stood_still_determines_nothing():
     t = np.arange(0.0, 30.0, 0.02)
     rng = np.random.default_rng(0)
-    still = drive_of("still", t, 1e-3 * rng.normal(size=(len(t), 2)), 0.0 * t, t[:1], np.zeros((1, 8)))
+    still = drive_of(
+        "still", t, np.column_stack((1e-3 * rng.normal(size=(len(t), 2)), 0.0 * t)), t[:1], np.zeros((1, 8))
+    )
     with pytest.raises(ConfigError, match="do not distinguish every quantity"):
         identify(PLATFORM, [still], known=[Known("mass", 5.3, 0.01)])

@@ -8,8 +8,7 @@ from fulmar_bags.run_record import read_run
 from fulmar_core.config.errors import ConfigError
 from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.robot_file import load_robot
-from fulmar_evaluation.identification.by_kind import DRIVES
-from fulmar_evaluation.identification.drives import Drive
+from fulmar_evaluation.identification.drives import Drive, drive_of
 
 
 def driven_run(path: Path, *, load: int = 0) -> tuple[Robot, Drive, tuple[str, ...]]:
@@ -35,5 +34,6 @@ def driven_run(path: Path, *, load: int = 0) -> tuple[Robot, Drive, tuple[str, .
         raise ConfigError(
             f"{path}: commands have {actuation.effort.shape[1]} values, '{robot.name}' takes {width}."
         )
-    made = DRIVES[robot.kind.name]
-    return robot, made(str(path), record.odom, actuation.stamp_s, actuation.effort, load), record.warnings
+    pose = robot.state_type.from_rigid(record.odom.states).pose
+    drive = drive_of(str(path), record.odom.stamp_s, pose, actuation.stamp_s, actuation.effort, load=load)
+    return robot, drive, record.warnings

@@ -5,12 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import numpy as np
-
-from fulmar_bags.run_record import Motion
-from fulmar_core.states.rotation import yaw_of
 from fulmar_evaluation.identification.boat import BoatModel
-from fulmar_evaluation.identification.drives import Drive, drive_in_space, drive_of
 from fulmar_evaluation.identification.free_flyer import FreeFlyerModel
 from fulmar_evaluation.identification.model import Model
 from fulmar_evaluation.identification.platform import PlatformModel
@@ -42,25 +37,4 @@ MODELS: dict[tuple[str, str], Identifies] = {
     ),
     ("rolling", "differential_drive"): Identifies(WheelModel, "speeds need no scale"),
     ("free_flyer", "thrusters"): Identifies(FreeFlyerModel),
-}
-
-
-def _in_plane(name: str, odometry: Motion, command_s: np.ndarray, command: np.ndarray, load: int) -> Drive:
-    yaw = np.asarray(yaw_of(odometry.quat_xyzw))
-    xy = odometry.position[:, :2]
-    return drive_of(name, odometry.stamp_s, xy, yaw, command_s, command, load=load)
-
-
-def _in_space(name: str, odometry: Motion, command_s: np.ndarray, command: np.ndarray, load: int) -> Drive:
-    pose = np.column_stack((odometry.position, odometry.quat_xyzw))
-    return drive_in_space(name, odometry.stamp_s, pose, command_s, command, load=load)
-
-
-# From a name, odometry, stamps [s] and values of commands, and the number of the load.
-DRIVES: dict[str, Callable[..., Drive]] = {
-    "planar": _in_plane,
-    "rolling": _in_plane,
-    "free_flyer": _in_space,
-    "satellite": _in_space,
-    "aircraft": _in_space,
 }

@@ -32,20 +32,18 @@ class Drive:
 def drive_of(
     name: str,
     time_s: np.ndarray,
-    xy: np.ndarray,
-    yaw: np.ndarray,
+    pose: np.ndarray,
     command_s: np.ndarray,
     command: np.ndarray,
     *,
     load: int = 0,
 ) -> Drive:
-    """Put a run in order: stamps increase, headings do not jump, commands that say nothing new are dropped.
+    """Put a run in order: stamps increase, angles do not jump, commands that say nothing new are dropped.
 
     Args:
         name: For messages.
         time_s: Stamps of the poses, shape (n,) [s].
-        xy: Positions in the world, shape (n, 2) [m].
-        yaw: Headings, shape (n,) [rad].
+        pose: In the world, shape (n, 3): x, y [m] and heading [rad]; or, in space, (n, 7): x, y, z and quaternion xyzw.
         command_s: Stamps of the commands, shape (k,) [s].
         command: Commands, shape (k, m).
         load: Number of the ballast that was aboard; 0 for none.
@@ -56,52 +54,29 @@ def drive_of(
     Raises:
         ConfigError: There are too few poses or no commands, or a value is not finite.
     """
-    _check_counts(name, time_s, command_s)
-    time_s, kept = np.unique(np.asarray(time_s, dtype=float), return_index=True)
-    pose = np.column_stack((np.asarray(xy, dtype=float)[kept], np.unwrap(np.asarray(yaw, dtype=float)[kept])))
-    return _ordered(name, time_s, pose, command_s, command, load)
-
-
-def drive_in_space(
-    name: str,
-    time_s: np.ndarray,
-    pose: np.ndarray,
-    command_s: np.ndarray,
-    command: np.ndarray,
-    *,
-    load: int = 0,
-) -> Drive:
-    """The same of a body in space, whose poses have the shape (n, 7): x, y, z [m] and quaternion xyzw.
-
-    Raises:
-        ConfigError: As of `drive_of`.
-    """
-    _check_counts(name, time_s, command_s)
-    time_s, kept = np.unique(np.asarray(time_s, dtype=float), return_index=True)
-    pose = np.array(pose, dtype=float)[kept]
-    turned = np.sum(pose[1:, 3:] * pose[:-1, 3:], axis=1) < 0.0
-    pose[1:, 3:] *= np.where(np.cumsum(turned) % 2, -1.0, 1.0)[:, None]
-    pose[:, 3:] *= 2.0
-    return _ordered(name, time_s, pose, command_s, command, load)
-
-
-def _check_counts(name: str, time_s: np.ndarray, command_s: np.ndarray) -> None:
     if len(time_s) < 2 or len(command_s) < 1:
         raise ConfigError(
             f"{name}: {len(time_s)} poses and {len(command_s)} commands; a driven run has many of both. "
             "Record one with: fulmar run ROBOT --controller excite"
         )
-
-
-def _ordered(
-    name: str, time_s: np.ndarray, pose: np.ndarray, command_s: np.ndarray, command: np.ndarray, load: int
-) -> Drive:
+    time_s, kept = np.unique(np.asarray(time_s, dtype=float), return_index=True)
+    pose = _without_jumps(np.array(pose, dtype=float)[kept])
     order = np.argsort(command_s, kind="stable")
     switch_s, command = np.asarray(command_s, dtype=float)[order], np.asarray(command, dtype=float)[order]
     if not all(np.isfinite(part).all() for part in (time_s, pose, switch_s, command)):
         raise ConfigError(f"{name}: a pose or a command is not finite; leave this bag out.")
     new = np.concatenate(([True], np.any(np.diff(command, axis=0) != 0.0, axis=1)))
     return Drive(name, time_s, pose, switch_s[new], command[new], load)
+
+
+def _without_jumps(pose: np.ndarray) -> np.ndarray:
+    """Poses as `Drive.pose` has them."""
+    if pose.shape[1] == 3:
+        return np.column_stack((pose[:, :2], np.unwrap(pose[:, 2])))
+    turned = np.sum(pose[1:, 3:] * pose[:-1, 3:], axis=1) < 0.0
+    pose[1:, 3:] *= np.where(np.cumsum(turned) % 2, -1.0, 1.0)[:, None]
+    pose[:, 3:] *= 2.0
+    return pose
 
 
 LEAST_SAMPLES = 5  # in a window: fewer say nothing beyond its start
