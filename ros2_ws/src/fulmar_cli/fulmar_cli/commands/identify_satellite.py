@@ -16,20 +16,22 @@ def print_satellite(bags: list[Path], *, given: bool, as_json: bool) -> bool:
     """
     from fulmar_core.config.errors import ConfigError
     from fulmar_core.robots.robot_file import load_robot
-    from fulmar_evaluation.satellite_identification import identify_satellite, robot_of_bag
+    from fulmar_evaluation.identification.by_kind import ESTIMATED
+    from fulmar_evaluation.satellite_identification import robot_of_bag
 
     names = {robot_of_bag(bag) for bag in bags}
     if len(names) != 1 or not (name := names.pop()):
         return False
     robot = load_robot(name)
-    if not robot.actuators.turns_only:
+    estimate = ESTIMATED.get(robot.kind.name)
+    if estimate is None:
         return False
     if given:
         raise ConfigError(
             f"--known, --ballast and --out are not for '{name}': wheels and gyroscope show its inertia in kg·m² "
             "without them, and there is no calibration of it. Leave them out."
         )
-    print_result(identify_satellite(robot, bags), _print, as_json=as_json)
+    print_result(estimate(robot, bags), _print, as_json=as_json)
     return True
 
 

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
+from fulmar_core.robots.robot import Robot
 from fulmar_evaluation.identification.boat import BoatModel
 from fulmar_evaluation.identification.free_flyer import FreeFlyerModel
 from fulmar_evaluation.identification.model import Model
 from fulmar_evaluation.identification.platform import PlatformModel
 from fulmar_evaluation.identification.wheels import WheelModel
+from fulmar_evaluation.satellite_identification import identify_satellite
 
 
 @dataclass(frozen=True)
@@ -38,3 +42,6 @@ MODELS: dict[tuple[str, str], Identifies] = {
     ("rolling", "differential_drive"): Identifies(WheelModel, "speeds need no scale"),
     ("free_flyer", "thrusters"): Identifies(FreeFlyerModel),
 }
+
+# Kinds that estimators identify instead, from a robot and its bags; JSON-ready.
+ESTIMATED: dict[str, Callable[[Robot, Sequence[Path]], dict[str, Any]]] = {"satellite": identify_satellite}
