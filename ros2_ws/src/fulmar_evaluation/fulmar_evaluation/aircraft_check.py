@@ -40,16 +40,6 @@ class AircraftCheck:
         """Axes that no control moves."""
         return tuple(axis for axis, each in self.authority.items() if max(map(abs, each.values())) < LEAST)
 
-    @property
-    def rank(self) -> int:
-        """Number of axes that controls move."""
-        return len(self.authority) - len(self.missing_axes)
-
-    @property
-    def controllable(self) -> bool:
-        """Whether it flies somewhere, and controls move it about every axis."""
-        return bool(self.trims) and not self.missing_axes
-
     def problems(self) -> Iterator[str]:
         """One line for each thing that is wrong."""
         if not self.trims:
@@ -75,13 +65,13 @@ class AircraftCheck:
         return {
             "actuators": {
                 "count": len(self.robot.actuators.names),
-                "rank": self.rank,
+                "rank": len(self.authority) - len(self.missing_axes),
                 "missing_axes": list(self.missing_axes),
                 "axes": list(self.authority),
                 "authority": self.authority,
             },
             "zero_wrench_holdable": bool(self.trims),
-            "controllable": self.controllable,
+            "controllable": bool(self.trims) and not self.missing_axes,
             "trim": trims,
         }
 

@@ -25,14 +25,14 @@ class RobotCheck:
     Attributes:
         name: Of the robot, or of the file that is refused.
         robot: None where the file has values that no robot has.
-        found: What its kind shows; None with the robot.
+        findings: What its kind shows; None with the robot.
         problems: One line each; a robot without any has passed.
         warnings: Unusual values, one line each.
     """
 
     name: str
     robot: Robot | None = None
-    found: Findings | None = None
+    findings: Findings | None = None
     problems: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
 
@@ -47,7 +47,7 @@ class RobotCheck:
             "robot": self.name,
             **UNKNOWN,
             "trim": [],
-            **(self.found.as_json() if self.found is not None else {}),
+            **(self.findings.as_json() if self.findings is not None else {}),
             "passed": self.passed,
             "problems": list(self.problems),
             "warnings": list(self.warnings),
@@ -74,9 +74,9 @@ def check_robot(
             robot = load_robot_file(path) if path.suffix in (".yaml", ".yml") else load_robot(name)
         except ImplausibleError as error:
             return RobotCheck(path.stem, problems=(str(error),), warnings=tuple(warnings))
-        found = CHECKS[robot.kind.name](robot, speed=speed, altitude=altitude, height=height)
-        problems = tuple(found.problems())
-    return RobotCheck(robot.name, robot, found, problems, tuple(warnings))
+        findings = CHECKS[robot.kind.name](robot, speed=speed, altitude=altitude, height=height)
+        problems = tuple(findings.problems())
+    return RobotCheck(robot.name, robot, findings, problems, tuple(warnings))
 
 
 @contextmanager

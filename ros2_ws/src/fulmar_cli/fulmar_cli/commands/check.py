@@ -75,9 +75,9 @@ def robot(
 
 def _show(found: RobotCheck) -> None:
     """Print a check for people."""
-    if found.robot is not None and found.found is not None:
+    if found.robot is not None and found.findings is not None:
         write_line(f"{found.name}: {found.robot.title}")
-        for label, text in found.found.lines():
+        for label, text in found.findings.lines():
             write_line(f"  {label:<24}{text}")
     for problem in found.problems:
         write_line(f"  problem: {problem}" if found.robot is not None else f"{found.name}: {problem}")
