@@ -17,7 +17,7 @@ def print_satellite(bags: list[Path], *, given: bool, as_json: bool) -> bool:
     from fulmar_core.config.errors import ConfigError
     from fulmar_core.robots.robot_file import load_robot
     from fulmar_evaluation.identification.by_kind import ESTIMATED
-    from fulmar_evaluation.satellite_identification import robot_of_bag
+    from fulmar_evaluation.identification.satellite import robot_of_bag
 
     names = {robot_of_bag(bag) for bag in bags}
     if len(names) != 1 or not (name := names.pop()):

@@ -12,8 +12,8 @@ from fulmar_evaluation.identification.boat import BoatModel
 from fulmar_evaluation.identification.free_flyer import FreeFlyerModel
 from fulmar_evaluation.identification.model import Model
 from fulmar_evaluation.identification.platform import PlatformModel
+from fulmar_evaluation.identification.satellite import identify_satellite
 from fulmar_evaluation.identification.wheels import WheelModel
-from fulmar_evaluation.satellite_identification import identify_satellite
 
 
 @dataclass(frozen=True)
