@@ -111,7 +111,6 @@ OTHERS: dict[str, ReadingKind] = {
     "events": ReadingKind(EVENTS, _unchecked),
     "events_2": ReadingKind(EVENTS_2, _unchecked),
 }
-READINGS: dict[str, ReadingKind] = {
-    **{name: _of_sensor(kind) for name, kind in SENSORS.items() if kind.wire != ODOMETRY},
-    **OTHERS,
+READINGS: dict[str, ReadingKind] = OTHERS | {
+    name: _of_sensor(kind) for name, kind in SENSORS.items() if kind.wire != ODOMETRY
 }
