@@ -33,8 +33,14 @@ def imports(repository):
 
 
 def programs(folder):
-    """Console scripts of one setup.py as (program, module)."""
-    return re.findall(r'"(\w+) = ([\w.]+):main"', (folder / "setup.py").read_text())
+    """Console scripts of one setup.py as (program, module); where it asks for them, every node is one."""
+    text, inner = (folder / "setup.py").read_text(), folder / folder.name
+    nodes = (
+        sorted(path.stem for path in inner.glob("*_node.py"))
+        if '{node}:main" for node in NODES' in text
+        else []
+    )
+    return re.findall(r'"(\w+) = ([\w.]+):main"', text) + [(node, f"{folder.name}.{node}") for node in nodes]
 
 
 def test_the_workspace_has_exactly_these_packages(packages):

@@ -14,7 +14,7 @@ import pytest
 import typer
 import yaml
 
-from fulmar_bringup.run_plan import NODES
+from fulmar_bringup.domain_status import NODES
 from fulmar_bringup.service.device_rules import device_groups, device_rules
 from fulmar_bringup.system import varied_system
 from fulmar_cli.main import app

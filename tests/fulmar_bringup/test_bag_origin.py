@@ -10,7 +10,7 @@ import pytest
 
 from fulmar_bringup.bag_origin import attachments, run_info
 from fulmar_bringup.launched_system import list_nodes
-from fulmar_bringup.node_table import recorder_spec
+from fulmar_bringup.recorder_row import recorder_spec
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.system import Guards, System
 from fulmar_core.config.recording import Recording

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from fulmar_bringup.domain_status import NodeStatus
-from fulmar_bringup.run_plan import NODES, RunPlan
+from fulmar_bringup.domain_status import NODES, NodeStatus
+from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.system import Guards
 from fulmar_bringup.system_rows import system_rows
 
@@ -30,7 +30,9 @@ def test_a_node_in_error_silent_or_absent_is_not_well(node, level, reason, well,
 
 def test_it_knows_the_name_of_every_node_of_a_system():
     guards = Guards(estop=True, estimator="mocap_imu")
-    plan = RunPlan("floating_platform", "go_to_pose", "lqr", "mujoco", 50.0, guards=guards, markers=True)
+    plan = RunPlan(
+        "floating_platform", "go_to_pose", "lqr", "mujoco", 50.0, guards=guards, extras=("markers",)
+    )
     chain = Guards(estimator="attitude", estimators=("event_rate", "inertia"))
     satellite = RunPlan("cubesat_wheels", "point", "lqr", "mujoco", 10.0, guards=chain)
     rows = {**system_rows(plan, record={}), **system_rows(satellite, record={})}

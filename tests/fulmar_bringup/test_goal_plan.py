@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
+from fulmar_bringup.controller_row import controller_spec
 from fulmar_bringup.goal_plan import is_endless, shown_path, start_of
+from fulmar_bringup.goals_row import run_goals_spec
 from fulmar_bringup.launched_system import list_nodes
-from fulmar_bringup.node_table import controller_spec
-from fulmar_bringup.operator_rows import run_goals_spec
 from fulmar_bringup.planning import plan_run
 from fulmar_bringup.task_choice import task_of_goals, task_of_run
 from fulmar_core.config.errors import ConfigError

@@ -9,8 +9,8 @@ import pytest
 
 from fulmar_bringup import node_keeper
 from fulmar_bringup.node_keeper import NodeKeeper, RestartTimes, resumed
-from fulmar_bringup.node_loss import ENDS, RESTARTS
-from fulmar_bringup.run_plan import NodeSpec, RunPlan
+from fulmar_bringup.node_spec import ENDS, RESTARTS, NodeSpec
+from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.supervisor import Report
 from fulmar_bringup.system import Guards, OwnNode
 from fulmar_bringup.system_rows import system_rows
@@ -18,7 +18,7 @@ from fulmar_core.config.errors import RunFailed
 
 PLAN = RunPlan(
     "floating_platform", "go_to_pose", "lqr", "mujoco", 5.0,
-    goals="configs/goals/lab_pose.yaml", guards=Guards(estop=True, estimator="mocap_imu"), markers=True,
+    goals="configs/goals/lab_pose.yaml", guards=Guards(estop=True, estimator="mocap_imu"), extras=("markers",),
 )  # fmt: skip
 
 
@@ -93,7 +93,7 @@ def test_each_row_says_what_its_loss_means():
 
 
 def test_lock_step_waits_for_nobody_to_come_back():
-    rows = system_rows(replace(PLAN, lockstep=True, markers=False), record={"directory": "bag"})
+    rows = system_rows(replace(PLAN, lockstep=True, extras=()), record={"directory": "bag"})
     assert {row.loss for row in rows.values()} == {ENDS}
 
 

@@ -8,9 +8,11 @@ from importlib.util import find_spec
 
 import pytest
 
-from fulmar_bringup.estimator_rows import estimator_specs
+from fulmar_bringup.controller_row import controller_spec
+from fulmar_bringup.estimator_row import estimator_specs
 from fulmar_bringup.launched_system import list_nodes
-from fulmar_bringup.node_table import controller_spec, plant_spec, recorder_spec
+from fulmar_bringup.plant_row import plant_spec
+from fulmar_bringup.recorder_row import recorder_spec
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.system import Guards, default_control_hz, default_guards, load_system
 from fulmar_bringup.system_rows import system_rows
@@ -48,14 +50,14 @@ def test_every_system_is_recorder_plant_its_guards_controller_and_markers_in_one
 
 
 def test_no_node_waits_for_the_one_that_draws():
-    rows = [system_rows(replace(PLAN, markers=markers), record={}) for markers in (False, True)]
+    rows = [system_rows(replace(PLAN, extras=extras), record={}) for extras in ((), ("markers",))]
     assert set(rows[1]) - set(rows[0]) == {"markers"}
     for name in rows[0]:
         assert rows[0][name].parameters == rows[1][name].parameters
 
 
 def test_the_node_that_draws_gets_the_area_and_receives_the_goals_of_the_task():
-    plan = replace(PLAN, markers=True, guards=Guards(area=(-1.0, 1.0, -2.0, 2.0)))
+    plan = replace(PLAN, extras=("markers",), guards=Guards(area=(-1.0, 1.0, -2.0, 2.0)))
     markers = system_rows(plan)["markers"]
     assert markers.parameters == {
         "robot": "floating_platform", "task": "go_to_pose", "area": [-1.0, 1.0, -2.0, 2.0],

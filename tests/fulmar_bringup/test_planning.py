@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from fulmar_bringup.node_table import plant_spec
+from fulmar_bringup.plant_row import plant_spec
 from fulmar_bringup.run_executor import execute
 from fulmar_core.config.errors import BundleError, ConfigError, DeviceError, UnknownNameError
 from fulmar_core.config.paths import config_directory

@@ -7,7 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from fulmar_bringup.node_table import controller_spec, plant_spec
+from fulmar_bringup.controller_row import controller_spec
+from fulmar_bringup.plant_row import plant_spec
 from fulmar_bringup.task_choice import check_heading, default_task, task_of_goals, task_of_run
 from fulmar_core.config.errors import ConfigError
 from fulmar_core.states.spatial import SpatialState

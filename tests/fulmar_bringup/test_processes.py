@@ -14,8 +14,8 @@ import pytest
 import yaml
 
 from fulmar_bringup import processes
+from fulmar_bringup.node_spec import NodeSpec
 from fulmar_bringup.processes import YIELDING, Ended, ProcessGroup, child_environment, command_line
-from fulmar_bringup.run_plan import NodeSpec
 from fulmar_core.config.yielding import AUTOGROUP, BEHIND
 
 

@@ -7,12 +7,12 @@ from dataclasses import replace
 import pytest
 
 from fulmar_bringup.bag_origin import run_info
-from fulmar_bringup.node_table import controller_spec, guard_specs, plant_spec, recorder_spec
-from fulmar_bringup.operator_rows import run_goals_spec
 from fulmar_bringup.plan_checks import read_remappings
+from fulmar_bringup.plant_row import plant_spec
 from fulmar_bringup.processes import command_line
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.system import Guards
+from fulmar_bringup.system_rows import system_rows
 from fulmar_core.config.errors import ConfigError
 
 NAME = "/vrpn_mocap/body/pose"
@@ -30,13 +30,7 @@ PLAN = RunPlan(
 
 
 def test_every_node_of_a_run_gets_the_same_names():
-    specs = [
-        recorder_spec(PLAN),
-        plant_spec(PLAN),
-        *guard_specs(PLAN),
-        controller_spec(PLAN),
-        run_goals_spec(PLAN),
-    ]
+    specs = system_rows(PLAN, record={}).values()
     assert {spec.name for spec in specs} == {"recorder", "plant", "estop", "estimator", "controller", "goals"}
     for spec in specs:
         assert f"mocap/pose:={NAME}" in command_line(spec)

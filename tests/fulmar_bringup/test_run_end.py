@@ -7,9 +7,10 @@ from dataclasses import replace
 
 import pytest
 
-from fulmar_bringup.node_table import plant_spec
+from fulmar_bringup.node_spec import NodeSpec
+from fulmar_bringup.plant_row import plant_spec
 from fulmar_bringup.run_executor import _bring_down, _wait_for_end
-from fulmar_bringup.run_plan import NodeSpec, RunPlan
+from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.supervisor import Report
 from fulmar_core.config.errors import RunFailed
 from fulmar_core.robots.actuators.refuge import LANDS_S

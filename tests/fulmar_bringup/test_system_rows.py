@@ -7,7 +7,8 @@ from dataclasses import replace
 import pytest
 
 from fulmar_bringup.launched_system import list_nodes
-from fulmar_bringup.run_plan import NodeSpec, RunPlan
+from fulmar_bringup.node_spec import NodeSpec
+from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.system import Guards, load_system
 from fulmar_bringup.system_rows import check_rows, system_rows
 from fulmar_core.config.errors import ConfigError

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from fulmar_bringup.bag_origin import attachments
+from fulmar_bringup.controller_row import controller_spec
 from fulmar_bringup.excitation_plan import torques_note
-from fulmar_bringup.node_table import controller_spec
 from fulmar_bringup.task_choice import task_of_run
 from fulmar_core.config.errors import ConfigError
 from fulmar_core.config.paths import config_names

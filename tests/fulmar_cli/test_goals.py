@@ -7,7 +7,7 @@ from dataclasses import fields
 
 import pytest
 
-from fulmar_bringup.operator_rows import goals_spec
+from fulmar_bringup.goals_row import goals_spec
 from fulmar_cli.commands.goals import goals
 from fulmar_core.config.errors import ConfigError, UnknownNameError
 from fulmar_core.config.paths import config_names

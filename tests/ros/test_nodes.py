@@ -13,6 +13,7 @@ from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.node import Node
 
 from fulmar_bringup.emulation import emulation_of
+from fulmar_bringup.goals_row import goals_spec, run_goals_spec
 from fulmar_bringup.node_table import (
     controller_spec,
     emulator_spec,
@@ -20,7 +21,6 @@ from fulmar_bringup.node_table import (
     plant_spec,
     recorder_spec,
 )
-from fulmar_bringup.operator_rows import goals_spec, run_goals_spec
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.system import Guards
 from fulmar_core.config.errors import ConfigError

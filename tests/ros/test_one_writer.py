@@ -14,7 +14,7 @@ import psutil
 import pytest
 
 from fulmar_bringup.launch_check import refuse_living_plants
-from fulmar_bringup.run_plan import NodeSpec
+from fulmar_bringup.node_spec import NodeSpec
 from fulmar_core.config.errors import ConfigError
 from fulmar_core.robots.topics import AIR_BEARING, COMMAND, ODOMETRY, Wire
 from fulmar_ros.controller_node import ControllerNode

@@ -19,7 +19,7 @@ from geometry_msgs.msg import QuaternionStamped
 from std_srvs.srv import Trigger
 
 from fulmar_bags.message_reader import stamp_ns
-from fulmar_bringup.node_table import plant_spec
+from fulmar_bringup.plant_row import plant_spec
 from fulmar_bringup.processes import ProcessGroup
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_core.config.errors import BAD_USAGE, FAILED

@@ -16,7 +16,8 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import JointState
 
 from fulmar_bringup.emulation import emulation_of
-from fulmar_bringup.node_table import emulator_spec, plant_spec
+from fulmar_bringup.emulator_row import emulator_spec
+from fulmar_bringup.plant_row import plant_spec
 from fulmar_bringup.processes import ProcessGroup
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.system import default_hardware

@@ -1,11 +1,17 @@
 """What colcon installs; name, version and words come from package.xml."""
 
+from pathlib import Path
 from xml.etree import ElementTree
 
 from setuptools import find_packages, setup
 
 ABOUT = ElementTree.parse("package.xml").getroot()
 NAME = ABOUT.findtext("name")
+NODES = [
+    path.stem
+    for path in sorted(Path(NAME).glob("*_node.py"))
+    if "def main(" in path.read_text(encoding="utf-8")
+]
 
 setup(
     name=NAME,
@@ -19,10 +25,5 @@ setup(
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
     ],
-    entry_points={
-        "console_scripts": [
-            "adapter_node = hardware_drivers.adapter_node:main",
-            "driver_node = hardware_drivers.driver_node:main",
-        ]
-    },
+    entry_points={"console_scripts": [f"{node} = {NAME}.{node}:main" for node in NODES]},
 )

@@ -1,11 +1,17 @@
 """What colcon installs; name, version and words come from package.xml."""
 
+from pathlib import Path
 from xml.etree import ElementTree
 
 from setuptools import find_packages, setup
 
 ABOUT = ElementTree.parse("package.xml").getroot()
 NAME = ABOUT.findtext("name")
+NODES = [
+    path.stem
+    for path in sorted(Path(NAME).glob("*_node.py"))
+    if "def main(" in path.read_text(encoding="utf-8")
+]
 
 setup(
     name=NAME,
@@ -20,9 +26,5 @@ setup(
         (f"share/{NAME}", ["package.xml"]),
     ],
     package_data={NAME: ["policies/**/*"]},
-    entry_points={
-        "console_scripts": [
-            "controller_node = policy_server.controller_node:main",
-        ]
-    },
+    entry_points={"console_scripts": [f"{node} = {NAME}.{node}:main" for node in NODES]},
 )

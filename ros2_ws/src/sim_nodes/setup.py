@@ -1,11 +1,17 @@
 """What colcon installs; name, version and words come from package.xml."""
 
+from pathlib import Path
 from xml.etree import ElementTree
 
 from setuptools import find_packages, setup
 
 ABOUT = ElementTree.parse("package.xml").getroot()
 NAME = ABOUT.findtext("name")
+NODES = [
+    path.stem
+    for path in sorted(Path(NAME).glob("*_node.py"))
+    if "def main(" in path.read_text(encoding="utf-8")
+]
 
 setup(
     name=NAME,
@@ -19,11 +25,5 @@ setup(
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
     ],
-    entry_points={
-        "console_scripts": [
-            "emulator_node = sim_nodes.emulator_node:main",
-            "event_camera_node = sim_nodes.event_camera_node:main",
-            "sim_node = sim_nodes.sim_node:main",
-        ]
-    },
+    entry_points={"console_scripts": [f"{node} = {NAME}.{node}:main" for node in NODES]},
 )

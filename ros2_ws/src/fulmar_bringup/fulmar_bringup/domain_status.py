@@ -9,7 +9,8 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.node import Node
 
-from fulmar_bringup.run_plan import NODES, PARTS, PLANT, REPORTING
+from fulmar_bringup.node_spec import PARTS, PLANT
+from fulmar_bringup.node_table import status_names
 from fulmar_core.robots.topics import DIAGNOSTICS, ESTOP_TRIGGER
 from fulmar_core.safety.estop import HOLDS, SILENT
 from fulmar_core.safety.watchdog import NO_COMMAND
@@ -17,6 +18,7 @@ from fulmar_core.wires.robot_name import namespace_of
 from fulmar_ros.operator_subscription import subscribe_every
 from fulmar_ros.runtime import ros_node
 
+NODES, REPORTING = status_names(), status_names(silent=False)
 SETTLE_S = 0.25  # after the last node was discovered, for others
 LOOK_S = 0.02
 LEVELS = {DiagnosticStatus.OK: "ok", DiagnosticStatus.WARN: "warn", DiagnosticStatus.ERROR: "error"}

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 
 import rclpy
 
-from fulmar_bringup.run_plan import NodeSpec
+from fulmar_bringup.node_spec import NodeSpec
 from fulmar_ros.living_plant import PLANT, refuse_living_plant
 from fulmar_ros.runtime import init_ros
 

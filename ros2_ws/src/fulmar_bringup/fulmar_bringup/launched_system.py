@@ -10,10 +10,13 @@ from pathlib import Path
 
 from fulmar_bringup.bag_origin import attachments, run_info
 from fulmar_bringup.goal_plan import checked_goals, goal_path, goal_rate
+from fulmar_bringup.node_spec import NodeSpec
+from fulmar_bringup.node_table import OPTIONS
+from fulmar_bringup.own_row import own_nodes
 from fulmar_bringup.plan_checks import adapter_path, check_external
-from fulmar_bringup.run_plan import NodeSpec, RunPlan
+from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.system import default_hardware, varied_system
-from fulmar_bringup.system_rows import own_nodes, system_rows
+from fulmar_bringup.system_rows import system_rows
 from fulmar_core.config.errors import ConfigError
 from fulmar_core.config.written_text import check_lines
 from fulmar_core.robots.robot_file import load_robot
@@ -36,7 +39,7 @@ def list_nodes(
     adapter: str | None = None,
     topic: str | None = None,
     emulate: str | None = None,
-    markers: str | None = None,
+    **switches: str | None,
 ) -> tuple[NodeSpec, ...]:
     """Nodes of a system, each of its choices replaced by what is given.
 
@@ -53,7 +56,7 @@ def list_nodes(
         adapter: With controller `external`, name or path of the hardware file whose commands it speaks.
         topic: Topic that the adapter takes them from; the file's by default.
         emulate: `true`: with backend hardware, an emulator stands in for the device.
-        markers: `false`: no node draws for viewers.
+        switches: `false`, by the name of an optional node of the table: it does not run.
 
     Returns:
         As of `system_rows`. The row of an external controller is not there, or is that of its adapter.
@@ -64,7 +67,7 @@ def list_nodes(
     given_texts = {
         "system": system, "robot": robot, "name": name, "task": task, "controller": controller, "backend": backend,
         "policy": policy, "goals": goals, "hardware": hardware, "adapter": adapter, "topic": topic,
-        "emulate": emulate, "markers": markers,
+        "emulate": emulate, **switches,
     }  # fmt: skip
     check_lines(given_texts.items())
     chosen = varied_system(
@@ -88,12 +91,12 @@ def list_nodes(
         guards=chosen.guards,
         recording=chosen.recorder,
         nodes=own_nodes(chosen),
-        markers=markers != "false",
+        extras=tuple(name for name in OPTIONS if switches.get(name) != "false"),
     )
     if plan.backend == "hardware":
         plan = replace(plan, hardware=default_hardware(plan.robot, hardware))
         check_own_driver(load_hardware(plan.hardware).driver)
-    for word, given in (("emulate", emulate), ("markers", markers)):
+    for word, given in (("emulate", emulate), *switches.items()):
         if given not in (None, "true", "false"):
             raise ConfigError(f"{word} = '{given}' must be true or false.")
     wires = None

@@ -8,19 +8,17 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from fulmar_bringup.console import log_line
-from fulmar_bringup.node_loss import ENDS
+from fulmar_bringup.node_spec import ENDS, NodeSpec
+from fulmar_bringup.node_table import row_of
 from fulmar_bringup.processes import Ended, ProcessGroup
-from fulmar_bringup.run_plan import NodeSpec
 from fulmar_bringup.supervisor import Supervisor
 from fulmar_core.config.errors import RunFailed
 
 LOOK_S = 0.25  # between two looks at the states of processes
 STOPPED_S = 3.0  # in its tracks, as by SIGSTOP, before a process counts as lost
 HANGS_S = 10.0  # without a status, before the process of a helper does; each reports once a second
-BEATING = ("recorder", "estop", "markers")  # helpers that report whatever the robot does
 WAITS_S = (0.0, 1.0, 2.0, 4.0, 8.0)  # before a node is started again for the first time, the second time, ...
 WITHIN_S = 120.0  # starts that are older no longer count
-INDISPENSABLE = ("estop",)  # helpers without which the robot ends, where they do not come back
 
 OnRestart = Callable[[str, str], None]  # name of the node, and why
 
@@ -124,8 +122,13 @@ class NodeKeeper:
             self._stopped_since.pop(name, None)
         elif now_s - self._stopped_since.setdefault(name, now_s) > STOPPED_S:
             return f"{name} was stopped (SIGSTOP) for {STOPPED_S:g} s"
-        report = self._overseer.report_of(name)
-        if spec.loss == ENDS or name not in BEATING or report.received_s < self._began.get(name, 0.0):
+        report, row = self._overseer.report_of(name), row_of(name)
+        if (
+            spec.loss == ENDS
+            or row is None
+            or not row.beats
+            or report.received_s < self._began.get(name, 0.0)
+        ):
             return ""
         if self._overseer.silent_s(report) > HANGS_S:
             return f"{name} has not reported for {HANGS_S:g} s and hangs"
@@ -136,7 +139,8 @@ class NodeKeeper:
         if due_s is not None:
             self._due[name] = (due_s, reason)
             return
-        if name in INDISPENSABLE:
+        row = row_of(name)
+        if row is not None and row.indispensable:
             raise RunFailed(f"{reason}; it was started {len(WAITS_S)} times within {WITHIN_S:g} s")
         self._left_out.add(name)
         self.restarts.append(Restart(name, reason, left_out=True))
@@ -160,8 +164,5 @@ def resumed(spec: NodeSpec, said: dict[str, str]) -> NodeSpec:
         spec: Row of that one.
         said: Values of its last status.
     """
-    if spec.name == "recorder":
-        return replace(spec, parameters={**spec.parameters, "resume": True})
-    if spec.name == "goals" and said.get("place"):
-        return replace(spec, parameters={**spec.parameters, "place": said["place"]})
-    return spec
+    row = row_of(spec.name)
+    return replace(spec, parameters=spec.parameters | row.resume(said)) if row is not None else spec

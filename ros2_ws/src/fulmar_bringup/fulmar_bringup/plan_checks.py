@@ -222,7 +222,7 @@ def checked_guards(usual: Guards, asked: Mapping[str, Any], robot: Robot, task: 
     check_area_of(robot, guards.area)
     if guards.fallback:
         controller_entry(guards.fallback).check(robot, task)
-    for file in (*filter(None, (guards.estimator,)), *guards.estimators):
+    for file in guards.files:
         check_estimator(file, robot)
     return guards
 

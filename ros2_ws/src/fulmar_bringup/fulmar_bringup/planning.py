@@ -19,6 +19,8 @@ from fulmar_bringup.goal_plan import (
     goal_rate,
     start_of,
 )
+from fulmar_bringup.node_spec import NodeSpec
+from fulmar_bringup.own_row import own_nodes
 from fulmar_bringup.plan_checks import (
     adapter_path,
     check_arming,
@@ -37,14 +39,13 @@ from fulmar_bringup.plan_checks import (
     usual_controller,
     with_usual_estimators,
 )
-from fulmar_bringup.run_plan import NodeSpec, RunPlan
+from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.system import (
     check_names,
     default_control_hz,
     default_guards,
     system_of,
 )
-from fulmar_bringup.system_rows import own_nodes
 from fulmar_bringup.task_choice import whole_pose
 from fulmar_core.config.errors import ConfigError, UnknownNameError
 from fulmar_core.config.recording import MODES, Mode, Recording
@@ -105,7 +106,7 @@ def plan_run(
     adapter: str | None = None,
     topic: str | None = None,
     goals_later: bool = False,
-    markers: bool = False,
+    extras: Sequence[str] = (),
 ) -> RunRequest:
     """Complete a request and refuse what cannot work, before any process is started.
 
@@ -141,7 +142,7 @@ def plan_run(
         adapter: With controller `external`, name or path of the hardware file whose commands it speaks.
         topic: Topic that the adapter takes them from; the file's by default.
         goals_later: Whether goals come from outside while the system runs; `goal` and `goals` are None then.
-        markers: Whether a node draws for viewers; not in lock step, where every message counts.
+        extras: Optional nodes of the table that run; none in lock step, where every message counts.
 
     Returns:
         The request.
@@ -152,9 +153,9 @@ def plan_run(
     """
     if lockstep and rate != 1.0:
         raise ConfigError("--lockstep runs as fast as it goes; it takes no --rate.")
-    if lockstep and markers:
+    if lockstep and extras:
         raise ConfigError(
-            "--lockstep gives the same bytes each time; it takes no --markers, drawn by the clock."
+            f"--lockstep gives the same bytes each time; it takes no --{extras[0]}, which goes by the clock."
         )
     controller = usual_controller(controller, policy, load_robot(robot), load_task(task))
     check_names(robot, task, controller, backend, hardware)
@@ -250,7 +251,7 @@ def plan_run(
         adapter=adapter_path(robot, adapter),
         adapter_topic=topic or "",
         nodes=nodes,
-        markers=markers,
+        extras=tuple(extras),
     )
     goal = goal or (the_task.state_type.written(mission.current) if the_task.goal_topic in PLACES else None)
     return RunRequest(plan, goal, record, command, mission)

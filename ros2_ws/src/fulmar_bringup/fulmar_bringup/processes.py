@@ -18,7 +18,7 @@ from typing import IO
 import psutil
 
 from fulmar_bringup.console import printable
-from fulmar_bringup.run_plan import NodeSpec, Parameter
+from fulmar_bringup.node_spec import NodeSpec, Parameter
 from fulmar_core.config.process import LAUNCHER_PID
 from fulmar_ros.middleware import environment_of_any_node, middleware_environment
 

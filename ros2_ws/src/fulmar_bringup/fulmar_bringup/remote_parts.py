@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 import time
 
-from fulmar_bringup.run_plan import PLANT, RunPlan
+from fulmar_bringup.node_spec import PLANT
+from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.supervisor import Report
 from fulmar_bringup.system_events import SystemEvents
 from fulmar_core.robots.robot_file import load_robot

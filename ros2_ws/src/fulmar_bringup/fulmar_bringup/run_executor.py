@@ -17,6 +17,7 @@ from fulmar_bringup.console import log_line
 from fulmar_bringup.domains import claimed_domain
 from fulmar_bringup.goal_plan import is_endless, shown_path
 from fulmar_bringup.node_keeper import NodeKeeper, OnRestart, Restart
+from fulmar_bringup.node_spec import NodeSpec
 from fulmar_bringup.planning import RunRequest
 from fulmar_bringup.processes import Ended, ProcessGroup
 from fulmar_bringup.progress import state_words, time_bar
@@ -27,7 +28,7 @@ from fulmar_bringup.readiness import (
     wait_for_reader,
     while_starting,
 )
-from fulmar_bringup.run_plan import NodeSpec, RunPlan
+from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.supervisor import Report, Supervisor, supervisor
 from fulmar_bringup.system_events import distance_of, mode_of
 from fulmar_bringup.system_rows import system_rows

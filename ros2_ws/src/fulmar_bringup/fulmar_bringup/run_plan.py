@@ -1,52 +1,13 @@
-"""What one system or run is started with: its plan, and the rows of its processes."""
+"""What one system or run is started with."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass
 
-from fulmar_bringup.node_loss import ENDS, RESTARTS
+from fulmar_bringup.node_spec import ENDS, RESTARTS, NodeSpec
 from fulmar_bringup.system import NONE, Guards
 from fulmar_core.config.recording import Recording
-from fulmar_core.estimators.kinds import KINDS
 from fulmar_core.wires.robot_name import Frames, frames_of, namespace_of
-
-Parameter = bool | int | float | str | list[float] | list[int] | list[str]
-PLANT, CONTROLLER = PARTS = ("plant", "controller")  # values of `RunPlan.only`
-# Nodes of a system by name: those that publish diagnostics, and all.
-ESTIMATORS = tuple(dict.fromkeys(kind.node for kind in KINDS.values()))
-REPORTING = (*PARTS, "recorder", "estop", *ESTIMATORS, "markers")
-NODES = (*REPORTING, "event_camera", "emulator")
-
-
-@dataclass(frozen=True)
-class NodeSpec:
-    """One process with one node."""
-
-    name: str  # of the node
-    package: str  # ament package
-    executable: str  # script that the package installs
-    module: str  # the same as a Python module
-    namespace: str
-    parameters: dict[str, Parameter] = field(default_factory=dict)
-    quiet: bool = False  # prints only warnings and errors
-    remappings: dict[str, str] = field(default_factory=dict)  # topics under other names
-    network: str = ""  # namespace of Linux that it runs in; empty: ours
-    inputs: tuple[str, ...] = ()  # topics without which it is of no use
-    outputs: tuple[str, ...] = ()  # topics that it publishes
-    observed: tuple[str, ...] = ()  # topics that it receives if they are there
-    optional: bool = False  # no node waits for it
-    loss: str = ENDS  # what its loss means: one of `node_loss.LOSSES`
-    ends_within_s: float = 0.0  # that an orderly end may take; 0: as any node's [s]
-
-
-def node_row(
-    namespace: str, name: str, module: str, parameters: Mapping[str, Parameter], **more: Any
-) -> NodeSpec:
-    """A row of a Python module: its first part is the package, its last part the executable."""
-    package, executable = module.partition(".")[0], module.rpartition(".")[2]
-    return NodeSpec(name, package, executable, module, namespace, dict(parameters), **more)
 
 
 @dataclass(frozen=True)
@@ -87,7 +48,7 @@ class RunPlan:
     adapter_topic: str = ""  # topic that it takes them from; empty: the file's
     only: str = ""  # plant or controller: the other one runs in another place; empty: both
     nodes: tuple[NodeSpec, ...] = ()  # of the system's own, beside those that every system has
-    markers: bool = False  # a node draws goal, limits and thrust for viewers
+    extras: tuple[str, ...] = ()  # nodes of the table with an option that run, by name: `node_table.OPTIONS`
 
     @property
     def loss_of_helpers(self) -> str:

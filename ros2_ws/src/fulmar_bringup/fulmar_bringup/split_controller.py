@@ -6,12 +6,13 @@ import socket
 
 from fulmar_bringup.console import log_line
 from fulmar_bringup.domains import claimed_domain
+from fulmar_bringup.node_spec import CONTROLLER
 from fulmar_bringup.planning import RunRequest
 from fulmar_bringup.processes import ProcessGroup
 from fulmar_bringup.readiness import raise_if_ended, while_starting
 from fulmar_bringup.remote_parts import domain_text, mismatch
 from fulmar_bringup.run_executor import STOPPED, passed_s, raise_if_silent, silence_limits_s
-from fulmar_bringup.run_plan import CONTROLLER, RunPlan
+from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.standing_system import Ending, Show, described, report_newest, trips_of
 from fulmar_bringup.supervisor import Supervisor, supervisor
 from fulmar_bringup.system_events import Emit, SystemEvents

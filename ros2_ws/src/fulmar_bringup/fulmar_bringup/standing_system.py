@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from fulmar_bringup.console import log_line
 from fulmar_bringup.node_keeper import NodeKeeper
+from fulmar_bringup.node_spec import CONTROLLER, PARTS, PLANT
+from fulmar_bringup.node_table import OPTIONS
+from fulmar_bringup.own_row import own_nodes
 from fulmar_bringup.planning import RunRequest, chosen_recording, plan_run
 from fulmar_bringup.processes import ProcessGroup
 from fulmar_bringup.readiness import raise_if_ended, wait_for_publisher, wait_for_reader, while_starting
@@ -24,11 +27,10 @@ from fulmar_bringup.run_executor import (
     silence_limits_s,
     with_plant_reaction,
 )
-from fulmar_bringup.run_plan import CONTROLLER, PARTS, PLANT, RunPlan
+from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.supervisor import Report, Supervisor
 from fulmar_bringup.system import System
 from fulmar_bringup.system_events import Emit, SystemEvents, distance_of, mode_of
-from fulmar_bringup.system_rows import own_nodes
 from fulmar_core.config.errors import ConfigError, RunFailed, UnknownNameError
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.robots.topics import SIMULATION_START_NS
@@ -53,7 +55,7 @@ def plan_system(
     start: PoseTuple | None = None,
     rate: float = 1.0,
     recording: str | None = None,
-    markers: bool = True,
+    extras: Sequence[str] = tuple(OPTIONS),
     unattended: bool = False,
     only: str | None = None,
 ) -> RunRequest:
@@ -72,7 +74,7 @@ def plan_system(
         start: Where a simulated robot begins; the origin by default.
         rate: Simulated seconds a wall-clock second.
         recording: A mode of `fulmar_core.config.recording` instead of the system's own.
-        markers: Whether a node draws for viewers.
+        extras: Optional nodes of the table that run.
         unattended: Whether a service starts it: an e-stop node begins pressed, and nothing is armed.
         only: plant or controller, where the other one runs in another place.
 
@@ -111,7 +113,7 @@ def plan_system(
         arm=arm,
         guards={name: value for name, value in asdict(guards).items() if value},
         goals_later=True,
-        markers=markers,
+        extras=extras,
     )
     if unattended and arm:
         raise ConfigError(

@@ -18,7 +18,8 @@ from lifecycle_msgs.srv import ChangeState
 from rclpy.node import Node
 from visualization_msgs.msg import MarkerArray
 
-from fulmar_bringup.run_plan import NODES, RunPlan
+from fulmar_bringup.node_table import status_names
+from fulmar_bringup.run_plan import RunPlan
 from fulmar_core.config.errors import RunFailed
 from fulmar_core.robots.topics import DIAGNOSTICS, GOAL_WIRES, OBSTACLES, STATUS
 from fulmar_core.robots.wire_check import Offer
@@ -94,7 +95,7 @@ class Supervisor:
 
     def refuse_twins(self) -> None:
         """Raise TwinRunError where another run of this name begins at the same time; call while ours gets ready."""
-        refuse_twins(self._node, self._plan.namespace, NODES)
+        refuse_twins(self._node, self._plan.namespace, status_names())
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         own = f"{self._plan.robot_name}: "

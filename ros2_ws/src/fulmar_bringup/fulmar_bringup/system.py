@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from fulmar_bringup.node_loss import ENDS, LOSSES
+from fulmar_bringup.node_spec import ENDS, LOSSES
 from fulmar_core.config.errors import ConfigError, UnknownNameError, did_you_mean
 from fulmar_core.config.paths import config_names, config_path
 from fulmar_core.config.recording import Recording
@@ -53,6 +53,11 @@ class Guards:
             raise ValueError(f"'max_run_time_s' = {self.max_run_time_s:g} must not be negative.")
         if self.area != NO_AREA:
             check_area(self.area)
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """Every estimator's file; that of the odometry last, which may take what the others publish."""
+        return (*self.estimators, *((self.estimator,) if self.estimator else ()))
 
 
 NONE = Guards()
@@ -160,8 +165,7 @@ def modules_of(
     """Modules of extras that the nodes of a controller, a backend, its guards and a hardware file import."""
     simulated = ("mujoco",) if backend == "mujoco" or emulated else (JSBSIM,) * is_jsbsim(backend)
     driven = load_hardware(hardware).needs if hardware else ()
-    files = (*filter(None, (guards.estimator,)), *guards.estimators)
-    estimated = (module for file in files for module in estimator_kind(file).needs)
+    estimated = (module for file in guards.files for module in estimator_kind(file).needs)
     return (*controller_entry(controller).needs, *simulated, *driven, *estimated)
 
 

@@ -11,18 +11,11 @@ from dataclasses import replace
 from pathlib import Path
 
 from fulmar_bringup.emulation import Emulation, emulation_of
-from fulmar_bringup.node_table import (
-    chain_of,
-    commander_specs,
-    emulator_spec,
-    guard_specs,
-    paced_wire,
-    plant_spec,
-    recorder_spec,
-)
-from fulmar_bringup.operator_rows import markers_spec, run_goals_spec
-from fulmar_bringup.run_plan import CONTROLLER, NodeSpec, RunPlan, node_row
-from fulmar_bringup.system import System
+from fulmar_bringup.lockstep_chain import chain_of, paced_wire
+from fulmar_bringup.node_row import Launcher
+from fulmar_bringup.node_spec import NodeSpec
+from fulmar_bringup.node_table import node_rows
+from fulmar_bringup.run_plan import RunPlan
 from fulmar_core.config.errors import ConfigError, did_you_mean
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.robots.topics import (
@@ -37,7 +30,6 @@ from fulmar_core.robots.topics import (
     command_wire,
 )
 from fulmar_core.tasks import load_task
-from fulmar_core.wires.robot_name import namespace_of
 from hardware_drivers.hardware import load_hardware
 from policy_server.controllers import controller_entry
 
@@ -65,27 +57,16 @@ def system_rows(
     Raises:
         ConfigError: Two rows have one name, or a row has an input that nothing publishes.
     """
-    rows = [recorder_spec(plan, **record)] if record is not None else []
-    if plan.emulated:
-        if emulation is None:
-            assert wires_folder is not None
-            emulation = emulation_of(load_hardware(plan.hardware), wires_folder)
-        rows.append(emulator_spec(plan, emulation))
-        port = port or emulation.port
-    rows += [plant_spec(plan, port=port), *guard_specs(plan), *commander_specs(plan)]
-    if plan.goals:
-        rows.append(run_goals_spec(plan))
-    rows += plan.nodes
-    if plan.markers:
-        rows.append(markers_spec(plan))
+    if plan.emulated and emulation is None:
+        assert wires_folder is not None
+        emulation = emulation_of(load_hardware(plan.hardware), wires_folder)
+    launcher = Launcher(record, emulation, port)
+    found = [(row.part, spec) for row in node_rows() for spec in row.specs(plan, launcher)]
+    specs = [spec for _, spec in found]
     _check_chain(plan)
-    check_rows(rows, outside=_from_outside(plan))
-    there = {row.name for row in commander_specs(plan)} if plan.only else set()
-    return {
-        row.name: _passed_on(row, plan)
-        for row in _with_listeners(rows, plan)
-        if not plan.only or (row.name in there) == (plan.only == CONTROLLER)
-    }
+    check_rows(specs, outside=_from_outside(plan))
+    there = {spec.name for part, spec in found if plan.only in ("", part)}
+    return {spec.name: _passed_on(spec, plan) for spec in _with_listeners(specs, plan) if spec.name in there}
 
 
 def _passed_on(row: NodeSpec, plan: RunPlan) -> NodeSpec:
@@ -95,23 +76,6 @@ def _passed_on(row: NodeSpec, plan: RunPlan) -> NodeSpec:
         return row
     waits = {"wait_for_subscribers": 1} if "wait_for_subscribers" in row.parameters else {}
     return replace(row, remappings={**row.remappings, **names}, parameters={**row.parameters, **waits})
-
-
-def own_nodes(system: System) -> tuple[NodeSpec, ...]:
-    """Rows of the nodes that a system file names beside those that every system has."""
-    space = namespace_of(system.name or system.robot)
-    return tuple(
-        node_row(
-            space,
-            node.name,
-            node.module,
-            node.parameters,
-            inputs=node.inputs,
-            outputs=node.outputs,
-            loss=node.loss,
-        )
-        for node in system.nodes
-    )
 
 
 def check_rows(rows: Iterable[NodeSpec], *, outside: Iterable[str] = ()) -> None:

@@ -11,8 +11,8 @@ from launch_ros.parameter_descriptions import ParameterValue
 
 from fulmar_bringup.launch_check import refuse_living_plants
 from fulmar_bringup.launched_system import list_nodes
-from fulmar_bringup.node_loss import RESTARTS
-from fulmar_bringup.run_plan import NodeSpec
+from fulmar_bringup.node_spec import RESTARTS, NodeSpec
+from fulmar_bringup.node_table import OPTIONS
 
 RESPAWN_S = 1.0  # before a helper that has ended is started again [s]
 
@@ -28,8 +28,8 @@ ARGUMENTS = {
     "adapter": "with controller external, a file of configs/hardware: commands come in as its driver sends them",
     "topic": "topic that the adapter takes, in the place of the file's",
     "emulate": "true: with backend hardware, an emulator stands in for the device",
-    "markers": "false: no node draws goal, limits and thrust for viewers",
     "goals": "a file of configs/goals, without .yaml, that a node of its own publishes",
+    **{name: f"false: not this. {text}" for name, text in OPTIONS.items()},
 }
 
 

@@ -23,7 +23,7 @@ import numpy as np
 from rclpy.lifecycle import TransitionCallbackReturn
 
 from fulmar_bringup.domains import reserved_domains
-from fulmar_bringup.operator_rows import run_goals_spec
+from fulmar_bringup.goals_row import run_goals_spec
 from fulmar_bringup.processes import ProcessGroup, command_line
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.supervisor import START_TIMEOUT_S, Supervisor, supervisor

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import functools
+import inspect
 import os
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
 import typer
 
 from fulmar_bringup.console import warn
+from fulmar_bringup.node_table import OPTIONS
 
 Value = TypeVar("Value")
 
@@ -77,10 +81,6 @@ ArmOption = Annotated[
 EstopOption = Annotated[
     bool, flag("--estop", "Run an e-stop node; nothing moves without it. See `fulmar estop`.")
 ]
-MARKERS_HELP = (
-    "Draw goal, limits and thrust for RViz and Foxglove, on the topic `markers`. See `fulmar layout`."
-)
-MarkersOption = Annotated[bool, typer.Option("--markers/--no-markers", help=MARKERS_HELP)]
 RateOption = Annotated[
     float, option("F", "Simulated seconds per second of wall-clock time.", "--rate", min=0.01, max=50.0)
 ]
@@ -95,6 +95,31 @@ JobsOption = Annotated[
 BagArgument = Annotated[Path, argument("BAG", "A bag folder, or the .mcap or .db3 file in it.")]
 OdometryOption = Annotated[str | None, option("TOPIC", "The odometry to use, where a bag has several.")]
 JsonOption = Annotated[bool, flag("--json", "Print one JSON object and nothing else.")]
+
+
+def with_node_options(*, standing: bool) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Options of a command that switch the nodes of the table that people may; it gets their names as `extras`.
+
+    Args:
+        standing: Whether they run unless they are switched off.
+    """
+
+    def made(command: Callable[..., None]) -> Callable[..., None]:
+        @functools.wraps(command)
+        def switched(**given: Any) -> None:
+            extras = tuple(name for name in OPTIONS if given.pop(name))
+            command(**given, extras=extras)
+
+        signature = inspect.signature(command, eval_str=True)
+        *own, last = (each for each in signature.parameters.values() if each.name != "extras")
+        kinds = {name: flag(f"--{name}/--no-{name}", text) for name, text in OPTIONS.items()}
+        more = [
+            last.replace(name=n, default=standing, annotation=Annotated[bool, k]) for n, k in kinds.items()
+        ]
+        vars(switched)["__signature__"] = signature.replace(parameters=[*own, *more, last])
+        return switched
+
+    return made
 
 
 def invoked_command() -> str:

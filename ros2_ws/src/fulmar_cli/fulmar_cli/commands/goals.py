@@ -84,7 +84,7 @@ def goals(
         example = name if place is None else f"--pose {pose}"
         raise ConfigError(f"whose goals? Example: fulmar goals {example} --robot floating_platform")
     from fulmar_bringup.goal_plan import check_file_places, check_pace
-    from fulmar_bringup.operator_rows import goals_spec
+    from fulmar_bringup.goals_row import goals_spec
     from fulmar_bringup.processes import command_line
     from fulmar_core.robots.robot_file import load_robot
     from fulmar_core.safety.geofence import NO_AREA, check_area_of

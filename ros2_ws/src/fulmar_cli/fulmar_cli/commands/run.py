@@ -40,6 +40,7 @@ ADAPTER_HELP = (
 )
 
 
+@cli.with_node_options(standing=False)
 def run(
     robot: cli.RobotArgument,
     name: cli.NameOption = None,
@@ -54,9 +55,7 @@ def run(
     goals: Annotated[str | None, option("NAME", GOALS_HELP)] = None,
     start: Annotated[str | None, option("x,y,deg", START_HELP)] = None,
     duration: Annotated[float | None, option("S", DURATION_HELP, min=0.1)] = None,
-    lockstep: Annotated[
-        bool, flag("--lockstep", "As fast as possible; one seed gives the same bytes.")
-    ] = False,
+    lockstep: Annotated[bool, flag("--lockstep", "As fast as possible; one seed, the same bytes.")] = False,
     rate: cli.RateOption = 1.0,
     control_hz: Annotated[
         float | None, option("HZ", "Command rate; the system file's by default.", min=0.01)
@@ -89,8 +88,8 @@ def run(
     remap: Annotated[list[str] | None, option("FROM:=TO", REMAP_HELP)] = None,
     adapter: Annotated[str | None, option("NAME", ADAPTER_HELP)] = None,
     topic: Annotated[str | None, option("T", "Topic that --adapter takes; the file's by default.")] = None,
-    markers: cli.MarkersOption = False,
     as_json: cli.JsonOption = False,
+    extras: tuple[str, ...] = (),
 ) -> None:
     """Run a robot once, over ROS, and record it.
 
@@ -137,7 +136,7 @@ def run(
         record=record or dated_folder("runs", name or robot, controller), command=cli.invoked_command(),
         guards={key: value for key, value in guards.items() if value is not None}, recording=recording,
         copies=copies, controller_network=controller_network, mocap_hz=mocap_hz, remap=remap or (),
-        adapter=adapter, topic=topic, markers=markers,
+        adapter=adapter, topic=topic, extras=extras,
     )  # fmt: skip
     check_plan(request.plan)
     from fulmar_evaluation.run_outcome import run_and_evaluate

@@ -35,8 +35,7 @@ def status(
 
     fulmar status floating_platform --node plant
     """
-    from fulmar_bringup.domain_status import domain_status
-    from fulmar_bringup.run_plan import NODES
+    from fulmar_bringup.domain_status import NODES, domain_status
 
     if node is not None and node not in NODES:
         raise UnknownNameError("node", node, NODES)

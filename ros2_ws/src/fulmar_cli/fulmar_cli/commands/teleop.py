@@ -36,8 +36,8 @@ def teleop(
 
     fulmar teleop kingfisher --no-keyboard --share 1
     """
-    from fulmar_bringup.operator_rows import teleop_spec
     from fulmar_bringup.processes import command_line
+    from fulmar_bringup.teleop_row import teleop_spec
     from fulmar_core.robots.robot_file import load_robot
     from fulmar_core.robots.topics import GIVE_BACK
 

@@ -32,6 +32,7 @@ ONLY_HELP = (
 )
 
 
+@cli.with_node_options(standing=True)
 def up(
     system: Annotated[str, argument("SYSTEM", "A name from `fulmar list systems`.")] = "mujoco_policy",
     robot: Annotated[str | None, option("R", "Another robot than the system's.")] = None,
@@ -52,12 +53,12 @@ def up(
     estop: cli.EstopOption = False,
     record: cli.RecordOption = None,
     recording: Annotated[str | None, option("whole|ring|goals", RECORDING_HELP)] = None,
-    markers: cli.MarkersOption = True,
     service: Annotated[bool, flag("--service", SERVICE_HELP)] = False,
     only: Annotated[str | None, option("plant|controller", ONLY_HELP)] = None,
     as_json: Annotated[
         bool, flag("--json", "Print one JSON object a line for each event, and nothing else.")
     ] = False,
+    extras: tuple[str, ...] = (),
 ) -> None:
     """Keep a system running until Ctrl-C or SIGTERM, and record it.
 
@@ -84,7 +85,7 @@ def up(
 
     fulmar up mujoco_lqr --only plant        # and on another host: fulmar up mujoco_lqr --only controller
     """
-    from fulmar_bringup.run_plan import CONTROLLER
+    from fulmar_bringup.node_spec import CONTROLLER
     from fulmar_bringup.split_controller import keep_controller_up
     from fulmar_bringup.standing_system import keep_up, plan_system
     from fulmar_bringup.system import varied_system
@@ -98,7 +99,7 @@ def up(
     request = plan_system(
         chosen, record=record or dated_folder("runs", chosen.name or chosen.robot, chosen.controller),
         command=cli.invoked_command(), policy=policy, hardware=hardware, emulate=emulate, arm=arm, scenario=scenario,
-        seed=seed, start=read_pose(start, "--start"), rate=rate, recording=recording, markers=markers,
+        seed=seed, start=read_pose(start, "--start"), rate=rate, recording=recording, extras=extras,
         unattended=service, only=only,
     )  # fmt: skip
     check_plan(request.plan)

@@ -67,7 +67,7 @@ def check_plan(plan: RunPlan, *, through: str = "ros") -> None:
     Raises:
         ConfigError: For all modules that are not installed.
     """
-    from fulmar_bringup.run_plan import CONTROLLER
+    from fulmar_bringup.node_spec import CONTROLLER
     from fulmar_bringup.system import gains_note, modules_of
 
     notes = [gains_note(plan.robot, name) for name in (plan.controller, plan.guards.fallback)]

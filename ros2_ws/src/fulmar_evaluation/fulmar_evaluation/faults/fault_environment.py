@@ -215,7 +215,7 @@ def request_of(name: str, record: Path, about: FaultEnvironment = USUAL) -> RunR
         command="fulmar faults",
         goals=_goals_file(record.parent, robot, task) if about.by_goal_node else None,
         emulate=about.emulated,
-        markers=about.drawn,
+        extras=("markers",) if about.drawn else (),
         guards=about.guards_of(robot),
     )
     policy = (

@@ -15,10 +15,10 @@ import rclpy
 from rclpy.node import Node
 
 from fulmar_bringup.launched_command import LaunchedCommand
-from fulmar_bringup.operator_rows import teleop_spec
 from fulmar_bringup.planning import RunRequest
 from fulmar_bringup.processes import ProcessGroup
 from fulmar_bringup.run_plan import RunPlan
+from fulmar_bringup.teleop_row import teleop_spec
 from fulmar_core.config.errors import RunFailed
 from fulmar_core.loop.controller_settings import MOST_COPIES
 from fulmar_core.robots.robot_file import load_robot

@@ -1,24 +1,16 @@
-"""Rows of the nodes that estimate, and of the simulated cameras that they need."""
+"""Row of the nodes that estimate, and the simulated cameras that they need."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
-from fulmar_bringup.run_plan import NodeSpec, Parameter, RunPlan, node_row
-from fulmar_core.estimators.kinds import estimator_kind
+from fulmar_bringup.node_row import Launcher, NodeRow, robot_spec
+from fulmar_bringup.node_spec import NodeSpec, Parameter
+from fulmar_bringup.run_plan import RunPlan
+from fulmar_core.estimators.kinds import KINDS, estimator_kind
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.robots.topics import ANSWER, EVENTS, EVENTS_2, PERIOD, TRUTH, Wire
 from fulmar_core.worlds.scenario import load_scenario
-
-CAMERA = "event_camera"  # name of the node
-
-
-def robot_row(
-    plan: RunPlan, name: str, module: str, parameters: Mapping[str, Parameter], **more: Any
-) -> NodeSpec:
-    """A row of a plan's robot, with its topics renamed; `more` as of `NodeSpec`."""
-    return node_row(plan.namespace, name, module, parameters, remappings=dict(plan.remappings), **more)
 
 
 def simulates_without_noise(plan: RunPlan) -> bool:
@@ -28,24 +20,23 @@ def simulates_without_noise(plan: RunPlan) -> bool:
     return plan.backend == "mock" or not load_scenario(plan.scenario).sensor_noise
 
 
-def estimator_specs(plan: RunPlan) -> tuple[NodeSpec, ...]:
-    """Nodes between plant and controller that Fulmar brings, each after those whose outputs are its inputs."""
-    guards, rows = plan.guards, list[NodeSpec]()
-    files = (*guards.estimators, *((guards.estimator,) if guards.estimator else ()))
-    simulated = plan.backend != "hardware"
-    if simulated and any(EVENTS in estimator_kind(file).takes.values() for file in files):
-        rows.append(_camera_spec(plan))
-    for file in files:
-        rows.append(_estimator_spec(plan, file, (*plan.nodes, *rows)))
-    return tuple(rows)
-
-
-def _camera_spec(plan: RunPlan) -> NodeSpec:
-    """The node that simulates the event cameras of a robot."""
-    count = len(load_robot(plan.robot).event_cameras)
-    outputs = (EVENTS, EVENTS_2)[:count]
+def camera_specs(plan: RunPlan) -> tuple[NodeSpec, ...]:
+    """The node that simulates the event cameras of a robot, where an estimator takes their events."""
+    files = plan.guards.files
+    if plan.backend == "hardware" or not any(EVENTS in estimator_kind(file).takes.values() for file in files):
+        return ()
+    outputs = (EVENTS, EVENTS_2)[: len(load_robot(plan.robot).event_cameras)]
     parameters: dict[str, Parameter] = {"robot": plan.robot, "seed": plan.seed}
-    return _row(plan, CAMERA, "sim_nodes.event_camera_node", parameters, (TRUTH,), (), outputs, ())
+    return (_row(plan, "event_camera", "sim_nodes.event_camera_node", parameters, (TRUTH,), (), outputs, ()),)
+
+
+def estimator_specs(plan: RunPlan) -> tuple[NodeSpec, ...]:
+    """The nodes that estimate, each after those whose outputs are its inputs."""
+    rows = list(camera_specs(plan))
+    cameras = len(rows)
+    for file in plan.guards.files:
+        rows.append(_estimator_spec(plan, file, (*plan.nodes, *rows)))
+    return tuple(rows[cameras:])
 
 
 def _estimator_spec(plan: RunPlan, file: str, others: Sequence[NodeSpec]) -> NodeSpec:
@@ -82,4 +73,11 @@ def _row(
         if upstream:
             parameters["upstream"] = upstream
         inputs, outputs = (*inputs, PERIOD.name), (*outputs, ANSWER.name)
-    return robot_row(plan, name, module, parameters, inputs=inputs, observed=observed, outputs=outputs)
+    return robot_spec(plan, name, module, parameters, inputs=inputs, observed=observed, outputs=outputs)
+
+
+def _specs(plan: RunPlan, _launcher: Launcher) -> tuple[NodeSpec, ...]:
+    return estimator_specs(plan)
+
+
+ROW = NodeRow(_specs, tuple(dict.fromkeys(kind.node for kind in KINDS.values())))

@@ -1,0 +1,94 @@
+"""Row of the node that controls."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from fulmar_bringup.estimator_row import simulates_without_noise
+from fulmar_bringup.lockstep_chain import estimates_odometry
+from fulmar_bringup.node_row import Launcher, NodeRow, robot_spec
+from fulmar_bringup.node_spec import CONTROLLER, NodeSpec, Parameter
+from fulmar_bringup.run_plan import RunPlan
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.robots.topics import (
+    ACTION,
+    METADATA,
+    OBSERVATION,
+    OBSTACLES,
+    ODOMETRY,
+    STATUS,
+    command_wire,
+    goal_wires,
+)
+from fulmar_core.safety.geofence import NO_AREA
+from fulmar_core.tasks import load_task
+from hardware_drivers.hardware import load_hardware
+from policy_server.controllers import controller_entry
+
+
+def controller_spec(plan: RunPlan) -> NodeSpec:
+    """The node that controls."""
+    robot, task = load_robot(plan.robot), load_task(plan.task)
+    parameters: dict[str, Parameter] = {
+        "controller": plan.controller,
+        "robot": plan.robot,
+        "task": plan.task,
+        "control_hz": plan.control_hz,
+        "lockstep": plan.lockstep,
+        "rate": plan.rate,
+        "goals_streamed": bool(plan.goals),
+    }
+    if plan.excitation:
+        parameters["excitation"] = plan.excitation
+    if controller_entry(plan.controller).draws:
+        parameters["seed"] = plan.seed
+    guards = plan.guards
+    if controller_entry(plan.controller).runs_bundle:
+        texts = {
+            "policy": plan.policy,
+            "fallback": guards.fallback or "",
+            "trusted_keys": "" if guards.trusted_keys is None else str(Path(guards.trusted_keys).absolute()),
+        }
+        parameters |= {key: text for key, text in texts.items() if text}
+    if guards.max_run_time_s:
+        parameters["max_run_time_s"] = guards.max_run_time_s
+    if guards.area != NO_AREA:
+        parameters["area"] = list(guards.area)
+    if guards.estop:
+        parameters["estop"] = True
+    if plan.unattended:
+        parameters["unattended"] = True
+    if plan.backend == "hardware":
+        hardware = load_hardware(plan.hardware)
+        if hardware.has_bearing:
+            parameters["air_bearing"] = True
+        # Encoders of a base at rest repeat; motion capture never does.
+        repeats = not estimates_odometry(plan) and not hardware.seen_from_outside
+    else:
+        repeats = simulates_without_noise(plan)
+    if repeats:
+        parameters["odometry_may_repeat"] = True
+    if plan.copies > 1:
+        parameters["copies"] = plan.copies
+    return robot_spec(
+        plan,
+        "controller",
+        "policy_server.controller_node",
+        parameters,
+        network=plan.controller_network,
+        inputs=(
+            ODOMETRY.name,
+            *(wire.name for wire in goal_wires(task.goal_topic)),
+            *((OBSTACLES.name,) if task.sees_obstacles else ()),
+            *(thing.wire.name for thing in task.things),
+        ),
+        outputs=(command_wire(robot).name, STATUS.name, METADATA.name, OBSERVATION.name, ACTION.name),
+    )
+
+
+def _specs(plan: RunPlan, _launcher: Launcher) -> tuple[NodeSpec, ...]:
+    """None where a node that Fulmar does not start controls."""
+    return () if controller_entry(plan.controller).is_external else (controller_spec(plan),)
+
+
+ROW = NodeRow(_specs, ("controller",), part=CONTROLLER)

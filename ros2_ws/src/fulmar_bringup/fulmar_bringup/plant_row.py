@@ -1,0 +1,130 @@
+"""Row of the node that simulates, or that drives a device."""
+
+from __future__ import annotations
+
+from fulmar_bringup.lockstep_chain import between, chain_of, estimates_odometry, paced_wire, takes_poses
+from fulmar_bringup.node_row import Launcher, NodeRow, robot_spec
+from fulmar_bringup.node_spec import NodeSpec, Parameter
+from fulmar_bringup.run_plan import RunPlan
+from fulmar_core.estimators.kinds import load_estimator
+from fulmar_core.robots.actuators.refuge import LANDS_S
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.robots.topics import (
+    ACTUATORS_STATE,
+    ANSWER,
+    CLOCK,
+    DESCRIPTION,
+    MOCAP,
+    ODOMETRY,
+    PERIOD,
+    STATIC_TRANSFORMS,
+    TRANSFORMS,
+    TRUTH,
+    command_wire,
+)
+from fulmar_core.tasks import load_task
+
+STOPS_S = 4.0  # for a plant to end once its robot is down [s]
+# Of every plant; the last two need tf2_msgs.
+MODEL = (DESCRIPTION.name, TRANSFORMS.name, STATIC_TRANSFORMS.name)
+
+
+def plant_spec(plan: RunPlan, *, port: str = "") -> NodeSpec:
+    """The node that simulates, or that drives a device.
+
+    Args:
+        plan: What to run.
+        port: Where the device is, in the place of what the hardware file says.
+    """
+    lands_s = LANDS_S + STOPS_S if load_robot(plan.robot).flies and not plan.lockstep else 0.0
+    parameters: dict[str, Parameter] = {
+        "robot": plan.robot,
+        "task": plan.task,
+        "backend": plan.backend,
+        "scenario": plan.scenario,
+        "seed": plan.seed,
+        "start": list(plan.start),
+        "control_hz": plan.control_hz,
+        "lockstep": plan.lockstep,
+        "rate": plan.rate,
+        "duration_s": plan.duration_s,
+        "autostart": not plan.supervised,
+    }
+    if plan.guards.estop:
+        parameters["estop"] = True
+    estimated, chain = estimates_odometry(plan), chain_of(plan)
+    captured = estimated and takes_poses(plan)
+    if estimated:
+        parameters["estimated"] = True
+        if not captured:
+            parameters["captured"] = False
+    if any(TRUTH.name in node.inputs for node in (*plan.nodes, *between(plan))):
+        parameters["truth_in_period"] = True
+    if chain:
+        parameters["chain"] = list(chain)
+    if plan.backend == "hardware":
+        parameters["hardware"] = plan.hardware
+        if plan.arm:
+            parameters["arm"] = True
+        if plan.unattended:
+            parameters["unattended"] = True
+        if port:
+            parameters["port"] = port
+        return robot_spec(
+            plan,
+            "plant",
+            "hardware_drivers.driver_node",
+            parameters,
+            inputs=(command_wire(load_robot(plan.robot)).name,),
+            outputs=tuple(
+                dict.fromkeys((ACTUATORS_STATE.name, *_sensor_topics(plan), paced_wire(plan).name, *MODEL))
+            ),
+            ends_within_s=lands_s,
+        )
+    parameters |= motion_capture(plan)
+    things = tuple(thing.wire.name for thing in load_task(plan.task).things)
+    poses = (MOCAP.name,) if captured or plan.mocap_hz else ()
+    odometry = () if estimated else (ODOMETRY.name,)
+    period = (PERIOD.name,) if chain else ()
+    return robot_spec(
+        plan,
+        "plant",
+        "sim_nodes.sim_node",
+        parameters,
+        inputs=(command_wire(load_robot(plan.robot)).name, *((ANSWER.name,) if chain else ())),
+        outputs=(
+            CLOCK.name,
+            TRUTH.name,
+            ACTUATORS_STATE.name,
+            *_sensor_topics(plan),
+            *odometry,
+            *poses,
+            *things,
+            *period,
+            *MODEL,
+        ),
+        ends_within_s=lands_s,
+    )
+
+
+def _sensor_topics(plan: RunPlan) -> tuple[str, ...]:
+    """Topics of a robot's sensors but the odometry, which may come from another node."""
+    return tuple(
+        kind.wire.name for kind in load_robot(plan.robot).sensors.kinds.values() if kind.wire != ODOMETRY
+    )
+
+
+def motion_capture(plan: RunPlan) -> dict[str, Parameter]:
+    """Parameters of the simulated motion capture."""
+    late: dict[str, Parameter] = {}
+    if plan.guards.estimator:
+        late["mocap_late_s"] = load_estimator(plan.guards.estimator).latency_s
+    return late | ({"mocap_hz": plan.mocap_hz} if plan.mocap_hz else {})
+
+
+def _specs(plan: RunPlan, launcher: Launcher) -> tuple[NodeSpec, ...]:
+    emulated = launcher.emulation.port if launcher.emulation is not None else ""
+    return (plant_spec(plan, port=launcher.port or emulated),)
+
+
+ROW = NodeRow(_specs, ("plant",))

@@ -1,0 +1,53 @@
+"""Row of the node that records."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict
+
+from fulmar_bringup.lockstep_chain import chain_of
+from fulmar_bringup.node_row import Launcher, NodeRow, robot_spec
+from fulmar_bringup.node_spec import NodeSpec, Parameter
+from fulmar_bringup.run_plan import RunPlan
+from fulmar_core.config.recording import Recording
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.robots.topics import WIRES, own_wires
+from fulmar_core.tasks import load_task
+
+
+def recorder_spec(plan: RunPlan, *, directory: str = "", info: str = "", files: str = "") -> NodeSpec:
+    """The node that records.
+
+    Args:
+        plan: What to run.
+        directory: The bag folder; empty: the node makes one under `runs/`.
+        info: As `bag_origin.run_info` gives it.
+        files: As `bag_origin.attachments` gives it.
+    """
+    texts = {"directory": directory, "run_info": info, "attachments": files}
+    things, own = load_task(plan.task).things, own_wires(load_robot(plan.robot))
+    usual = asdict(Recording())
+    unusual = {key: value for key, value in asdict(plan.recording).items() if value != usual[key]}
+    return robot_spec(
+        plan,
+        "recorder",
+        "fulmar_ros.recorder_node",
+        {key: text for key, text in texts.items() if text}
+        | unusual
+        | ({"lossless": True} if chain_of(plan) else {})
+        | ({"things": [thing.name for thing in things]} if things else {})
+        | ({"own_topics": [f"{wire.name} {wire.type}" for wire in own]} if own else {}),
+        observed=tuple(wire.name for wire in (*WIRES, *own, *(thing.wire for thing in things)) if wire.recorded),
+        loss=plan.loss_of_helpers,
+    )
+
+
+def _specs(plan: RunPlan, launcher: Launcher) -> tuple[NodeSpec, ...]:
+    return () if launcher.record is None else (recorder_spec(plan, **launcher.record),)
+
+
+def _resume(_said: Mapping[str, str]) -> dict[str, Parameter]:
+    return {"resume": True}
+
+
+ROW = NodeRow(_specs, ("recorder",), beats=True, resume=_resume)
