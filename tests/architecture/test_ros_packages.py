@@ -34,12 +34,9 @@ def imports(repository):
 
 def programs(folder):
     """Console scripts of one setup.py as (program, module); where it asks for them, every node is one."""
-    text, inner = (folder / "setup.py").read_text(), folder / folder.name
-    nodes = (
-        sorted(path.stem for path in inner.glob("*_node.py"))
-        if '{node}:main" for node in NODES' in text
-        else []
-    )
+    text = (folder / "setup.py").read_text()
+    asked = (folder / folder.name).glob("*_node.py") if '{node}:main" for node in NODES' in text else ()
+    nodes = sorted(path.stem for path in asked if "def main(" in path.read_text())
     return re.findall(r'"(\w+) = ([\w.]+):main"', text) + [(node, f"{folder.name}.{node}") for node in nodes]
 
 

@@ -16,7 +16,7 @@ import yaml
 
 from fulmar_bringup.domain_status import NODES
 from fulmar_bringup.service.device_rules import device_groups, device_rules
-from fulmar_bringup.system import varied_system
+from fulmar_bringup.system_plan import system_plan
 from fulmar_cli.main import app
 from hardware_drivers.hardware import load_hardware
 
@@ -119,9 +119,7 @@ def test_training_ends_by_itself_without_a_network(compose):
 @pytest.mark.parametrize("name", STANDING)
 def test_the_command_of_a_standing_service_names_a_system_that_exists(name, compose):
     runs = parsed(compose["services"][name]["command"])
-    system = varied_system(
-        runs["system"], robot=runs["robot"], robot_name=runs["name"], backend=runs["backend"]
-    )
+    system = system_plan(runs["system"], robot=runs["robot"], name=runs["name"], backend=runs["backend"])
     assert system.name == runs["name"]
 
 

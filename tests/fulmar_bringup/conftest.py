@@ -4,31 +4,19 @@ from __future__ import annotations
 
 import pytest
 
-from fulmar_bringup.planning import plan_run
+from fulmar_bringup.completion import completed
+from fulmar_bringup.plan_checks import checked
+from fulmar_bringup.run_plan import RunPlan
+from fulmar_bringup.system import Guards
 
 
 @pytest.fixture
 def plan(tmp_path):
-    """Function that plans a run, with some of its request changed."""
+    """Function that plans a run, with some of what is asked for changed; guards by their names."""
 
-    def make(**changes):
-        request = {
-            "robot": "floating_platform",
-            "task": "go_to_pose",
-            "controller": "lqr",
-            "backend": "mujoco",
-            "policy": None,
-            "goal": None,
-            "start": None,
-            "duration_s": None,
-            "lockstep": False,
-            "rate": 1.0,
-            "control_hz": None,
-            "scenario": "nominal",
-            "seed": 0,
-            "record": tmp_path / "bag",
-            "command": "fulmar run",
-        }
-        return plan_run(**request | changes)
+    def make(*, guards=None, **changes):
+        asked = {"robot": "floating_platform", "task": "go_to_pose", "controller": "lqr", "backend": "mujoco"}
+        asked |= {"record": str(tmp_path / "bag"), "command": "fulmar run", "guards": Guards(**guards or {})}
+        return checked(completed(RunPlan(**asked | changes)))
 
     return make

@@ -98,7 +98,7 @@ def test_a_launched_system_says_as_much_as_a_run():
 
 
 def test_run_information_is_the_plan_and_what_else_is_known():
-    info = json.loads(run_info(LQR, {"command": "fulmar run"}))
+    info = json.loads(run_info(replace(LQR, command="fulmar run")))
     assert info["command"] == "fulmar run"
     assert info["recording"]["mode"] == "whole"
     assert "supervised" not in info

@@ -6,12 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from fulmar_bringup.plan_checks import usual_controller
+from fulmar_bringup.completion import usual_controller
+from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.task_choice import check_heading, default_task
 from fulmar_cli.commands.values import read_goal
 from fulmar_core.config.errors import ConfigError
-from fulmar_core.robots.robot_file import load_robot
-from fulmar_core.tasks import load_task
 
 
 @pytest.mark.parametrize(
@@ -73,10 +72,13 @@ def test_a_goal_has_two_or_three_numbers():
 
 def test_an_aircraft_holds_its_height_by_lqi_where_no_policy_is_shipped(monkeypatch):
     assert default_task("navion", "policy") == "fly_hold"
-    robot, task = load_robot("navion"), load_task("fly_hold")
-    monkeypatch.setattr("fulmar_bringup.plan_checks.shipped_policy", lambda *_names: None)
-    assert usual_controller("policy", None, robot, task) == "lqi"
-    assert usual_controller("lqr", None, robot, task) == "lqr"
-    assert usual_controller("policy", Path("mine"), robot, task) == "policy"
-    monkeypatch.setattr("fulmar_bringup.plan_checks.shipped_policy", lambda *_names: Path("shipped"))
-    assert usual_controller("policy", None, robot, task) == "policy"
+
+    def usual(controller, policy=""):
+        return usual_controller(RunPlan("navion", "fly_hold", controller, "mujoco", policy=policy))
+
+    monkeypatch.setattr("fulmar_bringup.completion.shipped_policy", lambda *_names: None)
+    assert usual("policy") == "lqi"
+    assert usual("lqr") == "lqr"
+    assert usual("policy", "mine") == "policy"
+    monkeypatch.setattr("fulmar_bringup.completion.shipped_policy", lambda *_names: Path("shipped"))
+    assert usual("policy") == "policy"

@@ -11,22 +11,21 @@ from fulmar_bringup.controller_row import controller_spec
 from fulmar_bringup.goal_plan import is_endless, shown_path, start_of
 from fulmar_bringup.goals_row import run_goals_spec
 from fulmar_bringup.launched_system import list_nodes
-from fulmar_bringup.planning import plan_run
-from fulmar_bringup.task_choice import task_of_goals, task_of_run
+from fulmar_bringup.run_plan import RunPlan
+from fulmar_bringup.task_choice import task_of, task_of_goals
 from fulmar_core.config.errors import ConfigError
 from fulmar_core.tasks.goal_files import load_goals
 
 
 @pytest.fixture
-def plan(tmp_path):
+def plan(plan):
+    """Function that plans a run with goals from a file."""
+
     def make(goals, **changes):
-        request = {
-            "robot": "floating_platform", "task": task_of_goals(goals), "controller": "classical",
-            "backend": "mujoco", "policy": None, "goal": None, "start": None, "duration_s": None,
-            "lockstep": True, "rate": 1.0, "control_hz": None, "scenario": "nominal", "seed": 0,
-            "record": tmp_path / "bag", "command": "fulmar run",
-        }  # fmt: skip
-        return plan_run(**request | changes, goals=goals)
+        return plan(
+            **{"task": task_of_goals(goals), "controller": "classical", "lockstep": True} | changes,
+            goals=goals,
+        )
 
     return make
 
@@ -64,11 +63,11 @@ def test_every_kind_of_goals_has_a_task(goals, task):
 
 def test_a_path_is_begun_at_its_beginning_and_lasts_as_long_as_it_takes(plan):
     request = plan("circle")
-    x, y, heading = request.plan.start
+    x, y, heading = request.start
     points = load_goals("circle").planner().points
     assert (x, y) == pytest.approx(tuple(points[0]))
     assert math.radians(heading) == pytest.approx(math.atan2(*(points[1] - points[0])[::-1]))
-    assert request.plan.duration_s > 2 * math.pi * 1.5 / 0.25
+    assert request.duration_s > 2 * math.pi * 1.5 / 0.25
     assert request.goal is None
 
 
@@ -79,38 +78,30 @@ def test_a_path_is_begun_at_its_beginning_and_lasts_as_long_as_it_takes(plan):
 def test_a_satellite_turns_to_goals_and_else_points_to_the_earth(file, given, task):
     if "goals" in given:
         given = {"goals": file(TURNS)}
-    found, _ = task_of_run(
-        None,
-        "cubesat_wheels",
-        "lqr",
-        "mujoco",
-        goal=given.get("goal"),
-        goals=given.get("goals"),
-        policy=None,
-    )
+    found = task_of(RunPlan("cubesat_wheels", "", "lqr", "mujoco", **given))
     assert found == task
 
 
 def test_a_satellite_has_the_time_that_its_turns_take(plan, file):
     request = plan(file(TURNS), robot="cubesat_wheels", task="slew", start=(0.0,) * 6)
-    assert request.plan.duration_s == pytest.approx(2 * 20.0 + 3.0 * math.radians(90.0 + 180.0) / 0.03 + 5.0)
+    assert request.duration_s == pytest.approx(2 * 20.0 + 3.0 * math.radians(90.0 + 180.0) / 0.03 + 5.0)
 
 
 def test_velocities_begin_at_the_origin_and_end_a_little_after_the_last(plan):
     request = plan("velocity_steps")
-    assert request.plan.start == (0.0, 0.0, 0.0)
-    assert 26.0 < request.plan.duration_s < 35.0
+    assert request.start == (0.0, 0.0, 0.0)
+    assert 26.0 < request.duration_s < 35.0
 
 
 def test_places_are_begun_as_far_from_the_first_as_the_seed_s_episode_is(plan, file):
     request = plan(file(NEAR))
-    assert 0.5 <= math.dist(request.plan.start[:2], (7.0, 0.0)) <= 5.0
-    assert request.plan.goals.endswith("mine.yaml")
+    assert 0.5 <= math.dist(request.start[:2], (7.0, 0.0)) <= 5.0
+    assert request.goals.endswith("mine.yaml")
 
 
 def test_what_is_said_counts_more_than_what_follows_from_the_file(plan):
     request = plan("circle", start=(0.0, 1.0, 0.0), duration_s=7.0)
-    assert (request.plan.start, request.plan.duration_s) == ((0.0, 1.0, 0.0), 7.0)
+    assert (request.start, request.duration_s) == ((0.0, 1.0, 0.0), 7.0)
 
 
 @pytest.mark.parametrize(
@@ -155,7 +146,7 @@ def test_endless_rounds_have_the_length_of_one_and_are_known_for_endless(plan, f
     goals = file(ROUND)
     assert is_endless(load_goals(goals))
     assert not is_endless(load_goals("circle"))
-    assert 25.0 < plan(goals).plan.duration_s < 40.0
+    assert 25.0 < plan(goals).duration_s < 40.0
 
 
 def test_the_path_to_show_is_closed_and_small():
@@ -172,16 +163,16 @@ def test_a_path_s_start_is_no_place_s_start():
 
 def test_a_run_s_goal_node_waits_for_nobody_and_its_controller_for_it(plan):
     request = plan("circle")
-    parameters = run_goals_spec(request.plan).parameters
+    parameters = run_goals_spec(request).parameters
     assert parameters.items() >= {"lockstep": True, "stay": True, "control_hz": 5.0}.items()
-    assert controller_spec(request.plan).parameters["goals_streamed"] is True
+    assert controller_spec(request).parameters["goals_streamed"] is True
     assert controller_spec(plan_without(request)).parameters["goals_streamed"] is False
 
 
 def plan_without(request):
     from dataclasses import replace
 
-    return replace(request.plan, goals="")
+    return replace(request, goals="")
 
 
 def test_a_system_with_goals_has_a_node_more():

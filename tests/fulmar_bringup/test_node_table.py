@@ -264,7 +264,7 @@ def test_an_emulated_device_is_a_row_of_the_launch_file_too():
     rows = by_name(list_nodes(robot="turtlebot2", task="go_to_position", controller="classical", backend="hardware",
                               emulate="true"))  # fmt: skip
     assert rows["plant"].parameters["port"] == rows["emulator"].parameters["link"]
-    with pytest.raises(ConfigError, match="the backend is mujoco"):
+    with pytest.raises(ConfigError, match="not with mujoco"):
         list_nodes(emulate="true")
 
 

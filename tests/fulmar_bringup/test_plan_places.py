@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from fulmar_bringup import planning
+from fulmar_bringup import completion
 from fulmar_bringup.system import Guards
 from fulmar_core.config.errors import ConfigError
 
@@ -23,7 +23,7 @@ NARROW = {"area": (0.0, 2.0, -1.0, 1.0)}
             "the start x = 1 m, y = 1.5 m lies outside the area",
         ),
         (
-            {"start": (1.0, 1.5, 0.0), "goals_later": True},
+            {"start": (1.0, 1.5, 0.0), "standing": True},
             "the start x = 1 m, y = 1.5 m lies outside the area",
         ),
     ],
@@ -36,7 +36,7 @@ def test_a_goal_or_a_start_outside_the_area_is_refused(plan, change, words):
 
 
 def test_a_goal_outside_the_area_of_the_system_file_is_refused(plan, monkeypatch):
-    monkeypatch.setattr(planning, "default_guards", lambda *_: Guards(**NARROW))
+    monkeypatch.setattr(completion, "default_guards", lambda *_: Guards(**NARROW))
     with pytest.raises(ConfigError, match="outside the area of x 0 to 2 m"):
         plan(goal=(2.5, 0.0, 0.0), start=(1.0, 0.0, 0.0))
 
@@ -52,7 +52,7 @@ def test_what_is_drawn_lies_inside_the_area_and_is_the_same_for_one_seed(plan, g
     x_min, x_max, y_min, y_max = area = (-2.5, 2.5, -1.0, 1.5)
     first, again = (plan(goal=goal, seed=seed, guards={"area": area}) for _ in range(2))
     assert first == again
-    for x, y, _ in (first.goal, first.plan.start):
+    for x, y, _ in (first.goal, first.start):
         assert x_min <= x <= x_max
         assert y_min <= y <= y_max
 
@@ -71,7 +71,7 @@ def test_an_area_too_small_for_any_draw_is_refused_with_what_to_give(plan):
 
 def test_among_obstacles_a_start_outside_the_area_is_refused_since_the_plant_draws_the_same_ones(plan):
     change = {"robot": "kingfisher", "task": "go_to_position_with_obstacles", "controller": "policy"}
-    x, _, _ = plan(**change).plan.start
+    x, _, _ = plan(**change).start
     with pytest.raises(ConfigError, match="the drawn start"):
         plan(
             **change,
@@ -102,8 +102,8 @@ def test_where_a_real_robot_starts_is_not_known_and_not_refused(plan):
         "backend": "hardware",
     }
     far = {"area": (3.0, 9.0, 3.0, 9.0)}
-    assert plan(**change, goal=(4.0, 4.0, 0.0), guards=far).plan.guards.area == far["area"]
-    x, y, _ = plan(**change, goal=(4.0, 4.0, 0.0), guards=far, emulate=True).plan.start
+    assert plan(**change, goal=(4.0, 4.0, 0.0), guards=far).guards.area == far["area"]
+    x, y, _ = plan(**change, goal=(4.0, 4.0, 0.0), guards=far, emulated=True).start
     assert 3.0 <= x <= 9.0
     assert 3.0 <= y <= 9.0
 

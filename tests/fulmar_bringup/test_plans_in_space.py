@@ -9,7 +9,8 @@ import pytest
 
 from fulmar_bringup.controller_row import controller_spec
 from fulmar_bringup.plant_row import plant_spec
-from fulmar_bringup.task_choice import check_heading, default_task, task_of_goals, task_of_run
+from fulmar_bringup.run_plan import RunPlan
+from fulmar_bringup.task_choice import check_heading, default_task, goal_note, task_of_goals
 from fulmar_core.config.errors import ConfigError
 from fulmar_core.states.spatial import SpatialState
 
@@ -35,36 +36,36 @@ GOAL, START = (1.0, 0.0, -0.5, 0.0, 30.0, 90.0), (0.0, 0.5, 0.0, 10.0, 20.0, 30.
 
 def test_what_was_said_is_kept_and_reaches_the_plant(plan):
     request = plan(**SPACE, goal=GOAL, start=START)
-    assert (request.goal, request.plan.start) == (GOAL, START)
-    assert plant_spec(request.plan).parameters["start"] == list(START)
+    assert (request.goal, request.start) == (GOAL, START)
+    assert plant_spec(request).parameters["start"] == list(START)
     assert SpatialState.written(request.mission.current) == pytest.approx(GOAL)
 
 
 def test_a_place_alone_is_upright(plan):
     request = plan(**SPACE, goal=GOAL[:3], start=START[:3])
     assert request.goal == (*GOAL[:3], 0.0, 0.0, 0.0)
-    assert request.plan.start == (*START[:3], 0.0, 0.0, 0.0)
+    assert request.start == (*START[:3], 0.0, 0.0, 0.0)
 
 
 def test_one_seed_gives_one_plan_as_far_from_the_goal_as_the_task_says(plan):
     request = plan(**SPACE, seed=7)
     assert request == plan(**SPACE, seed=7)
     assert request.goal != plan(**SPACE, seed=8).goal
-    assert (len(request.goal), len(request.plan.start)) == (6, 6)
-    assert 0.25 <= math.dist(request.goal[:3], request.plan.start[:3]) <= 6.0
+    assert (len(request.goal), len(request.start)) == (6, 6)
+    assert 0.25 <= math.dist(request.goal[:3], request.start[:3]) <= 6.0
 
 
 def test_a_goal_alone_moves_the_start_along_and_keeps_its_attitude(plan):
     drawn, moved = plan(**SPACE, seed=3), plan(**SPACE, seed=3, goal=(5.0, 5.0, -5.0, 0.0, 0.0, 0.0))
-    offsets = [np.subtract(each.plan.start, each.goal)[:3] for each in (drawn, moved)]
+    offsets = [np.subtract(each.start, each.goal)[:3] for each in (drawn, moved)]
     assert offsets[0] == pytest.approx(offsets[1])
-    assert moved.plan.start[3:] == drawn.plan.start[3:]
+    assert moved.start[3:] == drawn.start[3:]
 
 
 def test_a_box_reaches_the_controller(plan):
     box = (-9.0, 9.0, -9.0, 9.0, -9.0, 9.0)
     request = plan(**SPACE | {"controller": STILL}, goal=GOAL, start=START, guards={"area": box})
-    assert controller_spec(request.plan).parameters["area"] == list(box)
+    assert controller_spec(request).parameters["area"] == list(box)
 
 
 @pytest.mark.parametrize(
@@ -124,9 +125,9 @@ def test_a_hardware_file_that_is_named_serves_a_robot_without_one_of_its_own(pla
         default_task("spacecraft_16", "lqr", "hardware")
     task = default_task("spacecraft_16", "lqr", "hardware", hardware=str(path))
     asked = {"robot": "spacecraft_16", "task": task, "controller": "lqr", "goal": GOAL}
-    found = plan(**asked, backend="hardware", hardware=str(path), emulate=True)
-    assert (task, found.plan.hardware) == ("go_to_pose_3d", str(path))
-    assert found.plan.guards.estimator == "mocap_imu_3d"  # valves measure nothing
+    found = plan(**asked, backend="hardware", hardware=str(path), emulated=True)
+    assert (task, found.hardware) == ("go_to_pose_3d", str(path))
+    assert found.guards.estimator == "mocap_imu_3d"  # valves measure nothing
 
 
 def test_a_place_is_no_pose_and_an_attitude_without_effect_is_said():
@@ -135,7 +136,7 @@ def test_a_place_is_no_pose_and_an_attitude_without_effect_is_said():
     note = check_heading("go_to_position_3d", GOAL)
     assert note == "task 'go_to_position_3d' has no attitude: the 0, 30, 90 deg of --goal have no effect"
     with pytest.raises(ConfigError, match="has 2 numbers"):
-        task_of_run(None, "spacecraft_16", "lqr", "mujoco", goal=(1.0, 2.0), goals=None, policy=None)
+        goal_note(RunPlan("spacecraft_16", "", "lqr", "mujoco", goal=(1.0, 2.0)))
 
 
 @pytest.mark.parametrize(
@@ -154,7 +155,7 @@ def test_a_file_in_space_is_for_the_tasks_in_space(text, task, plan, tmp_path):
     goals = str(tmp_path / "goals.yaml")
     assert task_of_goals(goals) == task
     request = plan(**SPACE | {"task": task}, goals=goals)
-    assert len(request.plan.start) == 6
+    assert len(request.start) == 6
     with pytest.raises(ConfigError, match="no goals of task"):
         plan(
             **SPACE | {"task": "go_through_poses_3d" if "velocities" in text else "track_velocities_3d"},
@@ -173,10 +174,8 @@ def test_a_turn_rate_beyond_the_limit_is_refused_whatever_its_axis(plan, tmp_pat
 def test_a_target_that_moves_starts_where_it_begins_and_lasts_as_long_as_it_moves(plan):
     request = plan(**SPACE, goals="helix")
     assert task_of_goals("helix") == "go_to_pose_3d"
-    assert request.plan.start[:3] == pytest.approx((1.0, 0.0, -0.5))
-    assert request.plan.duration_s == pytest.approx(
-        2.0 * math.hypot(2.0 * math.pi, 0.5) / 0.1 + 10.0, rel=1e-3
-    )
+    assert request.start[:3] == pytest.approx((1.0, 0.0, -0.5))
+    assert request.duration_s == pytest.approx(2.0 * math.hypot(2.0 * math.pi, 0.5) / 0.1 + 10.0, rel=1e-3)
 
 
 HELIX = "kind: trajectory\ntitle: t\nspeed: {}\nfacing: {}\npath: {{kind: helix, radius: 1, pitch: 9, turns: 1}}\n"

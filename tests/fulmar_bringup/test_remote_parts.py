@@ -7,11 +7,12 @@ from dataclasses import replace
 
 import pytest
 
+from fulmar_bringup.completion import completed
+from fulmar_bringup.plan_checks import checked
 from fulmar_bringup.remote_parts import RemoteController, mismatch
-from fulmar_bringup.standing_system import plan_system
 from fulmar_bringup.supervisor import Report
-from fulmar_bringup.system import varied_system
 from fulmar_bringup.system_events import SystemEvents
+from fulmar_bringup.system_plan import system_plan
 from fulmar_bringup.system_rows import system_rows
 from fulmar_core.config.errors import ConfigError, UnknownNameError
 
@@ -23,8 +24,9 @@ def plan(tmp_path):
     """Function that plans one part."""
 
     def planned(only, **changes):
-        system = varied_system("mock_lqr", **changes)
-        return plan_system(system, record=tmp_path / "bag", command="fulmar up", only=only).plan
+        asked = system_plan("mock_lqr", **changes)
+        asked = replace(asked, record=str(tmp_path / "bag"), only=only, extras=("markers",))
+        return checked(completed(asked))
 
     return planned
 

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import io
+from dataclasses import replace
 
 import pytest
 from rich.console import Console
 
+from fulmar_bringup.completion import completed
+from fulmar_bringup.plan_checks import checked
 from fulmar_bringup.progress import live_line
 from fulmar_bringup.run_executor import Execution
-from fulmar_bringup.standing_system import Ending, keep_up, plan_system
-from fulmar_bringup.system import varied_system
+from fulmar_bringup.standing_system import Ending, keep_up
+from fulmar_bringup.system_plan import system_plan
 from fulmar_core.config.errors import ConfigError, UnknownNameError
 
 
@@ -19,8 +22,8 @@ def plan(tmp_path):
     """Function that plans a system."""
 
     def planned(system="mujoco_lqr", *, changes=None, **more):
-        chosen = varied_system(system, **(changes or {}))
-        return plan_system(chosen, record=tmp_path / "bag", command="fulmar up", **more).plan
+        asked = replace(system_plan(system, **(changes or {})), record=str(tmp_path / "bag"), **more)
+        return checked(completed(asked))
 
     return planned
 
@@ -33,9 +36,9 @@ def test_a_system_has_no_end_and_begins_at_the_origin(plan):
 
 def test_a_system_keeps_the_name_of_its_robot(plan):
     assert plan().robot_name == "floating_platform"
-    assert plan(changes={"robot_name": "alpha"}).namespace == "/alpha"
+    assert plan(changes={"name": "alpha"}).namespace == "/alpha"
     with pytest.raises(ConfigError, match="the name '' of a robot"):
-        plan(changes={"robot_name": ""})
+        plan(changes={"name": ""})
 
 
 def test_on_hardware_goals_come_later_and_an_e_stop_runs(plan):
@@ -46,11 +49,11 @@ def test_on_hardware_goals_come_later_and_an_e_stop_runs(plan):
 
 
 def test_velocities_get_no_bag_for_each_goal(plan):
-    assert plan(recording="goals").recording.mode == "goals"
+    assert plan(recording_mode="goals").recording.mode == "goals"
     with pytest.raises(ConfigError, match="velocities stream"):
-        plan(changes={"task": "track_velocities"}, recording="goals")
+        plan(changes={"task": "track_velocities"}, recording_mode="goals")
     with pytest.raises(UnknownNameError, match="Did you mean 'goals'"):
-        plan(recording="goal")
+        plan(recording_mode="goal")
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,8 @@ import pytest
 from fulmar_bringup.bag_origin import attachments
 from fulmar_bringup.controller_row import controller_spec
 from fulmar_bringup.excitation_plan import torques_note
-from fulmar_bringup.task_choice import task_of_run
+from fulmar_bringup.run_plan import RunPlan
+from fulmar_bringup.task_choice import goal_note, task_of
 from fulmar_core.config.errors import ConfigError
 from fulmar_core.config.paths import config_names
 from fulmar_core.controllers.by_kind import exciting
@@ -32,8 +33,10 @@ def planned(plan):
     """The plan of a run with a goal file."""
 
     def made(goals, *, robot="microsat", controller="excite", **more):
-        task, _ = task_of_run(None, robot, controller, "mujoco", goal=None, goals=goals, policy=None)
-        return plan(robot=robot, task=task, controller=controller, goals=goals, lockstep=True, **more).plan
+        asked = RunPlan(robot, "", controller, "mujoco", goals=goals)
+        goal_note(asked)  # as the command line asks first
+        task = task_of(asked)
+        return plan(robot=robot, task=task, controller=controller, goals=goals, lockstep=True, **more)
 
     return made
 

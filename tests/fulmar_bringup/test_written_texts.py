@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shlex
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,6 +20,7 @@ from fulmar_bringup.service.unit import PASSED, Service, command_of, unit_text
 from fulmar_core.config.errors import ConfigError
 from fulmar_core.config.written_text import LINE, NAME, USER, check_written
 from hardware_drivers.hardware import load_hardware
+from policy_server.controllers import shipped_policy
 
 SERVICE = Service("a", "mujoco_lqr", ("/bin/fulmar", "up"), "games")
 HARMLESS = unit_text(SERVICE, {})
@@ -129,10 +131,11 @@ def test_a_launch_argument_that_is_no_name_is_refused_with_what_was_given(field,
 
 
 @pytest.mark.parametrize("text", ['a"b', "a;b", "$(env HOME)", "%h"])
-def test_a_launched_folder_reaches_its_node_as_it_is(text):
+def test_a_launched_folder_reaches_its_node_as_it_is(text, tmp_path):
     """As text with its type, which launch_ros neither reads as YAML nor fills in."""
-    rows = {row.name: row for row in list_nodes(system="mujoco_policy", policy=text)}
-    assert rows["controller"].parameters["policy"] == text
+    folder = shutil.copytree(shipped_policy("floating_platform", "go_to_pose"), tmp_path / text)
+    rows = {row.name: row for row in list_nodes(system="mujoco_policy", policy=str(folder))}
+    assert rows["controller"].parameters["policy"] == str(folder)
 
 
 @pytest.mark.parametrize("program", PROGRAMS)

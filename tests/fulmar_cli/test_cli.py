@@ -139,7 +139,7 @@ def test_limits_of_a_run_reach_its_plan(fulmar, monkeypatch, tmp_path):
         """Nothing is started."""
 
     def run(request):
-        guards.append(request.plan.guards)
+        guards.append(request.guards)
         raise PlannedError
 
     guards = []

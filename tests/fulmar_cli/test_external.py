@@ -15,11 +15,13 @@ from fulmar_bags.control_steps import control_steps_of
 from fulmar_bags.run_record import read_run
 from fulmar_bringup import readiness
 from fulmar_bringup.bag_origin import attachments
+from fulmar_bringup.completion import completed
 from fulmar_bringup.launched_system import list_nodes
-from fulmar_bringup.planning import plan_run
+from fulmar_bringup.plan_checks import checked
 from fulmar_bringup.readiness import command_input, wait_for_publisher, wait_for_reader
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.supervisor import Report
+from fulmar_bringup.system import Guards
 from fulmar_core.config.errors import ConfigError, RunFailed
 from fulmar_core.robots.wire_check import Offer
 from fulmar_evaluation.run_summary import summarise, summary_text
@@ -74,20 +76,17 @@ def test_what_has_no_effect_beside_an_external_controller_is_refused(choice, wor
     ("choice", "words"),
     [
         ({"adapter": KOBUKI, "lockstep": True}, "--adapter carry none. Leave --lockstep out"),
-        ({"guards": {"max_run_time_s": 5.0}}, "max_run_time_s: Fulmar's own controller node"),
+        ({"guards": Guards(max_run_time_s=5.0)}, "max_run_time_s: Fulmar's own controller node"),
         ({"copies": 2}, "--copies is for a controller that Fulmar starts"),
         ({"controller_network": "other"}, "--controller-in is for a controller that Fulmar starts"),
-        ({"policy": Path("bundle")}, "runs no policy bundle"),
+        ({"policy": "bundle"}, "runs no policy bundle"),
     ],
 )  # fmt: skip
 def test_a_run_refuses_options_of_the_controller_node(choice, words, tmp_path):
-    usual = dict(
-        backend="mujoco", policy=None, goal=None, start=None, duration_s=None, lockstep=False, rate=1.0,
-        control_hz=None, scenario="nominal", seed=0, record=tmp_path / "bag", command="",
-    )  # fmt: skip
-    assert plan_run(**OWN, **usual).plan.controller == "external"
+    usual = RunPlan(**OWN, backend="mujoco", record=str(tmp_path / "bag"))
+    assert checked(completed(usual)).controller == "external"
     with pytest.raises(ConfigError) as caught:
-        plan_run(**OWN | usual | choice)
+        checked(completed(replace(usual, **choice)))
     assert words in str(caught.value)
 
 

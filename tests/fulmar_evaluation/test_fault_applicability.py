@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from fulmar_bringup.system import Guards
 from fulmar_core.config.paths import config_names
 from fulmar_core.dynamics.flight_trim import find_trim
 from fulmar_core.robots.robot_file import load_robot
@@ -22,7 +23,7 @@ from fulmar_evaluation.faults.fault_environment import (
     FaultEnvironment,
     area_of,
     goal_of,
-    request_of,
+    plan_of,
     task_of,
 )
 from fulmar_evaluation.faults.suite import EVERY, faults_of, modules_for
@@ -113,20 +114,20 @@ def test_an_aircraft_has_every_fault_of_processes_commands_and_odometry_and_the_
 
 
 def test_an_aircraft_starts_in_level_flight_and_never_leaves_its_area_ahead(tmp_path):
-    request = request_of("airship_v7", tmp_path / "bag", FaultEnvironment(has_area=True))
+    request = plan_of("airship_v7", tmp_path / "bag", FaultEnvironment(has_area=True))
     craft = load_robot("airship_v7")
-    assert request.plan.controller == "policy"
-    assert request.plan.control_hz == 25.0
-    assert request.plan.start[4] == pytest.approx(
+    assert request.controller == "policy"
+    assert request.control_hz == 25.0
+    assert request.start[4] == pytest.approx(
         SpatialState.written(find_trim(craft, craft.airframe.speed, 1.0).state.pose)[4], abs=1e-6
     )
-    assert is_inside((craft.airframe.speed * 300.0, 0.0, 1.0), request.plan.guards.area)
-    assert not is_inside((0.0, 0.0, 5.0), request.plan.guards.area)
+    assert is_inside((craft.airframe.speed * 300.0, 0.0, 1.0), request.guards.area)
+    assert not is_inside((0.0, 0.0, 5.0), request.guards.area)
 
 
 def test_a_satellite_keeps_its_place_and_gets_another_attitude_from_a_file_of_goals(tmp_path):
-    request = request_of("cubesat_wheels", tmp_path / "bag", FaultEnvironment(by_goal_node=True))
-    poses = load_goals(request.plan.goals).poses
+    request = plan_of("cubesat_wheels", tmp_path / "bag", FaultEnvironment(by_goal_node=True))
+    poses = load_goals(request.goals).poses
     assert [pose[:3] for pose in poses] == [(0.0, 0.0, 0.0)] * 2
     assert poses[0] != poses[1]
 
@@ -158,8 +159,8 @@ def test_every_robot_has_a_task_and_a_goal_of_its_own_world_within_its_geofence_
 def test_an_estimator_of_the_robots_own_world_runs_where_a_fault_needs_one(robot, form, estimator):
     the_robot = load_robot(robot)
     assert the_robot.state_type is form
-    assert FaultEnvironment(estimated=True).guards_of(the_robot)["estimator"] == estimator
-    assert USUAL.guards_of(the_robot) == {"estop": True}
+    assert FaultEnvironment(estimated=True).guards_of(the_robot).estimator == estimator
+    assert USUAL.guards_of(the_robot) == Guards(estop=True)
     assert "filterpy" in modules_for(robot, faults_of(robot)[0])
 
 

@@ -17,7 +17,7 @@ from fulmar_bags.contents import open_bag
 from fulmar_bags.decode import stamps_ns
 from fulmar_core.robots.topics import ODOMETRY
 from fulmar_evaluation.faults.fault import stopped
-from fulmar_evaluation.faults.fault_environment import request_of
+from fulmar_evaluation.faults.fault_environment import plan_of
 from fulmar_evaluation.faults.live_system import LiveSystem
 from fulmar_evaluation.faults.observer import HealthStatus, bag_evidence, first_problem
 
@@ -46,7 +46,7 @@ def test_the_same_words_of_another_node_or_after_good_ones_are_new():
 @pytest.mark.parametrize("robot", ["floating_platform", "turtlebot2", "kingfisher"])
 @pytest.mark.parametrize("late_s", [-0.01, 0.01])
 def test_whether_a_robot_stopped_in_time_can_be_reported_in_json(robot: str, late_s: float, tmp_path: Path):
-    live = LiveSystem(request_of(robot, tmp_path / "bag"), MagicMock(), MagicMock())
+    live = LiveSystem(plan_of(robot, tmp_path / "bag"), MagicMock(), MagicMock())
     since_s = time.monotonic() - 10.0
     at_s = since_s + live.silenced_s + late_s
     live.observer = MagicMock(

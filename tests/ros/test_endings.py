@@ -12,8 +12,10 @@ import psutil
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 
-from fulmar_bringup.planning import plan_run
+from fulmar_bringup.completion import completed
+from fulmar_bringup.plan_checks import checked
 from fulmar_bringup.processes import Ended, ProcessGroup
+from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.supervisor import Supervisor
 from fulmar_evaluation.run_outcome import RunOutcome, run_and_evaluate
 from tests.conftest import RosDomain
@@ -58,22 +60,16 @@ def outcome_with(
     if ends:
         monkeypatch.setattr(ProcessGroup, "stop_all", stop_otherwise)
     return run_and_evaluate(
-        plan_run(
-            robot="floating_platform",
-            task="go_to_pose",
-            controller="lqr",
-            backend="mock",
-            policy=None,
-            goal=None,
-            start=None,
-            duration_s=2.0,
-            lockstep=True,
-            rate=1.0,
-            control_hz=5.0,
-            scenario="nominal",
-            seed=0,
-            record=folder / "bag",
-            command="test",
+        checked(
+            completed(
+                RunPlan(
+                    *("floating_platform", "go_to_pose", "lqr", "mock", 5.0),
+                    duration_s=2.0,
+                    lockstep=True,
+                    record=str(folder / "bag"),
+                    command="test",
+                )
+            )
         )
     )
 

@@ -11,7 +11,7 @@ from fulmar_cli.commands.faults import names_in
 from fulmar_core.config.errors import ConfigError, UnknownNameError
 from fulmar_evaluation.faults import command_faults
 from fulmar_evaluation.faults.fault import Fault, Outcome, stopped
-from fulmar_evaluation.faults.fault_environment import request_of
+from fulmar_evaluation.faults.fault_environment import plan_of
 from fulmar_evaluation.faults.live_system import LiveSystem, NothingShown, live_system
 from fulmar_evaluation.faults.suite import EVERY, faults_of, run_faults, times_of
 from tests.conftest import RosDomain
@@ -136,7 +136,7 @@ def test_a_robot_that_goes_on_or_never_moved_does_not_pass_for_one_that_stopped(
     ros_domain: RosDomain, tmp_path: Path
 ):
     """The evaluate alone, with nothing done to the system."""
-    with live_system(request_of("floating_platform", tmp_path / "bag")) as live:
+    with live_system(plan_of("floating_platform", tmp_path / "bag")) as live:
         with pytest.raises(NothingShown):
             stopped(live, time.monotonic(), 0.1)
         live.begin()

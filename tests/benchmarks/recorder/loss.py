@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 
 from fulmar_bags.run_record import read_run
+from fulmar_bringup.completion import completed
 from fulmar_bringup.domains import own_domain
-from fulmar_bringup.planning import plan_run
+from fulmar_bringup.plan_checks import checked
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_core.config.errors import RunFailed
 from fulmar_core.config.recording import Recording
@@ -97,32 +98,30 @@ def lost_in_lock_step(robot: str, *, control_hz: float, simulated_s: float, out:
     Raises:
         RunFailed: The run did not begin.
     """
-    request = plan_run(
-        robot=robot,
-        task="go_to_pose",
-        controller="lqr",
-        backend="mujoco",
-        policy=None,
+    plan = RunPlan(
+        robot,
+        "go_to_pose",
+        "lqr",
+        "mujoco",
+        control_hz,
         goal=(0.0, 0.0, 0.0),
         start=(3.0, 1.0, 90.0),
         duration_s=simulated_s,
         lockstep=True,
-        rate=1.0,
-        control_hz=control_hz,
-        scenario="nominal",
         seed=1,
-        record=out / "lock_step",
+        record=str(out / "lock_step"),
         command="fulmar benchmark recorder",
     )
+    record = Path(plan.record)
     with own_domain():
-        failure = run_and_evaluate(request).failure
-    log_s = read_run(request.record).odom.log_s if request.record.exists() else np.empty(0)
+        failure = run_and_evaluate(checked(completed(plan))).failure
+    log_s = read_run(record).odom.log_s if record.exists() else np.empty(0)
     if len(log_s) < 2:
         raise RunFailed(f"nothing was recorded: {failure or 'the run said nothing'}.")
     period_ns, steps = round(1e9 / control_hz), round(simulated_s * control_hz)
     expected = {SIMULATION_START_NS + step * period_ns for step in range(steps)}
-    stamps = stamps_by_topic(request.record)
-    lost = {wire.name: len(expected - set(stamps[f"{request.plan.namespace}/{wire.name}"])) for wire in WIRES}
+    stamps = stamps_by_topic(record)
+    lost = {wire.name: len(expected - set(stamps[f"{plan.namespace}/{wire.name}"])) for wire in WIRES}
     rate = simulated_s / float(log_s[-1] - log_s[0])
     return {
         "simulated_s": simulated_s,

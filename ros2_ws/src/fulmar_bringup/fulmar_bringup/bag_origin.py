@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fulmar_bringup.goal_plan import is_endless, shown_path
+from fulmar_bringup.node_table import OPTIONS
 from fulmar_bringup.system import System
 from fulmar_core.config.paths import config_path
 from fulmar_core.config.provenance import fulmar_version, git_revision
@@ -18,7 +19,7 @@ from fulmar_core.robots.calibration import calibration_path
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.robots.sensors.own_sensor import own_sensor_source
 from fulmar_core.tasks import load_task
-from fulmar_core.tasks.goal_files import goal_file_path
+from fulmar_core.tasks.goal_files import goal_file_path, load_goals
 from fulmar_core.tasks.own_task import OwnTask
 from fulmar_core.worlds.scenario import scenario_path
 from policy_server.controllers import controller_entry, shipped_policy
@@ -27,14 +28,34 @@ if TYPE_CHECKING:
     from fulmar_bringup.run_plan import RunPlan
 
 CALIBRATION = "calibration.yaml"  # name of the attachment
+# Fields of a plan that its bag does not name: how it was launched, and what the bag itself holds.
+NOT_KEPT = (
+    "supervised",
+    "intercepted",
+    "mission",
+    "standing",
+    "end_on_estop",
+    "extras",
+    "record",
+    "recording_mode",
+)
 
 
-def run_info(plan: RunPlan, more: Mapping[str, Any] | None = None) -> str:
-    """The plan, and more entries by name, as the JSON object that the recorder is given."""
+def run_info(plan: RunPlan) -> str:
+    """The plan and what made it, as the JSON object that the recorder is given."""
     made_by = {"fulmar_version": fulmar_version(), "git_revision": git_revision()}
-    own = {"name": plan.robot_name, **(more or {}), "calibration": str(calibration_path() or "")}
-    plans = {k: v for k, v in asdict(plan).items() if k not in ("supervised", "intercepted")}
-    return json.dumps(plans | own | made_by)
+    own = {"name": plan.robot_name, "calibration": str(calibration_path() or "")}
+    extras = {name: name in plan.extras for name in OPTIONS}
+    plans = {key: value for key, value in asdict(replace(plan, mission=None)).items() if key not in NOT_KEPT}
+    return json.dumps(plans | extras | own | _goal_path(plan.goals) | made_by)
+
+
+def _goal_path(goals: str) -> dict[str, Any]:
+    """What the evaluation of a run needs to know of its goal file."""
+    if not goals:
+        return {}
+    file = load_goals(goals)
+    return {"path": shown_path(file), "endless": is_endless(file)}
 
 
 def attachments(plan: RunPlan) -> str:

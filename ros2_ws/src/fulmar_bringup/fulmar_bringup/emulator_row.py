@@ -6,7 +6,7 @@ from fulmar_bringup.emulation import Emulation
 from fulmar_bringup.node_row import Launcher, NodeRow, robot_spec
 from fulmar_bringup.node_spec import NodeSpec, Parameter
 from fulmar_bringup.plant_row import motion_capture
-from fulmar_bringup.run_plan import RunPlan
+from fulmar_bringup.run_plan import ORIGIN, RunPlan
 from fulmar_core.robots.topics import DEVICE_STATE, MOCAP
 
 
@@ -17,7 +17,7 @@ def emulator_spec(plan: RunPlan, emulation: Emulation) -> NodeSpec:
         "task": plan.task,
         "scenario": plan.scenario,
         "seed": plan.seed,
-        "start": list(plan.start),
+        "start": list(plan.start or ORIGIN),
         "device": emulation.device,
         "link": emulation.link,
         **emulation.more,

@@ -14,13 +14,13 @@ from fulmar_core.tasks.torque_profiles import gain_of, profile_of
 EXCITE = "excite"  # name of the controller
 
 
-def excitation_of(goals: str | None, robot: Robot, controller: str) -> str:
+def excitation_of(goals: str, robot: Robot, controller: str) -> str:
     """What the controller's parameter `excitation` says: the name or the path of torques; empty for other goals.
 
     Raises:
         ConfigError: Unknown name, a mistake in the file, or a robot or a controller that plays no torques.
     """
-    if goals is None or not isinstance(load_goal_file(goals), Torques):
+    if not goals or not isinstance(load_goal_file(goals), Torques):
         return ""
     if not isinstance(robot.actuators, ReactionWheels):
         raise ConfigError(

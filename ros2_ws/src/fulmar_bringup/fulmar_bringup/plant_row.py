@@ -5,7 +5,7 @@ from __future__ import annotations
 from fulmar_bringup.lockstep_chain import between, chain_of, estimates_odometry, paced_wire, takes_poses
 from fulmar_bringup.node_row import Launcher, NodeRow, robot_spec
 from fulmar_bringup.node_spec import NodeSpec, Parameter
-from fulmar_bringup.run_plan import RunPlan
+from fulmar_bringup.run_plan import ORIGIN, RunPlan
 from fulmar_core.estimators.kinds import load_estimator
 from fulmar_core.robots.actuators.refuge import LANDS_S
 from fulmar_core.robots.robot_file import load_robot
@@ -36,14 +36,14 @@ def plant_spec(plan: RunPlan, *, port: str = "") -> NodeSpec:
         plan: What to run.
         port: Where the device is, in the place of what the hardware file says.
     """
-    lands_s = LANDS_S + STOPS_S if load_robot(plan.robot).flies and not plan.lockstep else 0.0
+    lands_s = LANDS_S + STOPS_S if not load_robot(plan.robot).kind.stops and not plan.lockstep else 0.0
     parameters: dict[str, Parameter] = {
         "robot": plan.robot,
         "task": plan.task,
         "backend": plan.backend,
         "scenario": plan.scenario,
         "seed": plan.seed,
-        "start": list(plan.start),
+        "start": list(plan.start or ORIGIN),
         "control_hz": plan.control_hz,
         "lockstep": plan.lockstep,
         "rate": plan.rate,

@@ -10,15 +10,12 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from fulmar_bringup.bag_origin import attachments, run_info
 from fulmar_bringup.console import log_line
 from fulmar_bringup.domains import claimed_domain
-from fulmar_bringup.goal_plan import is_endless, shown_path
 from fulmar_bringup.node_keeper import NodeKeeper, OnRestart, Restart
 from fulmar_bringup.node_spec import NodeSpec
-from fulmar_bringup.planning import RunRequest
 from fulmar_bringup.processes import Ended, ProcessGroup
 from fulmar_bringup.progress import state_words, time_bar
 from fulmar_bringup.readiness import (
@@ -38,7 +35,6 @@ from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.robots.topics import SIMULATION_START_NS
 from fulmar_core.safety.estop import HOLDS
 from fulmar_core.safety.watchdog import NO_COMMAND
-from fulmar_core.tasks.goal_files import load_goals
 from fulmar_ros.living_plant import TwinRunError
 from hardware_drivers.hardware import load_hardware
 from hardware_drivers.presence import check_presence
@@ -60,28 +56,28 @@ class Execution:
     warnings: tuple[str, ...] = ()  # of the launcher, such as nodes that it started again
 
 
-def execute(request: RunRequest) -> Execution:
-    """Run once; the bag then lies at `request.record`.
+def execute(plan: RunPlan) -> Execution:
+    """Run once; the bag then lies at `plan.record`.
 
     Raises:
         ConfigError: Another run goes on in this ROS domain, a plant of this name lives in it, or the plant refused its
             configuration.
         DeviceError: The device is not there.
     """
-    return run_nodes(request, _watch)
+    return run_nodes(plan, _watch)
 
 
-Watch = Callable[[RunRequest, RunPlan, Supervisor, ProcessGroup, NodeKeeper], str]
+Watch = Callable[[RunPlan, Supervisor, ProcessGroup, NodeKeeper], str]
 
 
-def run_nodes(request: RunRequest, watch: Watch, on_restart: OnRestart = lambda *_: None) -> Execution:
-    """Start every node of a request, watch them, and stop them in order.
+def run_nodes(plan: RunPlan, watch: Watch, on_restart: OnRestart = lambda *_: None) -> Execution:
+    """Start every node of a plan, watch them, and stop them in order.
 
     What cannot stop is brought to the ground before its plant ends, whatever ended the run. A second Ctrl-C cuts that
     short.
 
     Args:
-        request: What to run.
+        plan: What to run.
         watch: Called once the processes are started; gets them ready, waits for the end, and returns why the run
             failed, empty if it did not.
         on_restart: Called with the name of a node that was started again, and why.
@@ -90,26 +86,26 @@ def run_nodes(request: RunRequest, watch: Watch, on_restart: OnRestart = lambda 
         ConfigError: As of `execute`.
         DeviceError: The device is not there.
     """
-    if request.plan.hardware and not request.plan.emulated:
-        check_presence(load_hardware(request.plan.hardware).driver)
-    with claimed_domain(request.plan.robot_name, request.plan.only):
-        return _run(request, watch, on_restart)
+    if plan.is_real:
+        check_presence(load_hardware(plan.hardware).driver)
+    with claimed_domain(plan.robot_name, plan.only):
+        return _run(replace(plan, supervised=True), watch, on_restart)
 
 
-def _run(request: RunRequest, watch: Watch, on_restart: OnRestart) -> Execution:
-    plan = replace(request.plan, supervised=True)
+def _run(plan: RunPlan, watch: Watch, on_restart: OnRestart) -> Execution:
     group = ProcessGroup()
     failure, plant, ends, restarts = "", Report(), list[Ended](), list[Restart]()
     folders = contextlib.ExitStack()
     try:
         folder = tempfile.TemporaryDirectory(prefix="fulmar_", ignore_cleanup_errors=True)
         wires_folder = Path(folders.enter_context(folder))  # for the wires of an emulator that are files
-        specs = list(system_rows(plan, record=_recording(request), wires_folder=wires_folder).values())
+        record = {"directory": plan.record, "info": run_info(plan), "files": attachments(plan)}
+        specs = list(system_rows(plan, record=record, wires_folder=wires_folder).values())
         for spec in specs:
             group.start(spec)
         with supervisor(plan) as overseer:
             if overseer.sees_living_plant():
-                _withdraw(group, specs, request.record)
+                _withdraw(group, specs, plan.record)
                 overseer.refuse_living_plant()
                 for spec in specs:
                     group.start(spec)
@@ -117,9 +113,9 @@ def _run(request: RunRequest, watch: Watch, on_restart: OnRestart) -> Execution:
             keeper = NodeKeeper(group, overseer, on_restart)
             restarts = keeper.restarts
             try:
-                failure = watch(request, plan, overseer, group, keeper)
+                failure = watch(plan, overseer, group, keeper)
             except TwinRunError:  # before anything has run
-                _withdraw(group, specs, request.record)
+                _withdraw(group, specs, plan.record)
                 raise
             except KeyboardInterrupt as stop:
                 failure = str(stop) or STOPPED
@@ -136,13 +132,13 @@ def _run(request: RunRequest, watch: Watch, on_restart: OnRestart) -> Execution:
         ends += group.stop_all()
         folders.close()
     if any(end.name == "plant" and end.returncode == BAD_USAGE for end in ends):
-        shutil.rmtree(request.record, ignore_errors=True)  # nothing has run
+        shutil.rmtree(plan.record, ignore_errors=True)  # nothing has run
         raise ConfigError(failure)
     warnings = tuple(restart.warning for restart in restarts)
     return Execution(_with_ends(failure, ends), int(plant.values.get("steps", 0)), warnings)
 
 
-def _withdraw(group: ProcessGroup, specs: list[NodeSpec], record: Path) -> None:
+def _withdraw(group: ProcessGroup, specs: list[NodeSpec], record: str) -> None:
     """Stop nodes that have just been started, all at once, before they publish anything.
 
     They start while discovery looks for others, so that the look costs no time. It ends before they are up.
@@ -160,21 +156,20 @@ def _with_ends(failure: str, ends: list[Ended]) -> str:
     return "; ".join([*([failure] if failure else []), *(f"{end.text} when it was stopped" for end in bad)])
 
 
-def _watch(
-    request: RunRequest, plan: RunPlan, overseer: Supervisor, group: ProcessGroup, keeper: NodeKeeper
-) -> str:
+def _watch(plan: RunPlan, overseer: Supervisor, group: ProcessGroup, keeper: NodeKeeper) -> str:
     """Start the run and wait for its end; returns why it failed, or an empty text."""
     external = controller_entry(plan.controller).is_external
+    assert plan.mission is not None  # as of `completed`
     try:
         if external:
             wait_for_publisher(plan, overseer, lambda: raise_if_ended(group))
         starting = while_starting(group, overseer)
         now_ns = time.time_ns() if plan.hardware else SIMULATION_START_NS
         if not plan.goals and external:
-            overseer.publish_goal(request.mission, time_ns=now_ns, alive=starting)
+            overseer.publish_goal(plan.mission, time_ns=now_ns, alive=starting)
         elif not plan.goals:
             overseer.give_goal(
-                request.mission, time_ns=now_ns, alive=starting, listeners=CONTROLLER_AND_RECORDER
+                plan.mission, time_ns=now_ns, alive=starting, listeners=CONTROLLER_AND_RECORDER
             )
         elif not external:
             overseer.wait_until(lambda: overseer.controller.values.get("mode") == "armed", starting)
@@ -182,7 +177,7 @@ def _watch(
         if external:
             wait_for_reader(plan, overseer, lambda: raise_if_ended(group))
         with time_bar("running", plan.duration_s) as moved:
-            _wait_for_end(plan, overseer, keeper, moved, end_on_estop=request.end_on_estop)
+            _wait_for_end(plan, overseer, keeper, moved, end_on_estop=plan.end_on_estop)
     except RunFailed as error:
         time.sleep(LAST_WORDS_S)
         return with_plant_reaction(str(error), overseer)
@@ -226,7 +221,7 @@ def _wait_for_end(
     began = time.monotonic()
     plant_limit_s, controller_limit_s = silence_limits_s(plan)
     limit_s = 30.0 + 1.5 * plan.duration_s / plan.rate + (plan.duration_s if plan.lockstep else 0.0)
-    limit_s += LANDS_S if plan.hardware and load_robot(plan.robot).flies else 0.0
+    limit_s += LANDS_S if plan.hardware and not load_robot(plan.robot).kind.stops else 0.0
 
     def failed() -> bool:
         message = overseer.plant.message
@@ -287,18 +282,3 @@ def with_plant_reaction(reason: str, overseer: Supervisor) -> str:
     if overseer.plant.level == "error" and reaction not in reason:
         return f"{reason}; plant: {reaction}"
     return reason
-
-
-def _recording(request: RunRequest) -> dict[str, str]:
-    plan = request.plan
-    goal = list(request.goal) if request.goal else None
-    info = run_info(plan, {"goal": goal, "command": request.command, **_of_goals(plan)})
-    return {"directory": str(request.record), "info": info, "files": attachments(plan)}
-
-
-def _of_goals(plan: RunPlan) -> dict[str, Any]:
-    """What the evaluation of a run needs to know of its goal file."""
-    if not plan.goals:
-        return {}
-    file = load_goals(plan.goals)
-    return {"path": shown_path(file), "endless": is_endless(file)}

@@ -1,59 +1,32 @@
-"""What one system or run is started with."""
+"""The plan of a run or of a standing system: everything that it is started with, in five parts.
+
+The command line, a system file, the launch file, the fault suite and benchmarks fill it; `completion.completed` adds
+what they leave out, and `plan_checks.checked` refuses what cannot work.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass, field
 
 from fulmar_bringup.node_spec import ENDS, RESTARTS, NodeSpec
 from fulmar_bringup.system import NONE, Guards
 from fulmar_core.config.recording import Recording
+from fulmar_core.tasks.goal import Goal, PoseTuple
 from fulmar_core.wires.robot_name import Frames, frames_of, namespace_of
+
+ORIGIN = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
-class RunPlan:
-    """Everything that one run is started with."""
+class Who:
+    """A robot, what it does, and what controls it."""
 
     robot: str
-    task: str
+    task: str  # empty: as goal, goal file or kind of robot ask for
     controller: str
-    backend: str
-    control_hz: float  # [Hz]
+    _: KW_ONLY
     name: str = ""  # what the robot is called; empty: as its type
     policy: str = ""  # folder of a bundle; empty: the shipped one
-    scenario: str = "nominal"
-    seed: int = 0
-    start: tuple[float, ...] = (0.0, 0.0, 0.0)  # as `State.NUMBERS`, or a place alone [m, deg]
-    duration_s: float = 0.0  # 0: until stopped [s]
-    lockstep: bool = False
-    rate: float = 1.0  # simulated seconds a wall-clock second
-    goals: str = ""  # goal file that a node of its own publishes; empty: somebody else gives the goal
-    excitation: str = ""  # goal file of torques that the controller plays; empty: none
-    guards: Guards = NONE
-    supervised: bool = False  # somebody else activates the plant when all are ready
-    hardware: str = ""  # file of `configs/hardware`, where the backend is hardware
-    emulated: bool = False  # an emulator stands in for the device
-    arm: bool = False  # an autopilot may be armed, whatever the hardware file says
-    unattended: bool = False  # begun by a service: the e-stop is pressed, and nothing is armed
-    recording: Recording = Recording()
-    copies: int = 1  # of each command on the wire
-    controller_network: str = ""  # namespace of Linux, as another computer; empty: ours
-    mocap_hz: float = 0.0  # simulated motion capture beside the odometry; 0: only for an estimator [Hz]
-    remappings: tuple[tuple[str, str], ...] = ()  # topics and their other names, for every node
-    # Outputs of a node that another process takes and passes on: node, topic, and what it is called instead.
-    intercepted: tuple[tuple[str, str, str], ...] = ()
-    adapter: str = (
-        ""  # hardware file of an adapter, whose commands an external controller speaks; empty: none
-    )
-    adapter_topic: str = ""  # topic that it takes them from; empty: the file's
-    only: str = ""  # plant or controller: the other one runs in another place; empty: both
-    nodes: tuple[NodeSpec, ...] = ()  # of the system's own, beside those that every system has
-    extras: tuple[str, ...] = ()  # nodes of the table with an option that run, by name: `node_table.OPTIONS`
-
-    @property
-    def loss_of_helpers(self) -> str:
-        """What the loss of a node means that takes no robot's control away; lock step waits for nobody's return."""
-        return ENDS if self.lockstep else RESTARTS
 
     @property
     def robot_name(self) -> str:
@@ -69,3 +42,92 @@ class RunPlan:
     def frames(self) -> Frames:
         """Names of the robot's frames."""
         return frames_of(self.robot_name, self.robot)
+
+
+@dataclass(frozen=True)
+class Where:
+    """Simulator or device, and which nodes run beside it, where, with which topics."""
+
+    backend: str
+    _: KW_ONLY
+    hardware: str = ""  # file of `configs/hardware`, where the backend is hardware; empty: the robot's own
+    emulated: bool = False  # an emulator stands in for the device
+    # Hardware file of an adapter, whose commands an external controller speaks; empty: none.
+    adapter: str = ""
+    adapter_topic: str = ""  # topic that it takes them from; empty: the file's
+    only: str = ""  # plant or controller: the other one runs in another place; empty: both
+    controller_network: str = ""  # namespace of Linux, as another computer; empty: ours
+    copies: int = 1  # of each command on the wire
+    nodes: tuple[NodeSpec, ...] = ()  # of the system's own, beside those that every system has
+    extras: tuple[str, ...] = ()  # nodes of the table with an option that run, by name: `node_table.OPTIONS`
+    remappings: tuple[tuple[str, str], ...] = ()  # topics and their other names, for every node
+    # Outputs of a node that another process takes and passes on: node, topic, and what it is called instead.
+    intercepted: tuple[tuple[str, str, str], ...] = ()
+
+
+@dataclass(frozen=True)
+class How:
+    """Rates, disturbances, start, goal and length."""
+
+    control_hz: float = 0.0  # 0: as the system file, the policy or the robot have it [Hz]
+    _: KW_ONLY
+    scenario: str = "nominal"
+    seed: int = 0
+    start: PoseTuple = ()  # as `State.NUMBERS`, or a place alone; empty: as the seed draws it [m, deg]
+    goal: PoseTuple | None = None  # the same; None: as the seed draws it, or not one place [m, deg]
+    goals: str = ""  # goal file that a node of its own publishes; empty: somebody else gives the goal
+    excitation: str = ""  # goal file of torques that the controller plays; empty: none
+    duration_s: float = 0.0  # 0: as goal file or task ask for; of a complete plan, until it is stopped [s]
+    standing: bool = False  # it has no end, and goals come from outside
+    lockstep: bool = False  # plant and controller wait for each other
+    rate: float = 1.0  # simulated seconds a wall-clock second
+    mocap_hz: float = 0.0  # simulated motion capture beside the odometry; 0: only for an estimator [Hz]
+    supervised: bool = False  # somebody else activates the plant when all are ready
+    mission: Goal | None = field(default=None, compare=False)  # every target and obstacle of a complete plan
+
+
+@dataclass(frozen=True)
+class Guarded:
+    """What keeps the robot safe."""
+
+    _: KW_ONLY
+    guards: Guards = NONE
+    arm: bool = False  # an autopilot may be armed, whatever the hardware file says
+    unattended: bool = False  # begun by a service: the e-stop is pressed, and nothing is armed
+    end_on_estop: bool = False  # the run ends, and fails, when an e-stop stops the robot
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """What is kept of it."""
+
+    _: KW_ONLY
+    recording: Recording = Recording()
+    recording_mode: str = ""  # in the place of that of `recording`; empty: that
+    record: str = ""  # folder of the bag, or of all bags, which must not exist; empty: the recorder names one
+    command: str = ""  # command line, for the record
+
+
+@dataclass(frozen=True)
+class RunPlan(Recorded, Guarded, How, Where, Who):
+    """Who, where, how, guarded and recorded: the fields of all five parts."""
+
+    @property
+    def is_real(self) -> bool:
+        """Whether a real robot moves."""
+        return self.backend == "hardware" and not self.emulated
+
+    @property
+    def loss_of_helpers(self) -> str:
+        """What the loss of a node means that takes no robot's control away; lock step waits for nobody's return."""
+        return ENDS if self.lockstep else RESTARTS
+
+    @property
+    def line(self) -> str:
+        """The plan in one line."""
+        pace = "in lock step" if self.lockstep else f"at {self.rate:g} times real time"
+        length = f"for {self.duration_s:g} s" if self.duration_s else "until it is stopped"
+        return (
+            f"{self.robot_name}: {self.task}, {self.controller} at {self.control_hz:g} Hz on {self.backend}, "
+            f"scenario {self.scenario}, seed {self.seed}, {pace}, {length}"
+        )

@@ -7,7 +7,6 @@ import socket
 from fulmar_bringup.console import log_line
 from fulmar_bringup.domains import claimed_domain
 from fulmar_bringup.node_spec import CONTROLLER
-from fulmar_bringup.planning import RunRequest
 from fulmar_bringup.processes import ProcessGroup
 from fulmar_bringup.readiness import raise_if_ended, while_starting
 from fulmar_bringup.remote_parts import domain_text, mismatch
@@ -21,14 +20,14 @@ from fulmar_core.config.errors import ConfigError, RunFailed
 from fulmar_ros.node_identity import STARTED_NS
 
 
-def keep_controller_up(request: RunRequest, emit: Emit, show: Show) -> Ending:
+def keep_controller_up(plan: RunPlan, emit: Emit, show: Show) -> Ending:
     """Run the controller of a system until Ctrl-C or SIGTERM, beside a plant that runs in another place.
 
     The controller starts once its plant reports, and ends with it: a plant that is started again meets a new
     controller, which has no goal, so that nothing moves until a new one is given.
 
     Args:
-        request: Of `plan_system`, with `only` of its plan set to the controller.
+        plan: Of a standing system, with `only` set to the controller.
         emit: Called with each event; see `SystemEvents`. The first is `started`.
         show: Called several times a second with time, distance and mode.
 
@@ -38,7 +37,7 @@ def keep_controller_up(request: RunRequest, emit: Emit, show: Show) -> Ending:
     Raises:
         ConfigError: The plant belongs to another system, or the robot has a controller already.
     """
-    plan, group = request.plan, ProcessGroup()
+    group = ProcessGroup()
     trips: int | None = None
     try:
         with claimed_domain(plan.robot_name, CONTROLLER), supervisor(plan) as overseer:

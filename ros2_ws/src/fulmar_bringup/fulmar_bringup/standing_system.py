@@ -4,17 +4,13 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
-from pathlib import Path
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 from fulmar_bringup.console import log_line
 from fulmar_bringup.node_keeper import NodeKeeper
-from fulmar_bringup.node_spec import CONTROLLER, PARTS, PLANT
-from fulmar_bringup.node_table import OPTIONS
-from fulmar_bringup.own_row import own_nodes
-from fulmar_bringup.planning import RunRequest, chosen_recording, plan_run
+from fulmar_bringup.node_spec import PLANT
 from fulmar_bringup.processes import ProcessGroup
 from fulmar_bringup.readiness import raise_if_ended, wait_for_publisher, wait_for_reader, while_starting
 from fulmar_bringup.remote_parts import RemoteController, domain_text
@@ -29,110 +25,12 @@ from fulmar_bringup.run_executor import (
 )
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.supervisor import Report, Supervisor
-from fulmar_bringup.system import System
 from fulmar_bringup.system_events import Emit, SystemEvents, distance_of, mode_of
-from fulmar_core.config.errors import ConfigError, RunFailed, UnknownNameError
-from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.config.errors import RunFailed
 from fulmar_core.robots.topics import SIMULATION_START_NS
-from fulmar_core.tasks import load_task
-from fulmar_core.tasks.goal import PoseTuple
 from policy_server.controllers import controller_entry
 
 Show = Callable[[float, float | None, str], None]  # time [s], distance from the goal [m], mode
-
-
-def plan_system(
-    system: System,
-    *,
-    record: Path,
-    command: str,
-    policy: Path | None = None,
-    hardware: str | None = None,
-    emulate: bool = False,
-    arm: bool = False,
-    scenario: str = "nominal",
-    seed: int = 0,
-    start: PoseTuple | None = None,
-    rate: float = 1.0,
-    recording: str | None = None,
-    extras: Sequence[str] = tuple(OPTIONS),
-    unattended: bool = False,
-    only: str | None = None,
-) -> RunRequest:
-    """Plan a system that has no end.
-
-    Args:
-        system: What to run.
-        record: Folder of the bag, or of all bags; must not exist.
-        command: Command line, for the record.
-        policy: Bundle; the shipped one by default.
-        hardware: Hardware file; the robot's own by default.
-        emulate: Whether an emulator stands in for the device.
-        arm: Whether an autopilot may be armed that the hardware file does not arm.
-        scenario: Name of the scenario.
-        seed: Seed.
-        start: Where a simulated robot begins; the origin by default.
-        rate: Simulated seconds a wall-clock second.
-        recording: A mode of `fulmar_core.config.recording` instead of the system's own.
-        extras: Optional nodes of the table that run.
-        unattended: Whether a service starts it: an e-stop node begins pressed, and nothing is armed.
-        only: plant or controller, where the other one runs in another place.
-
-    Raises:
-        ConfigError: As of `plan_run`; a bag for each goal, where goals stream; or a controller alone, where the
-            system has an external one.
-    """
-    guards = replace(system.guards, estop=True) if unattended else system.guards
-    if only is not None and only not in PARTS:
-        raise UnknownNameError("part of --only", only, PARTS)
-    if only == CONTROLLER and controller_entry(system.controller).is_external:
-        raise ConfigError(
-            "the controller of this system is external, and you start it. Use --only plant or another --controller."
-        )
-    if only == CONTROLLER and recording is not None:
-        raise ConfigError("the recorder runs beside the plant: --recording goes with --only plant.")
-    request = plan_run(
-        robot=system.robot,
-        name=system.name or None,
-        task=system.task,
-        controller=system.controller,
-        backend=system.backend,
-        policy=policy,
-        goal=None,
-        start=start or (0.0,) * load_robot(system.robot).state_type.AXES,
-        duration_s=None,
-        lockstep=False,
-        rate=rate,
-        control_hz=system.control_hz,
-        scenario=scenario,
-        seed=seed,
-        record=record,
-        command=command,
-        hardware=hardware,
-        emulate=emulate,
-        arm=arm,
-        guards={name: value for name, value in asdict(guards).items() if value},
-        goals_later=True,
-        extras=extras,
-    )
-    if unattended and arm:
-        raise ConfigError(
-            "--service and --arm exclude one another: a person arms, beside the robot, by `fulmar up --arm`."
-        )
-    kept = chosen_recording(system.recorder, recording)
-    if kept.mode == "goals" and load_task(system.task).goal_topic == "goal_velocity":
-        raise ConfigError(
-            f"velocities stream: task '{system.task}' gets no bag for each goal. Use --recording whole or ring."
-        )
-    plan = replace(
-        request.plan,
-        duration_s=0.0,
-        unattended=unattended,
-        recording=kept,
-        nodes=own_nodes(system),
-        only=only or "",
-    )
-    return replace(request, plan=plan)
 
 
 @dataclass(frozen=True)
@@ -143,11 +41,11 @@ class Ending:
     watchdog_trips: int | None  # of the plant; None where it has not reported any number
 
 
-def keep_up(request: RunRequest, emit: Emit, show: Show) -> Ending:
+def keep_up(plan: RunPlan, emit: Emit, show: Show) -> Ending:
     """Run a system, or its plant alone, until Ctrl-C, SIGTERM or the end of one of its nodes.
 
     Args:
-        request: Of `plan_system`.
+        plan: Of a standing system.
         emit: Called with each event; see `SystemEvents`. The first is `started`.
         show: Called several times a second with time, distance and mode.
 
@@ -160,14 +58,12 @@ def keep_up(request: RunRequest, emit: Emit, show: Show) -> Ending:
     """
     stopped, plant_report = "", Report()
 
-    def watch(
-        request: RunRequest, plan: RunPlan, overseer: Supervisor, group: ProcessGroup, keeper: NodeKeeper
-    ) -> str:
+    def watch(plan: RunPlan, overseer: Supervisor, group: ProcessGroup, keeper: NodeKeeper) -> str:
         nonlocal stopped, plant_report
         plant_report = overseer.plant
         try:
-            _get_ready(request, plan, overseer, group)
-            emit("started", **described(plan), name=plan.robot_name, bag=str(request.record))
+            _get_ready(plan, overseer, group)
+            emit("started", **described(plan), name=plan.robot_name, bag=plan.record)
             _follow(plan, overseer, keeper, SystemEvents(emit), show)
         except RunFailed as error:
             time.sleep(LAST_WORDS_S)
@@ -179,9 +75,9 @@ def keep_up(request: RunRequest, emit: Emit, show: Show) -> Ending:
         return ""
 
     def restarted(node: str, reason: str) -> None:
-        emit("restarted", time_s=round(passed_s(request.plan, plant_report), 3), node=node, reason=reason)
+        emit("restarted", time_s=round(passed_s(plan, plant_report), 3), node=node, reason=reason)
 
-    failure = run_nodes(request, watch, restarted).failure
+    failure = run_nodes(plan, watch, restarted).failure
     asked = re.fullmatch(rf"{STOPPED}|stopped by SIG[A-Z]+", failure)  # also while the nodes still start
     return Ending("" if asked else failure, trips_of(plant_report))
 
@@ -205,16 +101,17 @@ def described(plan: RunPlan) -> dict[str, Any]:
     return {name: getattr(plan, name) for name in ("robot", "task", "controller", "backend", "control_hz")}
 
 
-def _get_ready(request: RunRequest, plan: RunPlan, overseer: Supervisor, group: ProcessGroup) -> None:
+def _get_ready(plan: RunPlan, overseer: Supervisor, group: ProcessGroup) -> None:
     """Wait for the controller, publish the obstacles, and start the plant.
 
     A plant alone starts at once, and begins when its controller has come.
     """
     external = controller_entry(plan.controller).is_external
+    assert plan.mission is not None  # as of `completed`
     if plan.only == PLANT:
-        if not plan.hardware or plan.emulated:
+        if not plan.is_real:
             now_ns = time.time_ns() if plan.hardware else SIMULATION_START_NS
-            overseer.publish_obstacles(request.mission, now_ns)
+            overseer.publish_obstacles(plan.mission, now_ns)
         overseer.start_plant(while_starting(group, overseer), lambda: group.last_words("plant"))
         log_line(f"the plant of '{plan.robot_name}' waits for its controller, in {domain_text()}")
         return
@@ -224,8 +121,8 @@ def _get_ready(request: RunRequest, plan: RunPlan, overseer: Supervisor, group: 
     if not external:
         overseer.wait_until(lambda: overseer.controller.values.get("mode") == "armed", starting)
         now_ns = time.time_ns() if plan.hardware else SIMULATION_START_NS
-        if not plan.hardware or plan.emulated:
-            overseer.give_obstacles(request.mission, time_ns=now_ns, alive=starting)
+        if not plan.is_real:
+            overseer.give_obstacles(plan.mission, time_ns=now_ns, alive=starting)
     overseer.start_plant(starting, lambda: group.last_words("plant"))
     if external:
         wait_for_reader(plan, overseer, lambda: raise_if_ended(group))

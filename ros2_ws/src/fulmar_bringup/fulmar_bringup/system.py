@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,7 @@ from fulmar_core.robots.jsbsim_models import JSBSIM, is_jsbsim, jsbsim_model
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.safety.geofence import NO_AREA, check_area
 from fulmar_core.tasks import load_task
-from fulmar_core.wires.robot_name import check_robot_name, checked_name
+from fulmar_core.wires.robot_name import check_robot_name
 from hardware_drivers.hardware import hardware_of, hardware_path, load_hardware
 from policy_server.controllers import FALLBACKS, controller_entry, usual_hz
 
@@ -112,51 +112,6 @@ def load_system(name: str) -> System:
     system = load_config(System, config_path("systems", name))
     check_names(system.robot, system.task, system.controller, system.backend)
     return system
-
-
-def varied_system(
-    name: str,
-    *,
-    robot: str | None = None,
-    robot_name: str | None = None,
-    task: str | None = None,
-    controller: str | None = None,
-    backend: str | None = None,
-    hardware: str | None = None,
-) -> System:
-    """A system file, each of its choices replaced by what is given; rate and guards follow.
-
-    Args:
-        name: Name of a file in `configs/systems`.
-        robot: Another robot.
-        robot_name: Another name of the robot.
-        task: Another task.
-        controller: Another controller.
-        backend: Another backend.
-        hardware: Hardware file, where the backend is hardware; the robot's own by default.
-
-    Raises:
-        ConfigError: Unknown name, or a mistake in a file.
-    """
-    base = load_system(name)
-    if robot_name is not None:
-        base = replace(base, name=checked_name(robot_name))
-    chosen = (robot or base.robot, task or base.task, controller or base.controller, backend or base.backend)
-    if chosen == (base.robot, base.task, base.controller, base.backend):
-        return base
-    check_names(*chosen, hardware)
-    guards = base.guards
-    if chosen[3] == "hardware" and base.backend != "hardware":
-        guards = default_guards(chosen[2], "hardware", default_hardware(chosen[0], hardware))
-    return replace(
-        base,
-        robot=chosen[0],
-        task=chosen[1],
-        controller=chosen[2],
-        backend=chosen[3],
-        control_hz=default_control_hz(*chosen),
-        guards=guards,
-    )
 
 
 def modules_of(

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from fulmar_bringup.excitation_plan import torques_note
+from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.system import default_hardware
 from fulmar_core.config.errors import ConfigError
 from fulmar_core.robots.robot import Robot
@@ -52,42 +53,34 @@ def whole_pose(numbers: Sequence[float], robot: Robot, option: str) -> PoseTuple
     return (*numbers, *[0.0] * (len(form.NUMBERS) - len(numbers)))
 
 
-def task_of_run(
-    task: str | None,
-    robot: str,
-    controller: str,
-    backend: str,
-    *,
-    goal: tuple[float, ...] | None,
-    goals: str | None,
-    policy: Path | None,
-    hardware: str | None = None,
-) -> tuple[str, str]:
-    """Name of the task of a run, and a note where a part of its goal has no effect.
-
-    Args:
-        task: Name of the task, if one was given.
-        robot: Name of the robot.
-        controller: Name of the controller.
-        backend: Name of the backend.
-        goal: A place [m] or a pose [m, deg], as `State.NUMBERS`.
-        goals: Name or path of a goal file; without a task it decides.
-        policy: Bundle that was given.
-        hardware: Hardware file that was given.
+def task_of(plan: RunPlan) -> str:
+    """Name of the task of a plan: the one that is given, or what its goal, its goal file or its robot asks for.
 
     Raises:
-        ConfigError: As of `default_task`, `whole_pose`, `check_heading` and `excitation_of`.
+        ConfigError: As of `default_task`.
     """
-    if goal is not None:
-        whole_pose(goal, load_robot(robot), "--goal")
-    note = torques_note(goals, load_robot(robot), controller) if goals else ""
-    if task is not None:
-        return task, note if goal is None else check_heading(task, goal)
-    if goals:
-        kind, poses = load_robot(robot).kind, task_of_goals(goals) == POSE + SpatialState.SUFFIX
-        turns = poses and not kind.goes_anywhere
-        return kind.goal_task if turns else task_of_goals(goals), note
-    return default_task(robot, controller, backend, goal=goal, policy=policy, hardware=hardware), ""
+    if plan.task:
+        return plan.task
+    if plan.goals:
+        kind, asked = load_robot(plan.robot).kind, task_of_goals(plan.goals)
+        return kind.goal_task if asked == POSE + SpatialState.SUFFIX and not kind.goes_anywhere else asked
+    policy, hardware = Path(plan.policy) if plan.policy else None, plan.hardware or None
+    return default_task(
+        plan.robot, plan.controller, plan.backend, goal=plan.goal, policy=policy, hardware=hardware
+    )
+
+
+def goal_note(plan: RunPlan) -> str:
+    """Warning about a part of a plan's goal that has no effect, or that asks much; empty if there is none.
+
+    Raises:
+        ConfigError: As of `whole_pose`, `check_heading` and `excitation_of`.
+    """
+    robot = load_robot(plan.robot)
+    if plan.goal is not None:
+        whole_pose(plan.goal, robot, "--goal")
+        return check_heading(plan.task, plan.goal) if plan.task else ""
+    return torques_note(plan.goals, robot, plan.controller)
 
 
 def default_task(

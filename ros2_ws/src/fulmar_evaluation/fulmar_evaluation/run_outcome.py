@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+import json
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from fulmar_bags.run_record import Actuation, Motion, RunRecord, read_run
-from fulmar_bringup.planning import RunRequest
+from fulmar_bringup.bag_origin import run_info
 from fulmar_bringup.readiness import command_input
 from fulmar_bringup.run_executor import Execution, execute
+from fulmar_bringup.run_plan import RunPlan
 from fulmar_core.config.errors import FulmarError
 from fulmar_evaluation.run_summary import summarise
 from policy_server.controllers import controller_entry
@@ -33,7 +36,7 @@ class RunOutcome:
         return 1 if missed or self.failure else 0
 
 
-def run_and_evaluate(request: RunRequest) -> RunOutcome:
+def run_and_evaluate(plan: RunPlan) -> RunOutcome:
     """Run once and evaluate the bag.
 
     Returns:
@@ -44,37 +47,37 @@ def run_and_evaluate(request: RunRequest) -> RunOutcome:
             configuration.
         DeviceError: The device is not there.
     """
-    return evaluate_execution(request, execute(request))
+    return evaluate_execution(plan, execute(plan))
 
 
-def evaluate_execution(request: RunRequest, execution: Execution) -> RunOutcome:
+def evaluate_execution(plan: RunPlan, execution: Execution) -> RunOutcome:
     """Evaluate a run that has ended, from its bag."""
-    failure, ring = execution.failure, request.plan.recording.mode == "ring"
-    if ring and not failure and not request.record.exists():
-        return RunOutcome({**summarise(_nothing_recorded(request)), **_NOT_EVALUATED}, "")
+    record, failure, ring = Path(plan.record), execution.failure, plan.recording.mode == "ring"
+    if ring and not failure and not record.exists():
+        return RunOutcome({**summarise(_nothing_recorded(plan)), **_NOT_EVALUATED}, "")
     try:
-        summary = summarise(read_run(request.record))
+        summary = summarise(read_run(record))
     except FulmarError as error:
-        failure, summary = failure or str(error), summarise(_nothing_recorded(request))
-        summary["bag"] = str(request.record) if request.record.exists() else None
+        failure, summary = failure or str(error), summarise(_nothing_recorded(plan))
+        summary["bag"] = plan.record if record.exists() else None
     summary["warnings"] = [*summary["warnings"], *dict.fromkeys(execution.warnings)]
-    external = controller_entry(request.plan.controller).is_external
+    external = controller_entry(plan.controller).is_external
     if not failure and not ring and external and not summary["steps"]:
-        failure = f"no command came on {command_input(request.plan).topic}: your controller published none"
+        failure = f"no command came on {command_input(plan).topic}: your controller published none"
     lost = execution.plant_steps - summary["steps"]
     if not failure and not ring and lost > 0:
         failure = f"the bag lacks {lost} of {execution.plant_steps} commands"
     return RunOutcome({**summary, "failure": failure or None}, failure)
 
 
-def _nothing_recorded(request: RunRequest) -> RunRecord:
+def _nothing_recorded(plan: RunPlan) -> RunRecord:
     """The record of a run without a bag: its plan, and nothing else."""
     none, vectors = np.empty(0), np.empty((0, 3))
     motion = Motion(none, none, none, vectors, np.empty((0, 4)), vectors, vectors)
     actuation = Actuation(none, none, none, (), np.empty((0, 0)))
     return RunRecord(
-        path=request.record,
-        info=asdict(request.plan),
+        path=Path(plan.record),
+        info=json.loads(run_info(plan)),
         truth=motion,
         odom=motion,
         applied=actuation,

@@ -10,8 +10,9 @@ from typing import Any
 
 from fulmar_bags.run_record import read_run
 from fulmar_benchmarks.falcon.cells import figures
+from fulmar_bringup.completion import completed
 from fulmar_bringup.domains import own_domain
-from fulmar_bringup.planning import plan_run
+from fulmar_bringup.plan_checks import checked
 from fulmar_bringup.run_executor import execute
 from fulmar_core.config.errors import RunFailed
 from fulmar_core.simulation.metrics import join
@@ -93,25 +94,17 @@ def _by_the_clock(trial: Trial, seed: int) -> dict[str, Any]:
     """One flight in real time, as `fulmar run` does it, with its bag."""
     plan = trial.plan
     with tempfile.TemporaryDirectory(prefix="fulmar_", ignore_cleanup_errors=True) as folder, own_domain():
-        request = plan_run(
-            robot=plan.robot,
-            task=plan.task,
-            controller=plan.controller,
-            backend=plan.backend,
-            policy=Path(plan.policy) if plan.policy else None,
-            goal=None,
-            start=None,
-            duration_s=plan.duration_s,
+        asked = replace(
+            plan,
+            start=(),
             lockstep=False,
-            rate=1.0,
-            control_hz=plan.control_hz,
-            scenario=plan.scenario,
             seed=seed,
-            record=Path(folder) / "bag",
+            record=str(Path(folder) / "bag"),
             command="fulmar benchmark flights",
         )
-        execution = execute(request)
-        record = read_run(request.record)
+        asked = checked(completed(asked))
+        execution = execute(asked)
+        record = read_run(Path(asked.record))
         result, summary = evaluate_run(record), summarise(record)
     if execution.failure or result is None:
         raise RunFailed(f"flight of seed {seed}: {execution.failure or 'nothing of it was recorded'}")

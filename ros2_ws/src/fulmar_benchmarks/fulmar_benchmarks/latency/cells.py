@@ -14,7 +14,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from fulmar_benchmarks.latency.watched_system import REPORT_S, request_at, watched_system
+from fulmar_benchmarks.latency.watched_system import REPORT_S, plan_at, watched_system
 from fulmar_core.config.errors import RunFailed
 from fulmar_ros.runtime import EXECUTOR
 
@@ -67,7 +67,7 @@ def measure(cells: list[Cell], seconds: float, progress: Callable[[int], None]) 
 
 def _row(cell: Cell, seconds: float, folder: Path) -> dict[str, Any]:
     try:
-        with watched_system(request_at(cell.hz, folder), {EXECUTOR: cell.executor}) as system, _load(cell):
+        with watched_system(plan_at(cell.hz, folder), {EXECUTOR: cell.executor}) as system, _load(cell):
             began_s, before = time.monotonic(), system.cpu_s()
             system.wait(seconds + REPORT_S)
             took_s, after = time.monotonic() - began_s, system.cpu_s()

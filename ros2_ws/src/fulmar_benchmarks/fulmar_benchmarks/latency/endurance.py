@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from fulmar_bags.run_record import read_run
-from fulmar_benchmarks.latency.watched_system import STEP_HZ, request_at, watched_system
+from fulmar_benchmarks.latency.watched_system import STEP_HZ, plan_at, watched_system
 
 ALLOWED_MB = 5.0
 WARM_UP_SHARE = 0.1  # of the time: pools fill and windows of statistics grow to their size
@@ -34,10 +34,10 @@ def endure(
     Raises:
         RunFailed: A node ended, or did not get ready.
     """
-    request = request_at(rate * STEP_HZ, folder)
+    plan = plan_at(rate * STEP_HZ, folder)
     seconds = simulated_s / rate
     seen: list[tuple[float, dict[str, int]]] = []
-    with watched_system(request, {}) as system:
+    with watched_system(plan, {}) as system:
         began_s = time.monotonic()
         while (passed_s := time.monotonic() - began_s) < seconds:
             seen.append((passed_s, system.memory_bytes()))
@@ -48,7 +48,7 @@ def endure(
         system.end_commands()
         answered = int(system.reports()[0]["answers"])
     growth = _growth_mb(seen, WARM_UP_SHARE * seconds)
-    recorded = _recorded(request.record)
+    recorded = _recorded(Path(plan.record))
     lost = max(0, answered - recorded)
     return {
         "simulated_s": simulated_s,

@@ -11,8 +11,9 @@ from pathlib import Path
 import psutil
 
 from fulmar_bringup.bag_origin import run_info
+from fulmar_bringup.completion import completed
 from fulmar_bringup.domains import own_domain
-from fulmar_bringup.planning import RunRequest, plan_run
+from fulmar_bringup.plan_checks import checked
 from fulmar_bringup.processes import ProcessGroup
 from fulmar_bringup.readiness import CONTROLLER_AND_RECORDER, while_starting
 from fulmar_bringup.run_plan import RunPlan
@@ -70,7 +71,7 @@ class WatchedSystem:
         return dict(self._overseer.plant.values), dict(self._overseer.controller.values)
 
 
-def request_at(hz: float, folder: Path) -> RunRequest:
+def plan_at(hz: float, folder: Path) -> RunPlan:
     """A system that steps and commands so often a second of the wall clock.
 
     The robot's own time goes `hz / 50` times as fast as ours, so that all rates are steps of the same physics. The
@@ -85,46 +86,41 @@ def request_at(hz: float, folder: Path) -> RunRequest:
     bundle.mkdir(parents=True)
     passport = replace(read_passport(shipped), control_hz=STEP_HZ)
     write_bundle(bundle, (shipped / NETWORK).read_bytes(), read_golden(shipped), passport)
-    request = plan_run(
-        robot=ROBOT,
-        task=TASK,
-        controller="policy",
-        backend="mujoco",
-        policy=bundle,
+    asked = RunPlan(
+        ROBOT,
+        TASK,
+        "policy",
+        "mujoco",
+        STEP_HZ,
+        policy=str(bundle),
         goal=(0.0, 0.0, 0.0),
         start=(1.0, 0.5, 30.0),
-        duration_s=None,
-        lockstep=False,
         rate=hz / STEP_HZ,
-        control_hz=STEP_HZ,
-        scenario="nominal",
-        seed=0,
-        record=folder / "bag",
+        record=str(folder / "bag"),
         command="fulmar benchmark latency",
     )
-    return replace(request, plan=replace(request.plan, duration_s=0.0, supervised=True))
+    return replace(checked(completed(asked)), duration_s=0.0, supervised=True)
 
 
 @contextlib.contextmanager
-def watched_system(request: RunRequest, environment: Mapping[str, str]) -> Iterator[WatchedSystem]:
+def watched_system(plan: RunPlan, environment: Mapping[str, str]) -> Iterator[WatchedSystem]:
     """A system that has begun to act, in a ROS domain of its own; ended in order at the end.
 
     Args:
-        request: From `request_at`.
+        plan: From `plan_at`.
         environment: Of its nodes, on top of ours.
 
     Raises:
         RunFailed: It does not come up.
     """
-    plan = request.plan
     with own_domain():
         group = ProcessGroup(environment)
         try:
-            record = {"directory": str(request.record), "info": run_info(plan)}
+            record = {"directory": plan.record, "info": run_info(plan)}
             for row in system_rows(plan, record=record).values():
                 group.start(row)
             with supervisor(plan) as overseer:
-                _begin(request, plan, overseer, group)
+                _begin(plan, overseer, group)
                 yield WatchedSystem(group, overseer)
                 group.stop("controller")
                 group.stop("plant")
@@ -132,10 +128,11 @@ def watched_system(request: RunRequest, environment: Mapping[str, str]) -> Itera
             group.stop_all()
 
 
-def _begin(request: RunRequest, plan: RunPlan, overseer: Supervisor, group: ProcessGroup) -> None:
+def _begin(plan: RunPlan, overseer: Supervisor, group: ProcessGroup) -> None:
     alive = while_starting(group, overseer)
+    assert plan.mission is not None  # as of `completed`
     overseer.give_goal(
-        request.mission, time_ns=SIMULATION_START_NS, alive=alive, listeners=CONTROLLER_AND_RECORDER
+        plan.mission, time_ns=SIMULATION_START_NS, alive=alive, listeners=CONTROLLER_AND_RECORDER
     )
     overseer.start_plant(alive, lambda: group.last_words("plant"))
     overseer.wait_until(lambda: overseer.controller.values.get("mode") == "active", alive)

@@ -15,6 +15,7 @@ import typer
 
 from fulmar_bringup.console import warn
 from fulmar_bringup.node_table import OPTIONS
+from fulmar_core.wires.robot_name import checked_name
 
 Value = TypeVar("Value")
 
@@ -47,7 +48,13 @@ def renamed(old: str, new: str) -> Any:
 
 RobotArgument = Annotated[str, argument("ROBOT", "A name from `fulmar list robots`.")]
 NameOption = Annotated[
-    str | None, option("NAME", "Name of the robot, and its ROS namespace; its type by default.", "--name")
+    str | None,
+    option(
+        "NAME",
+        "Name of the robot, and its ROS namespace; its type by default.",
+        "--name",
+        callback=lambda name: name if name is None else checked_name(name),
+    ),
 ]
 TASK_HELP = "A name from `fulmar list tasks`, or your own class: mypackage.mymodule:MyTask."
 TaskArgument = Annotated[str, argument("TASK", TASK_HELP)]

@@ -25,7 +25,9 @@ def demo(
 
     require("rclpy", "mujoco", "onnxruntime", "mcap", "rosbags", "matplotlib")
     from fulmar_bags.run_record import read_run
-    from fulmar_bringup.planning import plan_run
+    from fulmar_bringup.completion import completed
+    from fulmar_bringup.plan_checks import checked
+    from fulmar_bringup.run_plan import RunPlan
     from fulmar_evaluation.report.run_report import write_report
     from fulmar_evaluation.run_outcome import run_and_evaluate
 
@@ -36,12 +38,11 @@ def demo(
             f"{controller}: a simulated platform, the {controller} node and a recorder, in separate processes, "
             f"{DURATION_S:g} s at {RATE:g} times real time"
         )
-        request = plan_run(
-            robot="floating_platform", task="go_to_pose", controller=controller, backend="mujoco", policy=None,
-            goal=GOAL, start=START, duration_s=DURATION_S, lockstep=False, rate=RATE, control_hz=None,
-            scenario="nominal", seed=1, record=out / controller, command=invoked_command(),
+        plan = RunPlan(
+            "floating_platform", "go_to_pose", controller, "mujoco", goal=GOAL, start=START, duration_s=DURATION_S,
+            rate=RATE, seed=1, record=str(out / controller), command=invoked_command(),
         )  # fmt: skip
-        outcome = run_and_evaluate(request)
+        outcome = run_and_evaluate(checked(completed(plan)))
         if outcome.failure:  # Ctrl-C among them: there is nothing to compare
             log_line(f"{controller}: {outcome.failure}")
             raise typer.Exit(outcome.exit_code)

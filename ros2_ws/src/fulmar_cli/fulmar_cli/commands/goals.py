@@ -10,7 +10,6 @@ from fulmar_cli.commands.arguments import NameOption, argument, flag, option
 from fulmar_cli.commands.list import list_names
 from fulmar_cli.commands.values import read_area, read_goal
 from fulmar_core.config.errors import ConfigError
-from fulmar_core.wires.robot_name import checked_name
 
 if TYPE_CHECKING:
     from fulmar_core.robots.robot import Robot
@@ -102,7 +101,7 @@ def goals(
     spec = goals_spec(
         robot,
         name or "",
-        name="" if robot_name is None else checked_name(robot_name),
+        name=robot_name or "",
         as_path=as_path,
         control_hz=control_hz,
         give_up_s=0.0 if wait else GIVE_UP_S,

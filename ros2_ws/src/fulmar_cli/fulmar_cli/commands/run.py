@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -11,7 +10,7 @@ import typer
 from fulmar_bringup.console import log_line, print_result, write_line
 from fulmar_cli.commands import arguments as cli
 from fulmar_cli.commands.arguments import dated_folder, flag, option
-from fulmar_cli.commands.values import read_area, read_goal, read_pose
+from fulmar_cli.commands.values import read_area, read_goal, read_guards, read_pose
 
 RUN_TASK_HELP = (
     f"{cli.TASK_HELP} By default the goal decides: go_to_position for x,y, go_to_pose for x,y,deg and without a goal, "
@@ -113,36 +112,37 @@ def run(
 
     fulmar run cubesat_wheels --scenario gyro_dies --lockstep
     """
-    from fulmar_bringup.planning import plan_run
-    from fulmar_bringup.task_choice import task_of_run
+    from fulmar_bringup.completion import completed
+    from fulmar_bringup.plan_checks import checked, read_remappings
+    from fulmar_bringup.run_plan import RunPlan
+    from fulmar_bringup.task_choice import goal_note
     from fulmar_cli.installation.extras import check_plan
     from fulmar_core.robots.robot_file import use_calibration
 
     use_calibration(calibration, robot)
-    place = read_goal(goal, robot=robot)
-    task, note = task_of_run(
-        task, robot, controller, backend, goal=place, goals=goals, policy=policy, hardware=hardware
-    )
+    asked = RunPlan(
+        robot, task or "", controller, backend, control_hz or 0.0, name=name or "", policy=str(policy or ""),
+        hardware=hardware or "", emulated=emulate, arm=arm, goal=read_goal(goal, robot=robot), goals=goals or "",
+        start=read_pose(start, "--start", robot) or (), duration_s=duration or 0.0, lockstep=lockstep, rate=rate,
+        scenario=scenario, seed=seed, command=cli.invoked_command(), copies=copies, mocap_hz=mocap_hz,
+        record=str(record or dated_folder("runs", name or robot, controller)), recording_mode=recording or "",
+        guards=read_guards(
+            estimator=estimator, estop=estop, fallback=fallback, max_run_time_s=max_run_time,
+            trusted_keys=str(trusted_keys) if trusted_keys else None, area=read_area(area),
+        ),
+        controller_network=controller_network, remappings=tuple(read_remappings(remap or ()).items()),
+        adapter=adapter or "", adapter_topic=topic or "", extras=extras, end_on_estop=end_on_estop,
+    )  # fmt: skip
+    note = goal_note(asked)
     if note:
         log_line(note)
-    guards = {
-        "estimator": estimator, "estop": estop or None, "fallback": fallback, "max_run_time_s": max_run_time,
-        "trusted_keys": str(trusted_keys) if trusted_keys else None, "area": read_area(area),
-    }  # fmt: skip
-    request = plan_run(
-        robot=robot, name=name, task=task, controller=controller, backend=backend, policy=policy,
-        goal=place, goals=goals, start=read_pose(start, "--start", robot), duration_s=duration, lockstep=lockstep,
-        rate=rate, control_hz=control_hz, scenario=scenario, seed=seed, hardware=hardware, emulate=emulate, arm=arm,
-        record=record or dated_folder("runs", name or robot, controller), command=cli.invoked_command(),
-        guards={key: value for key, value in guards.items() if value is not None}, recording=recording,
-        copies=copies, controller_network=controller_network, mocap_hz=mocap_hz, remap=remap or (),
-        adapter=adapter, topic=topic, extras=extras,
-    )  # fmt: skip
-    check_plan(request.plan)
+    plan = checked(completed(asked))
+    check_plan(plan)
     from fulmar_evaluation.run_outcome import run_and_evaluate
     from fulmar_evaluation.run_summary import summary_text
 
-    outcome = run_and_evaluate(replace(request, end_on_estop=end_on_estop))
+    log_line(plan.line)
+    outcome = run_and_evaluate(plan)
     print_result(outcome.summary, lambda summary: write_line(summary_text(summary)), as_json=as_json)
     if outcome.failure:
         log_line(f"run failed: {outcome.failure}")

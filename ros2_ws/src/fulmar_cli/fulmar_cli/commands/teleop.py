@@ -9,7 +9,7 @@ import typer
 from fulmar_bringup.console import write_line
 from fulmar_cli.commands.arguments import NameOption, RobotArgument, flag, option
 from fulmar_core.config.errors import FAILED, RunFailed
-from fulmar_core.wires.robot_name import checked_name, namespace_of
+from fulmar_core.wires.robot_name import namespace_of
 
 
 def teleop(
@@ -42,7 +42,7 @@ def teleop(
     from fulmar_core.robots.topics import GIVE_BACK
 
     load_robot(robot)  # rejects a wrong name
-    name = robot if name is None else checked_name(name)
+    name = name or robot
     space = namespace_of(name)
     if give_back:
         from fulmar_bringup.robot_operator import FIND_S, operator

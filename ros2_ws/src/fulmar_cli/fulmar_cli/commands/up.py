@@ -11,7 +11,7 @@ from typing import Annotated, Any
 
 import typer
 
-from fulmar_bringup.console import write_line
+from fulmar_bringup.console import log_line, write_line
 from fulmar_bringup.progress import live_line
 from fulmar_cli.commands import arguments as cli
 from fulmar_cli.commands.arguments import argument, dated_folder, flag, option
@@ -85,29 +85,29 @@ def up(
 
     fulmar up mujoco_lqr --only plant        # and on another host: fulmar up mujoco_lqr --only controller
     """
+    from fulmar_bringup.completion import completed
     from fulmar_bringup.node_spec import CONTROLLER
+    from fulmar_bringup.plan_checks import checked
     from fulmar_bringup.split_controller import keep_controller_up
-    from fulmar_bringup.standing_system import keep_up, plan_system
-    from fulmar_bringup.system import varied_system
+    from fulmar_bringup.standing_system import keep_up
+    from fulmar_bringup.system_plan import system_plan
     from fulmar_cli.installation.extras import check_plan
 
-    chosen = varied_system(
-        system, robot=robot, robot_name=name, task=task, controller=controller, backend=backend, hardware=hardware
+    asked = system_plan(system, robot=robot, name=name, task=task, controller=controller, backend=backend)
+    plan = replace(
+        asked, policy=str(policy or ""), hardware=hardware or "", emulated=emulate, arm=arm, scenario=scenario,
+        seed=seed, start=read_pose(start, "--start") or (), rate=rate, recording_mode=recording or "", extras=extras,
+        unattended=service, only=only or "", guards=replace(asked.guards, estop=estop or asked.guards.estop),
+        record=str(record or dated_folder("runs", asked.robot_name, asked.controller)), command=cli.invoked_command(),
     )  # fmt: skip
-    if estop:
-        chosen = replace(chosen, guards=replace(chosen.guards, estop=True))
-    request = plan_system(
-        chosen, record=record or dated_folder("runs", chosen.name or chosen.robot, chosen.controller),
-        command=cli.invoked_command(), policy=policy, hardware=hardware, emulate=emulate, arm=arm, scenario=scenario,
-        seed=seed, start=read_pose(start, "--start"), rate=rate, recording=recording, extras=extras,
-        unattended=service, only=only,
-    )  # fmt: skip
-    check_plan(request.plan)
+    plan = checked(completed(plan))
+    check_plan(plan)
+    log_line(plan.line)
     report = _print_json if as_json else _print_words
     with live_line() as show:
-        end = (keep_controller_up if only == CONTROLLER else keep_up)(request, report, show)
+        end = (keep_controller_up if only == CONTROLLER else keep_up)(plan, report, show)
     bags = sorted(
-        {str(file.parent) for file in Path(request.record).rglob("*.mcap")}
+        {str(file.parent) for file in Path(plan.record).rglob("*.mcap")}
     )  # one, or one for each goal
     report("stopped", failure=end.failure or None, watchdog_trips=end.watchdog_trips, bags=bags)
     raise typer.Exit(FAILED if end.failure else DONE)

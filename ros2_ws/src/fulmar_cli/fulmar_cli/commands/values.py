@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from fulmar_core.config.errors import ConfigError, UnknownNameError
 from fulmar_core.safety.geofence import check_area
+
+if TYPE_CHECKING:
+    from fulmar_bringup.system import Guards
 
 Area = tuple[float, ...]  # x_min, x_max, y_min, y_max, in space also z_min, z_max [m]
 
@@ -48,6 +51,20 @@ def read_area(text: str | None) -> Area | None:
         return True
 
     return _read(text, "--area", wanted, is_area)
+
+
+def read_guards(**given: Any) -> Guards:
+    """Guards as options give them; None: not given.
+
+    Raises:
+        ConfigError: Unknown fallback.
+    """
+    from fulmar_bringup.system import Guards
+    from policy_server.controllers import FALLBACKS
+
+    if given["fallback"] not in (None, *FALLBACKS):
+        raise UnknownNameError("fallback", given["fallback"], FALLBACKS)
+    return Guards(**{name: value for name, value in given.items() if value is not None})
 
 
 def read_goal(text: str | None, option: str = "--goal", robot: str = "") -> tuple[float, ...] | None:

@@ -8,10 +8,13 @@ import pwd
 import shutil
 import subprocess
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+from fulmar_bringup.completion import completed
 from fulmar_bringup.console import warn
+from fulmar_bringup.plan_checks import checked
+from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.service.device_rules import device_groups, device_rules
 from fulmar_bringup.service.installation import (
     Files,
@@ -22,8 +25,7 @@ from fulmar_bringup.service.installation import (
 )
 from fulmar_bringup.service.own_places import module_path, whole_paths
 from fulmar_bringup.service.unit import Service, known_groups, unit_text
-from fulmar_bringup.standing_system import plan_system
-from fulmar_bringup.system import System, varied_system
+from fulmar_bringup.system_plan import system_plan
 from fulmar_cli.installation.extras import check_plan
 from fulmar_core.config.errors import ConfigError, FulmarError
 from fulmar_core.config.own_class import is_own
@@ -92,36 +94,32 @@ def plan_service(wanted: Wanted, root: Path, *, dry_run: bool) -> PlannedService
     hardware = wanted.hardware
     if hardware is not None and hardware.endswith(".yaml"):
         hardware = str(Path(hardware).absolute())  # the service has another working folder
-    chosen = varied_system(
-        wanted.system,
-        robot=wanted.robot,
-        robot_name=wanted.name,
-        task=wanted.task,
-        controller=wanted.controller,
+    plan = system_plan(
+        wanted.system, robot=wanted.robot, name=wanted.name, task=wanted.task, controller=wanted.controller,
         backend=wanted.backend,
-        hardware=hardware,
-    )
-    _check_places(chosen)
-    policy = wanted.policy.absolute() if wanted.policy else None
-    request = plan_system(
-        chosen, record=Path("runs/planned"), command="", policy=policy, hardware=hardware,
-        recording=wanted.recording, unattended=True,
     )  # fmt: skip
-    check_plan(request.plan)
+    _check_places(plan)
+    policy = wanted.policy.absolute() if wanted.policy else None
+    plan = replace(
+        plan, record="runs/planned", policy=str(policy or ""), hardware=hardware or "",
+        recording_mode=wanted.recording or "", unattended=True,
+    )  # fmt: skip
+    plan = checked(completed(plan))
+    check_plan(plan)
     if root == Path("/") and not dry_run and os.geteuid() != 0:
         raise ConfigError(
             f"only root may write below /etc: sudo {_program()} {' '.join(sys.argv[1:])}   # or --root DIR"
         )
     rules: tuple[str, ...] = ()
     groups: tuple[str, ...] = ()
-    own = [name for name in (chosen.controller, chosen.task) if is_own(name)]
-    own += [node.module for node in chosen.nodes]
-    if request.plan.hardware:
-        file = load_hardware(request.plan.hardware)
+    own = [name for name in (plan.controller, plan.task) if is_own(name)]
+    own += [node.module for node in plan.nodes]
+    if plan.hardware:
+        file = load_hardware(plan.hardware)
         own += [file.driver.kind] if is_own(file.driver.kind) else []
         rules, groups = device_rules(file), device_groups(file)
         if root == Path("/"):
-            _warn_of_absence(request.plan.hardware)
+            _warn_of_absence(plan.hardware)
     user = _user(wanted.user, root)
     if root == Path("/") and not dry_run:
         _check_program(str(_program()), user)
@@ -139,7 +137,7 @@ def plan_service(wanted: Wanted, root: Path, *, dry_run: bool) -> PlannedService
         user,
         known,
         whole_paths(os.environ) | module_path(own, os.environ),
-        lands=not load_robot(chosen.robot).kind.stops,
+        lands=not load_robot(plan.robot).kind.stops,
     )
     files = Files(root, service.name)
     return PlannedService(files, texts_of(files, unit_text(service, os.environ), rules))
@@ -162,9 +160,9 @@ def _program() -> Path:
     return Path(found).absolute()
 
 
-def _check_places(system: System) -> None:
+def _check_places(plan: RunPlan) -> None:
     """Refuse a path in a system file that the service, which runs in a folder of its own, does not find."""
-    keys = system.guards.trusted_keys
+    keys = plan.guards.trusted_keys
     if keys is not None and not Path(keys).is_absolute():
         raise ConfigError(
             f"trusted_keys = '{keys}' of the system file is relative, and a service runs in a folder of its own: write "

@@ -16,7 +16,10 @@ from nav_msgs.msg import Odometry
 from rclpy.node import Node
 from sensor_msgs.msg import Imu, JointState
 
-from fulmar_bringup.planning import RunRequest, plan_run
+from fulmar_bringup.completion import completed
+from fulmar_bringup.plan_checks import checked
+from fulmar_bringup.run_plan import RunPlan
+from fulmar_bringup.system import Guards
 from fulmar_core.config.process import CONTROL_PRIORITY, take_priority_with_helpers
 from fulmar_core.dynamics.flight_trim import find_trim
 from fulmar_core.estimators.kinds import default_estimator
@@ -34,6 +37,7 @@ from fulmar_core.robots.topics import (
     VELOCITY_COMMAND,
     Wire,
 )
+from fulmar_core.safety.geofence import NO_AREA
 from fulmar_core.states.spatial import SpatialState
 from fulmar_core.tasks import Task, load_task
 from fulmar_evaluation.faults.by_kind import STAYS, UNSEEN
@@ -128,14 +132,14 @@ class FaultEnvironment:
     height_m: float = HELD[2]  # at which an aircraft begins [m]
     nadir: bool = False  # a satellite keeps pointing to the Earth, and turns with its orbit
 
-    def guards_of(self, robot: Robot) -> dict[str, Any]:
-        """What replaces guards of the system, by name."""
-        return {
-            "estop": True,
-            **({"estimator": default_estimator(robot)} if self.estimated else {}),
-            **({"fallback": self.fallback} if self.fallback else {}),
-            **({"area": area_of(robot)} if self.has_area else {}),
-        }
+    def guards_of(self, robot: Robot) -> Guards:
+        """Guards beside those of the system."""
+        return Guards(
+            estop=True,
+            estimator=default_estimator(robot) if self.estimated else None,
+            fallback=self.fallback or None,
+            area=area_of(robot) if self.has_area else NO_AREA,
+        )
 
     def why_not(self, robot: Robot) -> str:
         """Why a robot cannot be in such a system; empty if it can."""
@@ -183,7 +187,7 @@ def area_of(robot: Robot) -> tuple[float, ...]:
     return tuple(side for far in goal for side in (-ROOM_M, far + ROOM_M))
 
 
-def request_of(name: str, record: Path, about: FaultEnvironment = USUAL) -> RunRequest:
+def plan_of(name: str, record: Path, about: FaultEnvironment = USUAL) -> RunPlan:
     """A robot that has far to go, with an e-stop.
 
     Args:
@@ -196,40 +200,32 @@ def request_of(name: str, record: Path, about: FaultEnvironment = USUAL) -> RunR
     """
     robot = load_robot(name)
     task = load_task("point") if about.nadir else task_of(robot)
-    controller = _controller_of(robot)
-    request = plan_run(
-        robot=name,
-        task=task.name,
-        controller=controller,
-        backend="hardware" if about.emulated else "mujoco",
-        policy=None,
+    asked = RunPlan(
+        name,
+        task.name,
+        _controller_of(robot),
+        "hardware" if about.emulated else "mujoco",
         goal=None if about.by_goal_node or about.nadir or not robot.kind.stops else goal_of(robot),
         start=_start_of(robot, about),
-        duration_s=None,
-        lockstep=False,
-        rate=1.0,
-        control_hz=None,
         scenario=about.scenario,
-        seed=0,
-        record=record,
-        command="fulmar faults",
-        goals=_goals_file(record.parent, robot, task) if about.by_goal_node else None,
-        emulate=about.emulated,
+        goals=_goals_file(record.parent, robot, task) if about.by_goal_node else "",
+        emulated=about.emulated,
         extras=("markers",) if about.drawn else (),
         guards=about.guards_of(robot),
+        record=str(record),
+        command="fulmar faults",
     )
-    policy = (
-        _harmed_bundle(name, task.name, record.parent, about.bundle) if about.bundle else request.plan.policy
-    )
-    return replace(request, plan=replace(request.plan, duration_s=0.0, policy=policy))
+    plan = checked(completed(asked))
+    harmed = _harmed_bundle(name, task.name, record.parent, about.bundle) if about.bundle else plan.policy
+    return replace(plan, duration_s=0.0, policy=harmed)
 
 
-def _start_of(robot: Robot, about: FaultEnvironment) -> tuple[float, ...] | None:
-    """Where it starts, as people write it: an aircraft in level flight [m, deg]; None: as the task draws it."""
+def _start_of(robot: Robot, about: FaultEnvironment) -> tuple[float, ...]:
+    """Where it starts, as people write it: an aircraft in level flight [m, deg]; empty: as the task draws it."""
     if robot.airframe is not None:
         level = find_trim(robot, robot.airframe.speed, about.height_m).state
         return *HELD[:2], about.height_m, *SpatialState.written(level.pose)[3:]
-    return None if about.nadir else (0.0,) * robot.state_type.AXES
+    return () if about.nadir else (0.0,) * robot.state_type.AXES
 
 
 def _controller_of(robot: Robot) -> str:

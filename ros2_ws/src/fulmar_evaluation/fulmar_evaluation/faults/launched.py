@@ -1,6 +1,6 @@
-"""What `fulmar run` and `fulmar up` do with a request, in a process of its own.
+"""What `fulmar run` and `fulmar up` do with a plan, in a process of its own.
 
-The fault suite starts it in the place of these commands, since its requests have relays and networks that no option
+The fault suite starts it in the place of these commands, since its plans have relays and networks that no option
 of theirs has. It prints the events of `fulmar up --json`, the last one with the reason of the end.
 """
 
@@ -10,14 +10,13 @@ import json
 import os
 import signal
 import sys
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from types import FrameType
 from typing import Any
 
 import numpy as np
 
-from fulmar_bringup.planning import RunRequest
 from fulmar_bringup.run_executor import execute
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.standing_system import keep_up
@@ -32,49 +31,39 @@ Rows = tuple[tuple[float, ...], ...]
 
 
 @dataclass(frozen=True)
-class WrittenRequest:
-    """A `RunRequest` of a task without things, as a file has it."""
+class WrittenPlan:
+    """A complete plan of a task without things, as a file has it."""
 
     plan: RunPlan
-    goal: tuple[float, ...] | None
-    record: str
-    command: str
     targets: Rows
     obstacles: Rows
 
     @property
-    def request(self) -> RunRequest:
-        """What is asked for."""
+    def whole(self) -> RunPlan:
+        """The plan with its mission."""
         obstacles = np.array(self.obstacles) if self.obstacles else None
-        mission = goal_at(*self.targets, obstacles=obstacles)
-        return RunRequest(self.plan, self.goal, Path(self.record), self.command, mission)
+        return replace(self.plan, mission=goal_at(*self.targets, obstacles=obstacles))
 
 
-def command_of(launcher: str, request: RunRequest, folder: Path) -> list[str]:
-    """Command line of a launcher of a request, which is written into a folder."""
-    mission = request.mission
-    written = WrittenRequest(
-        request.plan,
-        request.goal,
-        str(request.record),
-        request.command,
-        np.asarray(mission.targets).tolist(),
-        np.asarray(mission.obstacles).tolist(),
-    )
-    path = folder / "request.json"
-    path.write_text(json.dumps(asdict(written)), encoding="utf-8")
+def command_of(launcher: str, plan: RunPlan, folder: Path) -> list[str]:
+    """Command line of a launcher of a plan, which is written into a folder."""
+    mission = plan.mission
+    assert mission is not None  # as of `completed`
+    rows = np.asarray(mission.targets).tolist(), np.asarray(mission.obstacles).tolist()
+    path = folder / "plan.json"
+    path.write_text(json.dumps(asdict(WrittenPlan(replace(plan, mission=None), *rows))), encoding="utf-8")
     return [sys.executable, "-m", __name__, launcher, str(path)]
 
 
 def main() -> None:
-    """Run or keep up the request of a file until its end, or until SIGINT or SIGTERM."""
+    """Run or keep up the plan of a file until its end, or until SIGINT or SIGTERM."""
     launcher, path = sys.argv[1:]
-    request = load_config(WrittenRequest, Path(path)).request
+    plan = load_config(WrittenPlan, Path(path)).whole
     signal.signal(signal.SIGTERM, _on_terminate)
     end_with(os.getppid(), signal.SIGTERM)
     failure = ""
     try:
-        failure = _launched(launcher, request)
+        failure = _launched(launcher, plan)
     except FulmarError as error:
         failure = str(error)
     except KeyboardInterrupt as stop:
@@ -83,11 +72,11 @@ def main() -> None:
     sys.exit(FAILED if failure else 0)
 
 
-def _launched(launcher: str, request: RunRequest) -> str:
+def _launched(launcher: str, plan: RunPlan) -> str:
     """Why it failed; empty if it did not."""
     if launcher == RUN:
-        return execute(request).failure
-    return keep_up(request, _emit, lambda *_shown: None).failure
+        return execute(plan).failure
+    return keep_up(plan, _emit, lambda *_shown: None).failure
 
 
 def _on_terminate(number: int, _frame: FrameType | None) -> None:

@@ -9,13 +9,13 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from pathlib import Path
 
 import psutil
 import rclpy
 from rclpy.node import Node
 
 from fulmar_bringup.launched_command import LaunchedCommand
-from fulmar_bringup.planning import RunRequest
 from fulmar_bringup.processes import ProcessGroup
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.teleop_row import teleop_spec
@@ -75,7 +75,7 @@ class LiveSystem:
 
     def __init__(
         self,
-        request: RunRequest,
+        plan: RunPlan,
         launched: LaunchedCommand,
         bystander: Node,
         about: FaultEnvironment = USUAL,
@@ -84,13 +84,8 @@ class LiveSystem:
         clock: SteppedClock | None = None,
     ) -> None:
         """Hold the parts together."""
-        self.plan, self.record, self.launched, self.launcher = (
-            request.plan,
-            request.record,
-            launched,
-            launcher,
-        )
-        self.bystander, self._request, self._hosts, self._clock = bystander, request, hosts, clock
+        self.plan, self.record, self.launched, self.launcher = plan, Path(plan.record), launched, launcher
+        self.bystander, self._hosts, self._clock = bystander, hosts, clock
         self.others = ProcessGroup()
         self.left_over: list[str] = []
         robot = load_robot(self.plan.robot)
@@ -169,7 +164,8 @@ class LiveSystem:
         """As `fulmar goals` gives one to a system that is up."""
         wire, form = GOAL_WIRES[load_task(self.plan.task).goal_topic], self.robot.state_type
         now_ns = time.time_ns() if self.plan.hardware else SIMULATION_START_NS
-        message = goal_message(self._request.mission, wire.name, now_ns, self.plan.frames, form=form)
+        assert self.plan.mission is not None  # as of `completed`
+        message = goal_message(self.plan.mission, wire.name, now_ns, self.plan.frames, form=form)
         publisher = self.bystander.create_publisher(TYPES[wire.name], wire.name, publisher_qos(wire))
         wait_for(lambda: publisher.get_subscription_count() > 0, MATCH_S)
         publisher.publish(message)
@@ -269,7 +265,7 @@ def repeated(publish: Callable[[], None], every_s: float) -> Iterator[None]:
 
 @contextlib.contextmanager
 def live_system(
-    request: RunRequest,
+    plan: RunPlan,
     about: FaultEnvironment = USUAL,
     hosts: TwoHosts | None = None,
     launcher: str = RUN,
@@ -277,29 +273,28 @@ def live_system(
     """A system that a launcher has started, on its way to its goal after `begin`; ended at the end.
 
     Args:
-        request: What to run.
-        about: What is unusual about it; the same that the request was made with.
+        plan: What to run.
+        about: What is unusual about it; the same that the plan was made with.
         hosts: The controller is on the other one, everything else on the robot's, which this thread has to be on.
         launcher: `run` or `up`.
 
     Raises:
         RunFailed: Its observer failed.
     """
-    plan = replace(request.plan, intercepted=_intercepted(request.plan, about))
-    plan = replace(plan, duration_s=MOST_S if launcher == RUN else 0.0)
+    length_s = MOST_S if launcher == RUN else 0.0
+    plan = replace(plan, intercepted=_intercepted(plan, about), duration_s=length_s)
     if hosts is not None:
         plan = replace(plan, controller_network=hosts.other, copies=MOST_COPIES)
-    request = replace(request, plan=plan)
     errors: list[Exception] = []
     with contextlib.ExitStack() as stack:
         bystander = stack.enter_context(ros_node("bystander", errors.append, namespace=plan.namespace))
-        folder = request.record.parent
+        folder = Path(plan.record).parent
         clock = SteppedClock(folder, about.clock_of) if about.clock_of else None
         variables = {**os.environ, **(clock.environment if clock is not None else {})}
         launched = LaunchedCommand(
-            (), environment=variables, folder=folder, command=command_of(launcher, request, folder)
+            (), environment=variables, folder=folder, command=command_of(launcher, plan, folder)
         )
-        live = LiveSystem(request, launched, bystander, about, hosts, launcher, clock)
+        live = LiveSystem(plan, launched, bystander, about, hosts, launcher, clock)
         try:
             if about.by_hand:
                 live.others.start(teleop_spec(plan.robot, name=plan.name, keyboard=False))

@@ -12,14 +12,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from fulmar_bringup.domains import environment, reserved_domains
-from fulmar_bringup.system import Guards, default_hardware, modules_of
+from fulmar_bringup.system import default_hardware, modules_of
 from fulmar_core.config.errors import ConfigError, FulmarError, UnknownNameError
 from fulmar_core.config.process import end_with
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_evaluation.faults.actuator_faults import ACTUATOR_FAULTS
 from fulmar_evaluation.faults.command_faults import CABLE_FAULTS, COMMAND_FAULTS
 from fulmar_evaluation.faults.fault import Fault, FaultResult, Outcome
-from fulmar_evaluation.faults.fault_environment import request_of
+from fulmar_evaluation.faults.fault_environment import plan_of
 from fulmar_evaluation.faults.hardware_faults import HARDWARE_FAULTS
 from fulmar_evaluation.faults.host_faults import HOST_FAULTS
 from fulmar_evaluation.faults.input_faults import INPUT_FAULTS
@@ -95,7 +95,7 @@ def modules_for(robot: str, faults: list[Fault]) -> tuple[str, ...]:
     needed: dict[str, None] = {}
     for about in (fault.about for fault in faults):
         backend, hardware = ("hardware", default_hardware(robot)) if about.emulated else ("mujoco", "")
-        guards = Guards(**about.guards_of(load_robot(robot)))
+        guards = about.guards_of(load_robot(robot))
         modules = modules_of("policy", backend, guards=guards, hardware=hardware, emulated=about.emulated)
         needed |= dict.fromkeys(modules)
     return tuple(needed)
@@ -150,9 +150,7 @@ def run_faults(
         FulmarError: The robot has no controller to run.
     """
     with tempfile.TemporaryDirectory() as folder:
-        request_of(
-            robot, Path(folder) / "bag"
-        )  # a robot without a policy is refused once, not by every fault
+        plan_of(robot, Path(folder) / "bag")  # a robot without a policy is refused once, not by every fault
     results = []
     with reserved_domains(1) as (domain,), environment({"ROS_DOMAIN_ID": str(domain)}):
         for count, (fault, each) in enumerate(times_of(faults, launcher, times), 1):
@@ -212,8 +210,8 @@ def _do_on_two_hosts(robot: str, fault: Fault, launcher: str, folder: Path) -> F
 
 
 def _do(robot: str, fault: Fault, launcher: str, folder: Path, hosts: TwoHosts | None) -> FaultResult:
-    request = request_of(robot, folder / "bag", fault.about)
-    with live_system(request, fault.about, hosts, launcher) as live:
+    plan = plan_of(robot, folder / "bag", fault.about)
+    with live_system(plan, fault.about, hosts, launcher) as live:
         if fault.begins:
             live.begin()
         outcome = fault.do(live)
@@ -221,5 +219,5 @@ def _do(robot: str, fault: Fault, launcher: str, folder: Path, hosts: TwoHosts |
         if outcome.time_to_safe_s is not None and live.flight is None:
             wait_for(lambda: live.has_ended, ENDS_S)
     away, again = outcome.recorder_away, outcome.recorder_again
-    evidence = bag_evidence(request.record, live.observer, away, again=again)
+    evidence = bag_evidence(Path(plan.record), live.observer, away, again=again)
     return _result(fault, live, outcome, evidence)

@@ -115,33 +115,31 @@ def run_reference(reference: Reference, folder: Path) -> Path:
     Raises:
         RunFailed: The run did not come to its end.
     """
-    from fulmar_bringup.planning import plan_run
+    from fulmar_bringup.completion import completed
+    from fulmar_bringup.plan_checks import checked
+    from fulmar_bringup.run_plan import RunPlan
+    from fulmar_bringup.system import Guards
     from fulmar_evaluation.run_outcome import run_and_evaluate
 
     control_hz = reference.control_hz or load_robot(reference.robot).timing.control_hz
-    request = plan_run(
-        robot=reference.robot,
-        task=reference.task,
-        controller=reference.controller,
-        backend=reference.backend,
-        policy=None,
-        goal=None,
-        start=None,
+    asked = RunPlan(
+        reference.robot,
+        reference.task,
+        reference.controller,
+        reference.backend,
+        control_hz,
         duration_s=STEPS / control_hz,
         lockstep=True,
-        rate=1.0,
-        control_hz=control_hz,
-        scenario="nominal",
         seed=SEED,
-        record=folder / reference.name,
-        guards=reference.guards,
-        command="",
+        record=str(folder / reference.name),
+        guards=Guards(**reference.guards),
     )
+    plan = checked(completed(asked))
     with own_domain():
-        outcome = run_and_evaluate(request)
+        outcome = run_and_evaluate(plan)
     if outcome.failure:
         raise RunFailed(f"reference '{reference.name}': {outcome.failure}")
-    return request.record
+    return Path(plan.record)
 
 
 def _write_kept(bag: Bag, folder: Path, task: Task) -> None:

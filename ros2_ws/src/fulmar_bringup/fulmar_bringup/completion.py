@@ -1,0 +1,176 @@
+"""Completes a plan: what nobody said comes from a system file, the robot's kind, the goal file and the seed."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import cast
+
+import numpy as np
+
+from fulmar_bringup.excitation_plan import excitation_of
+from fulmar_bringup.goal_plan import check_file_places, checked_goals, duration_of, goal_path, goal_rate
+from fulmar_bringup.own_row import own_nodes
+from fulmar_bringup.placement import placed
+from fulmar_bringup.plan_checks import adapter_path
+from fulmar_bringup.run_plan import RunPlan
+from fulmar_bringup.system import (
+    NONE,
+    Guards,
+    check_names,
+    default_control_hz,
+    default_guards,
+    default_hardware,
+    system_of,
+)
+from fulmar_bringup.task_choice import task_of, whole_pose
+from fulmar_core.config.errors import ConfigError, UnknownNameError
+from fulmar_core.config.recording import MODES, Mode, Recording
+from fulmar_core.estimators.kinds import default_estimator, estimator_kind
+from fulmar_core.loop.controller_settings import POLICY
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.robots.topics import ODOMETRY
+from fulmar_core.safety.geofence import check_starts
+from fulmar_core.tasks import Task, load_task
+from fulmar_core.tasks.goal import PLACES
+from fulmar_core.tasks.torque_profiles import DURATION_S
+from fulmar_core.worlds.scenario import load_scenario
+from policy_server.controllers import controller_entry, shipped_policy
+
+EVENT_RATE = "event_rate"  # file of configs/estimators that takes the place of a dead gyroscope
+
+
+def completed(plan: RunPlan) -> RunPlan:
+    """The plan with all that was not said; a complete plan stays as it is.
+
+    Raises:
+        ConfigError: Unknown name, a mistake in a file, or choices that exclude one another: nothing completes them.
+    """
+    if plan.mission is not None:
+        return plan
+    plan = replace(plan, task=task_of(plan))
+    plan = replace(plan, controller=usual_controller(plan))
+    check_names(plan.robot, plan.task, plan.controller, plan.backend, plan.hardware or None)
+    robot, task = load_robot(plan.robot), load_task(plan.task)
+    _check_asked(plan, task)
+    policy = Path(plan.policy) if plan.policy else None
+    if policy is None and controller_entry(plan.controller).runs_bundle:
+        policy = shipped_policy(plan.robot, plan.task)
+    hz = plan.control_hz or default_control_hz(plan.robot, plan.task, plan.controller, plan.backend, policy)
+    if plan.backend == "hardware":
+        plan = replace(plan, hardware=default_hardware(plan.robot, plan.hardware or None))
+    plan = replace(
+        plan,
+        control_hz=hz,
+        policy=str(policy.absolute()) if policy else "",
+        adapter=adapter_path(plan.robot, plan.adapter),
+        guards=_guards(plan, robot),
+    )
+    return _with_goal(_as_its_system(plan), robot, task)
+
+
+def usual_controller(plan: RunPlan) -> str:
+    """The controller that was asked for, or another one in the place of a policy that a satellite or aircraft lacks."""
+    law = load_robot(plan.robot).kind.usual_law
+    lacks = plan.controller == POLICY and not plan.policy and shipped_policy(plan.robot, plan.task) is None
+    return law if lacks and law else plan.controller
+
+
+def _check_asked(plan: RunPlan, task: Task) -> None:
+    """Refuse numbers that are none, and choices that exclude one another."""
+    if plan.backend != "hardware" and (plan.hardware or plan.emulated):
+        raise ConfigError(f"--hardware and --emulate go with --backend hardware, not with {plan.backend}.")
+    asked = {"goal": plan.goal, "start": plan.start, "duration": plan.duration_s, "rate": plan.rate}
+    for name, value in asked.items():
+        if value is not None and not np.isfinite(value).all():
+            raise ConfigError(f"{name} = {value} must be finite.")
+    if plan.goals and plan.goal is not None:
+        raise ConfigError("--goals brings its own goals; it takes no --goal.")
+    # References of aircraft begin where the craft is, and no single goal holds one.
+    if plan.is_real and plan.goal is None and not (plan.goals or plan.standing or task.flies):
+        raise ConfigError("a real robot goes nowhere by chance: say where with --goal or --goals.")
+
+
+def _guards(plan: RunPlan, robot: Robot) -> Guards:
+    """The guards of the matching system file, with what was asked for and what the robot's kind always has."""
+    asked = {key: value for key, value in asdict(plan.guards).items() if value != getattr(NONE, key)}
+    files = [file.strip() for file in str(asked.pop("estimator", "")).split(",") if file.strip()]
+    rest = tuple(file for file in files if ODOMETRY not in estimator_kind(file).publishes)
+    first = [file for file in files if file not in rest]
+    if len(first) > 1:
+        raise ConfigError(
+            f"{' and '.join(first)} estimate the odometry, and a controller follows one. Leave one out."
+        )
+    asked |= ({"estimator": first[0]} if first else {}) | ({"estimators": rest} if rest else {})
+    guards = replace(default_guards(plan.controller, plan.backend, plan.hardware), **asked)
+    guards = replace(guards, estop=guards.estop or plan.unattended)
+    if not robot.kind.always_estimated or plan.backend == "hardware":
+        return guards
+    if guards.estimator is None:
+        guards = replace(guards, estimator=default_estimator(robot))
+    lost = load_scenario(plan.scenario).sensing.gyroscope_dies_s is not None and robot.event_cameras
+    if lost and not any(estimator_kind(file).takes.get("events") for file in guards.estimators):
+        guards = replace(guards, estimators=(*guards.estimators, EVENT_RATE))
+    return guards
+
+
+def _as_its_system(plan: RunPlan) -> RunPlan:
+    """The plan of a run with recorder and own nodes of the matching system file; a standing system has brought its own.
+
+    Raises:
+        ConfigError: There is no such mode of recording.
+    """
+    if not plan.standing:
+        system = system_of(plan.controller, plan.backend)
+        recording = system.recorder if system is not None else Recording()
+        if recording.mode == "goals":
+            recording = replace(recording, mode="whole")  # a run has one bag
+        same = system is not None and (system.robot, system.task) == (plan.robot, plan.task)
+        nodes = own_nodes(replace(system, name=plan.name)) if system is not None and same else ()
+        plan = replace(plan, recording=recording, nodes=nodes)
+    if not plan.recording_mode:
+        return plan
+    if plan.recording_mode not in MODES:
+        raise UnknownNameError("recording", plan.recording_mode, MODES)
+    return replace(plan, recording=replace(plan.recording, mode=cast(Mode, plan.recording_mode)))
+
+
+def _with_goal(plan: RunPlan, robot: Robot, task: Task) -> RunPlan:
+    """The plan with start, goal and length, as given, as a goal file says, or as the seed draws them."""
+    form, area = robot.state_type, plan.guards.area
+    goal = plan.goal and whole_pose(plan.goal, robot, "--goal")
+    start = plan.start and whole_pose(plan.start, robot, "--start")
+    if plan.standing or plan.is_real:  # where a robot stands is where its odometry begins
+        start = start or (0.0,) * len(form.NUMBERS)
+    excitation = plan.excitation or excitation_of(plan.goals, robot, plan.controller)
+    goals = "" if excitation else plan.goals
+    file = None
+    if goals:
+        file = checked_goals(goals, robot, task, goal_rate(plan.control_hz, lockstep=plan.lockstep))
+        check_file_places(file, goals, robot, area)
+    if not start and not goals:
+        check_starts(robot, task)
+    mission, drawn = placed(
+        robot,
+        task,
+        load_scenario(plan.scenario),
+        plan.seed,
+        file=file,
+        goal=goal,
+        start=start or None,
+        area=area,
+        checks_goal=not plan.standing,
+        checks_start=not plan.is_real,
+    )
+    start = start or drawn
+    usual_s = DURATION_S if excitation else duration_of(file, robot, start) if file else task.episode_s
+    return replace(
+        plan,
+        start=start,
+        goal=goal or (form.written(mission.current) if task.goal_topic in PLACES else None),
+        goals=str(goal_path(goals)) if goals else "",
+        excitation=excitation,
+        duration_s=0.0 if plan.standing else plan.duration_s or usual_s,
+        mission=mission,
+    )
