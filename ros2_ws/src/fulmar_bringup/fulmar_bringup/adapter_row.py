@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fulmar_bringup.node_row import Launcher, NodeRow, robot_spec
-from fulmar_bringup.node_spec import CONTROLLER, NodeSpec, Parameter
+from fulmar_bringup.node_spec import CONTROLLER, NodeSpec, given
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.robots.topics import command_wire
@@ -12,9 +12,7 @@ from fulmar_core.robots.topics import command_wire
 def _specs(plan: RunPlan, _launcher: Launcher) -> tuple[NodeSpec, ...]:
     if not plan.adapter:
         return ()
-    parameters: dict[str, Parameter] = {"hardware": plan.adapter}
-    if plan.adapter_topic:
-        parameters["topic"] = plan.adapter_topic
+    parameters = given(hardware=plan.adapter, topic=plan.adapter_topic)
     commands = (command_wire(load_robot(plan.robot)).name,)
     return (robot_spec(plan, "adapter", "hardware_drivers.adapter_node", parameters, outputs=commands),)
 

@@ -88,7 +88,7 @@ def _check_asked(plan: RunPlan, task: Task) -> None:
     if plan.goals and plan.goal is not None:
         raise ConfigError("--goals brings its own goals; it takes no --goal.")
     # References of aircraft begin where the craft is, and no single goal holds one.
-    if plan.is_real and plan.goal is None and not (plan.goals or plan.standing or task.flies):
+    if plan.is_real and plan.goal is None and not (plan.goals or plan.standing or not robot.kind.stops):
         raise ConfigError("a real robot goes nowhere by chance: say where with --goal or --goals.")
 
 
@@ -138,7 +138,7 @@ def _as_its_system(plan: RunPlan) -> RunPlan:
 
 def _with_goal(plan: RunPlan, robot: Robot, task: Task) -> RunPlan:
     """The plan with start, goal and length, as given, as a goal file says, or as the seed draws them."""
-    form, area = robot.state_type, plan.guards.area
+    form = robot.state_type
     goal = plan.goal and whole_pose(plan.goal, robot, "--goal")
     start = plan.start and whole_pose(plan.start, robot, "--start")
     if plan.standing or plan.is_real:  # where a robot stands is where its odometry begins
@@ -148,21 +148,10 @@ def _with_goal(plan: RunPlan, robot: Robot, task: Task) -> RunPlan:
     file = None
     if goals:
         file = checked_goals(goals, robot, task, goal_rate(plan.control_hz, lockstep=plan.lockstep))
-        check_file_places(file, goals, robot, area)
+        check_file_places(file, goals, robot, plan.guards.area)
     if not start and not goals:
         check_starts(robot, task)
-    mission, drawn = placed(
-        robot,
-        task,
-        load_scenario(plan.scenario),
-        plan.seed,
-        file=file,
-        goal=goal,
-        start=start or None,
-        area=area,
-        checks_goal=not plan.standing,
-        checks_start=not plan.is_real,
-    )
+    mission, drawn = placed(replace(plan, goal=goal, start=start), file)
     start = start or drawn
     usual_s = DURATION_S if excitation else duration_of(file, robot, start) if file else task.episode_s
     return replace(

@@ -7,7 +7,7 @@ from pathlib import Path
 from fulmar_bringup.estimator_row import simulates_without_noise
 from fulmar_bringup.lockstep_chain import estimates_odometry
 from fulmar_bringup.node_row import Launcher, NodeRow, robot_spec
-from fulmar_bringup.node_spec import CONTROLLER, NodeSpec, Parameter
+from fulmar_bringup.node_spec import CONTROLLER, NodeSpec, Parameter, given
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.robots.topics import (
@@ -38,38 +38,25 @@ def controller_spec(plan: RunPlan) -> NodeSpec:
         "rate": plan.rate,
         "goals_streamed": bool(plan.goals),
     }
-    if plan.excitation:
-        parameters["excitation"] = plan.excitation
-    if controller_entry(plan.controller).draws:
+    guards, entry = plan.guards, controller_entry(plan.controller)
+    if entry.draws:
         parameters["seed"] = plan.seed
-    guards = plan.guards
-    if controller_entry(plan.controller).runs_bundle:
-        texts = {
-            "policy": plan.policy,
-            "fallback": guards.fallback or "",
-            "trusted_keys": "" if guards.trusted_keys is None else str(Path(guards.trusted_keys).absolute()),
-        }
-        parameters |= {key: text for key, text in texts.items() if text}
-    if guards.max_run_time_s:
-        parameters["max_run_time_s"] = guards.max_run_time_s
-    if guards.area != NO_AREA:
-        parameters["area"] = list(guards.area)
-    if guards.estop:
-        parameters["estop"] = True
-    if plan.unattended:
-        parameters["unattended"] = True
-    if plan.backend == "hardware":
-        hardware = load_hardware(plan.hardware)
-        if hardware.has_bearing:
-            parameters["air_bearing"] = True
-        # Encoders of a base at rest repeat; motion capture never does.
-        repeats = not estimates_odometry(plan) and not hardware.seen_from_outside
-    else:
-        repeats = simulates_without_noise(plan)
-    if repeats:
-        parameters["odometry_may_repeat"] = True
-    if plan.copies > 1:
-        parameters["copies"] = plan.copies
+    if entry.runs_bundle:
+        keys = "" if guards.trusted_keys is None else str(Path(guards.trusted_keys).absolute())
+        parameters |= given(policy=plan.policy, fallback=guards.fallback, trusted_keys=keys)
+    hardware = load_hardware(plan.hardware) if plan.backend == "hardware" else None
+    # Encoders of a base at rest repeat; motion capture never does.
+    encoded = hardware is not None and not (estimates_odometry(plan) or hardware.seen_from_outside)
+    parameters |= given(
+        excitation=plan.excitation,
+        max_run_time_s=guards.max_run_time_s,
+        area=guards.area if guards.area != NO_AREA else (),
+        estop=guards.estop,
+        unattended=plan.unattended,
+        air_bearing=hardware is not None and hardware.has_bearing,
+        odometry_may_repeat=encoded or simulates_without_noise(plan),
+        copies=plan.copies if plan.copies > 1 else 0,
+    )
     return robot_spec(
         plan,
         "controller",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fulmar_bringup.node_row import Launcher, NodeRow, robot_spec
-from fulmar_bringup.node_spec import NodeSpec, Parameter
+from fulmar_bringup.node_spec import NodeSpec, given
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_core.robots.topics import ESTOP
 
@@ -11,9 +11,7 @@ from fulmar_core.robots.topics import ESTOP
 def _specs(plan: RunPlan, _launcher: Launcher) -> tuple[NodeSpec, ...]:
     if not plan.guards.estop:
         return ()
-    parameters: dict[str, Parameter] = {"robot": plan.robot}
-    if plan.unattended:
-        parameters["pressed"] = True
+    parameters = given(robot=plan.robot, pressed=plan.unattended)
     row = robot_spec(
         plan, "estop", "fulmar_ros.estop_node", parameters, outputs=(ESTOP.name,), loss=plan.loss_of_helpers
     )

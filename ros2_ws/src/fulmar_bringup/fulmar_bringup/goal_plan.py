@@ -203,7 +203,7 @@ def duration_of(file: GoalFile, robot: Robot, start: PoseTuple) -> float:
     if isinstance(file, Trajectory):
         return replace(file, loops=max(1, file.loops)).target().duration_s + 2.0 * SPARE_S  # it stops at once
     axes, can = file.form.AXES, robot.performance
-    if robot.actuators.turns_only:
+    if not robot.kind.goes_anywhere:
         attitudes = np.concatenate((file.form.target_at(start)[None], file.targets()))[:, axes:]
         turns = [angle_between(tuple(q), tuple(after)) for q, after in itertools.pairwise(attitudes)]
         return float(np.sum(20.0 + 3.0 * np.array(turns) / can.yaw_rate)) + SPARE_S

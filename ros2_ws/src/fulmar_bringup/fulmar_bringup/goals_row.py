@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from fulmar_bringup.goal_plan import goal_rate, is_path_of_places
 from fulmar_bringup.node_row import Launcher, NodeRow
-from fulmar_bringup.node_spec import NodeSpec, Parameter, node_spec
+from fulmar_bringup.node_spec import NodeSpec, Parameter, given, node_spec
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_core.robots.topics import GOAL_WIRES, ODOMETRY
 from fulmar_core.tasks import load_task
@@ -33,14 +33,9 @@ def goals_spec(
         control_hz: Velocities come so often along a path [Hz].
         give_up_s: Ends with exit code 1 where robot or controller are not there after so long; 0: waits [s].
     """
-    parameters: dict[str, Parameter] = {
-        "goals": goals,
-        "robot": robot,
-        "control_hz": control_hz,
-        "as_path": as_path,
-    }
-    if give_up_s:
-        parameters["give_up_s"] = give_up_s
+    parameters: dict[str, Parameter] = {"goals": goals, "robot": robot}
+    parameters |= {"control_hz": control_hz, "as_path": as_path}
+    parameters |= given(give_up_s=give_up_s)
     wires = {"inputs": (ODOMETRY.name,), "outputs": tuple(GOAL_WIRES)}
     return node_spec(namespace_of(name or robot), "goals", "fulmar_ros.goal_node", parameters, **wires)
 

@@ -18,39 +18,28 @@ from fulmar_bringup.system_rows import system_rows
 from fulmar_core.config.errors import ConfigError
 from fulmar_core.config.written_text import check_lines
 
+ARGUMENTS = {
+    "system": "a file of configs/systems, without .yaml; mujoco_policy by default",
+    "robot": "a file of configs/robots, without .yaml",
+    "name": "what the robot is called: its namespace; its type by default",
+    "task": "a file of configs/tasks, without .yaml, or your own class: mypackage.mymodule:MyTask",
+    "controller": "policy, a classical one such as lqr, mymodule:MyController, or external: a node of yours",
+    "backend": "mujoco, mock, jsbsim or hardware",
+    "hardware": "a file of configs/hardware, without .yaml, or a path to one",
+    "policy": "folder of a policy bundle",
+    "adapter": "with controller external, a file of configs/hardware: commands come in as its driver sends them",
+    "topic": "topic that the adapter takes, in the place of the file's",
+    "emulate": "true: with backend hardware, an emulator stands in for the device",
+    "goals": "a file of configs/goals, without .yaml, that a node of its own publishes",
+    **{name: f"false: not this. {text}" for name, text in OPTIONS.items()},
+}
 
-def list_nodes(
-    *,
-    system: str | None = None,
-    robot: str | None = None,
-    name: str | None = None,
-    task: str | None = None,
-    controller: str | None = None,
-    backend: str | None = None,
-    policy: str | None = None,
-    goals: str | None = None,
-    hardware: str | None = None,
-    adapter: str | None = None,
-    topic: str | None = None,
-    emulate: str | None = None,
-    **switches: str | None,
-) -> tuple[NodeSpec, ...]:
+
+def list_nodes(**asked: str | None) -> tuple[NodeSpec, ...]:
     """Nodes of a system, each of its choices replaced by what is given.
 
     Args:
-        system: Name of a file in `configs/systems`; `mujoco_policy` by default.
-        robot: Another robot.
-        name: Another name of the robot; that of the system or its type by default.
-        task: Another task.
-        controller: Another controller.
-        backend: Another backend.
-        policy: Folder of a bundle; the shipped one by default.
-        goals: Name of a file in `configs/goals`, or a path that ends in `.yaml`; without it goals come from outside.
-        hardware: Name of a file in `configs/hardware`, or a path that ends in `.yaml`; the robot's own by default.
-        adapter: With controller `external`, name or path of the hardware file whose commands it speaks.
-        topic: Topic that the adapter takes them from; the file's by default.
-        emulate: `true`: with backend hardware, an emulator stands in for the device.
-        switches: `false`, by the name of an optional node of the table: it does not run.
+        asked: Texts by the names of `ARGUMENTS`; None: not given.
 
     Returns:
         As of `system_rows`. The row of an external controller is not there, or is that of its adapter.
@@ -58,27 +47,20 @@ def list_nodes(
     Raises:
         ConfigError: Unknown name, or a mistake in a file.
     """
-    given_texts = {
-        "system": system, "robot": robot, "name": name, "task": task, "controller": controller, "backend": backend,
-        "policy": policy, "goals": goals, "hardware": hardware, "adapter": adapter, "topic": topic,
-        "emulate": emulate, **switches,
-    }  # fmt: skip
-    check_lines(given_texts.items())
-    for word, given in (("emulate", emulate), *switches.items()):
-        if given not in (None, "true", "false"):
-            raise ConfigError(f"{word} = '{given}' must be true or false.")
-    chosen = system_plan(
-        system or "mujoco_policy", robot=robot, name=name, task=task, controller=controller, backend=backend
-    )
+    check_lines(asked.items())
+    for word in ("emulate", *OPTIONS):
+        if asked.get(word) not in (None, "true", "false"):
+            raise ConfigError(f"{word} = '{asked[word]}' must be true or false.")
+    choices = {name: asked.get(name) for name in ("robot", "name", "task", "controller", "backend")}
     plan = replace(
-        chosen,
-        policy=policy or "",
-        goals=goals or "",
-        hardware=hardware or "",
-        adapter=adapter or "",
-        adapter_topic=topic or "",
-        emulated=emulate == "true",
-        extras=tuple(name for name in OPTIONS if switches.get(name) != "false"),
+        system_plan(asked.get("system") or "mujoco_policy", **choices),
+        policy=asked.get("policy") or "",
+        goals=asked.get("goals") or "",
+        hardware=asked.get("hardware") or "",
+        adapter=asked.get("adapter") or "",
+        adapter_topic=asked.get("topic") or "",
+        emulated=asked.get("emulate") == "true",
+        extras=tuple(name for name in OPTIONS if asked.get(name) != "false"),
     )
     plan, wires = checked(completed(plan)), None
     if plan.emulated:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fulmar_bringup.node_row import Launcher, NodeRow, robot_spec
-from fulmar_bringup.node_spec import RESTARTS, NodeSpec, Parameter
+from fulmar_bringup.node_spec import RESTARTS, NodeSpec, given
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_core.robots.topics import ACTUATORS_STATE, DIAGNOSTICS, MARKERS, OBSTACLES, STATUS, goal_wires
 from fulmar_core.safety.geofence import NO_AREA
@@ -14,9 +14,7 @@ def _specs(plan: RunPlan, _launcher: Launcher) -> tuple[NodeSpec, ...]:
     if "markers" not in plan.extras:
         return ()
     task, area = load_task(plan.task), plan.guards.area
-    parameters: dict[str, Parameter] = {"robot": plan.robot, "task": plan.task}
-    if area != NO_AREA:
-        parameters["area"] = list(area)
+    parameters = given(robot=plan.robot, task=plan.task, area=area if area != NO_AREA else ())
     goals = (wire.name for wire in goal_wires(task.goal_topic))
     row = robot_spec(
         plan,

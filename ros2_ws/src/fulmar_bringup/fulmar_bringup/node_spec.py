@@ -43,3 +43,8 @@ def node_spec(
     """That of a Python module: its first part is the package, its last part the executable."""
     package, executable = module.partition(".")[0], module.rpartition(".")[2]
     return NodeSpec(name, package, executable, module, namespace, dict(parameters), **more)
+
+
+def given(**values: Parameter | tuple[float | str, ...] | None) -> dict[str, Parameter]:
+    """Parameters that differ from nothing: none that is false, 0 or empty, as nodes have them by default."""
+    return {name: list(v) if isinstance(v, tuple) else v for name, v in values.items() if v}  # type: ignore[misc]

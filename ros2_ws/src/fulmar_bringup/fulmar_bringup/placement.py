@@ -2,74 +2,54 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 from fulmar_bringup.goal_plan import first_targets, start_of
+from fulmar_bringup.run_plan import RunPlan
 from fulmar_core.config.errors import ConfigError
-from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.safety.geofence import check_places, farthest_goal, unreachable
 from fulmar_core.simulation.episode import draw_episode
-from fulmar_core.tasks import Task
+from fulmar_core.tasks import Task, load_task
 from fulmar_core.tasks.goal import PLACES, Goal, PoseTuple
 from fulmar_core.tasks.goal_files import GoalFile
-from fulmar_core.worlds.scenario import Scenario
+from fulmar_core.worlds.scenario import load_scenario
 
 DRAWS = 1000  # of a start and a goal, before an area counts as too small for them
 
 
-def placed(
-    robot: Robot,
-    task: Task,
-    scenario: Scenario,
-    seed: int,
-    *,
-    file: GoalFile | None,
-    goal: PoseTuple | None,
-    start: PoseTuple | None,
-    area: Sequence[float],
-    checks_goal: bool,
-    checks_start: bool,
-) -> tuple[Goal, PoseTuple]:
-    """The goal and the start of a run, both inside the area; what was not given is drawn until it is.
+def placed(plan: RunPlan, file: GoalFile | None) -> tuple[Goal, PoseTuple]:
+    """The goal and the start of a plan, both inside the area; what was not given is drawn until it is.
 
     The first draw is the seed's episode. It stays where the task has obstacles or things: the plant draws the
     same ones.
 
     Args:
-        robot: The robot.
-        task: The task.
-        scenario: Scenario of the draws.
-        seed: Seed of the draws.
+        plan: What was given. A standing system gets its goals later, and a real robot starts where it stands.
         file: Goals from a file, which were checked.
-        goal: The goal that was given.
-        start: The start that was given.
-        area: Area of the robot.
-        checks_goal: Whether the robot goes to the goal by itself; otherwise goals come later.
-        checks_start: Whether the start is known; a real robot starts where it stands.
 
     Raises:
         ConfigError: What was given is outside, or no draw is inside.
     """
-    farthest = farthest_goal(robot)
-    if goal is not None:
-        check_places(
-            "the goal", [goal], area, farthest
-        )  # numbers of a pose, of which a place is at the front
-    if start is not None and checks_start:
-        check_places("the start", [start], area, farthest)
+    robot, task, scenario = load_robot(plan.robot), load_task(plan.task), load_scenario(plan.scenario)
+    area, farthest = plan.guards.area, farthest_goal(robot)
+    if plan.goal is not None:  # numbers of a pose, of which a place is at the front
+        check_places("the goal", [plan.goal], area, farthest)
+    if plan.start and not plan.is_real:
+        check_places("the start", [plan.start], area, farthest)
     fixed = start_of(file) if file is not None else None
-    if fixed is not None and start is None and checks_start:
+    if fixed is not None and not plan.start and not plan.is_real:
         check_places("the start of these goals", [fixed], area, farthest)
     for number in range(DRAWS):
-        episode = draw_episode(robot, task, scenario, seed=seed, number=number)
+        episode = draw_episode(robot, task, scenario, seed=plan.seed, number=number)
         mission, drawn = episode.goal, task.state_type.written(episode.start.pose)
         if file is not None:
             mission, drawn = _from_file(file, mission, drawn)
-        elif goal is not None:
-            mission, drawn = _moved(task, mission, drawn, goal)
-        targets = mission.targets.tolist() if checks_goal and task.goal_topic != "goal_velocity" else []
-        starts = [start or drawn] if checks_start else []
+        elif plan.goal is not None:
+            mission, drawn = _moved(task, mission, drawn, plan.goal)
+        goes = not plan.standing and task.goal_topic != "goal_velocity"
+        targets = mission.targets.tolist() if goes else []
+        starts = [] if plan.is_real else [plan.start or drawn]
         problem = unreachable("the drawn goal", targets, area, farthest) or unreachable(
             "the drawn start", starts, area, farthest
         )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fulmar_bringup.lockstep_chain import between, chain_of, estimates_odometry, paced_wire, takes_poses
 from fulmar_bringup.node_row import Launcher, NodeRow, robot_spec
-from fulmar_bringup.node_spec import NodeSpec, Parameter
+from fulmar_bringup.node_spec import NodeSpec, Parameter, given
 from fulmar_bringup.run_plan import ORIGIN, RunPlan
 from fulmar_core.estimators.kinds import load_estimator
 from fulmar_core.robots.actuators.refuge import LANDS_S
@@ -50,60 +50,31 @@ def plant_spec(plan: RunPlan, *, port: str = "") -> NodeSpec:
         "duration_s": plan.duration_s,
         "autostart": not plan.supervised,
     }
-    if plan.guards.estop:
-        parameters["estop"] = True
     estimated, chain = estimates_odometry(plan), chain_of(plan)
     captured = estimated and takes_poses(plan)
-    if estimated:
-        parameters["estimated"] = True
-        if not captured:
-            parameters["captured"] = False
-    if any(TRUTH.name in node.inputs for node in (*plan.nodes, *between(plan))):
-        parameters["truth_in_period"] = True
-    if chain:
-        parameters["chain"] = list(chain)
+    parameters |= given(
+        estop=plan.guards.estop,
+        estimated=estimated,
+        truth_in_period=any(TRUTH.name in node.inputs for node in (*plan.nodes, *between(plan))),
+        chain=chain,
+    )
+    if estimated and not captured:
+        parameters["captured"] = False
+    commands, things = command_wire(load_robot(plan.robot)).name, load_task(plan.task).things
+    sensed = (ACTUATORS_STATE.name, *_sensor_topics(plan))
     if plan.backend == "hardware":
-        parameters["hardware"] = plan.hardware
-        if plan.arm:
-            parameters["arm"] = True
-        if plan.unattended:
-            parameters["unattended"] = True
-        if port:
-            parameters["port"] = port
-        return robot_spec(
-            plan,
-            "plant",
-            "hardware_drivers.driver_node",
-            parameters,
-            inputs=(command_wire(load_robot(plan.robot)).name,),
-            outputs=tuple(
-                dict.fromkeys((ACTUATORS_STATE.name, *_sensor_topics(plan), paced_wire(plan).name, *MODEL))
-            ),
-            ends_within_s=lands_s,
-        )
-    parameters |= motion_capture(plan)
-    things = tuple(thing.wire.name for thing in load_task(plan.task).things)
-    poses = (MOCAP.name,) if captured or plan.mocap_hz else ()
-    odometry = () if estimated else (ODOMETRY.name,)
-    period = (PERIOD.name,) if chain else ()
+        module, inputs = "hardware_drivers.driver_node", (commands,)
+        outputs = tuple(dict.fromkeys((*sensed, paced_wire(plan).name, *MODEL)))
+        parameters |= given(hardware=plan.hardware, arm=plan.arm, unattended=plan.unattended, port=port)
+    else:
+        module, inputs = "sim_nodes.sim_node", (commands, *((ANSWER.name,) if chain else ()))
+        odometry = () if estimated else (ODOMETRY.name,)
+        poses = (MOCAP.name,) if captured or plan.mocap_hz else ()
+        seen = (*odometry, *poses, *(thing.wire.name for thing in things))
+        outputs = (CLOCK.name, TRUTH.name, *sensed, *seen, *((PERIOD.name,) if chain else ()), *MODEL)
+        parameters |= motion_capture(plan)
     return robot_spec(
-        plan,
-        "plant",
-        "sim_nodes.sim_node",
-        parameters,
-        inputs=(command_wire(load_robot(plan.robot)).name, *((ANSWER.name,) if chain else ())),
-        outputs=(
-            CLOCK.name,
-            TRUTH.name,
-            ACTUATORS_STATE.name,
-            *_sensor_topics(plan),
-            *odometry,
-            *poses,
-            *things,
-            *period,
-            *MODEL,
-        ),
-        ends_within_s=lands_s,
+        plan, "plant", module, parameters, inputs=inputs, outputs=outputs, ends_within_s=lands_s
     )
 
 

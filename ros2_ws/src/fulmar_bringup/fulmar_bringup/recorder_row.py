@@ -7,7 +7,7 @@ from dataclasses import asdict
 
 from fulmar_bringup.lockstep_chain import chain_of
 from fulmar_bringup.node_row import Launcher, NodeRow, robot_spec
-from fulmar_bringup.node_spec import NodeSpec, Parameter
+from fulmar_bringup.node_spec import NodeSpec, Parameter, given
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_core.config.recording import Recording
 from fulmar_core.robots.robot_file import load_robot
@@ -24,19 +24,20 @@ def recorder_spec(plan: RunPlan, *, directory: str = "", info: str = "", files: 
         info: As `bag_origin.run_info` gives it.
         files: As `bag_origin.attachments` gives it.
     """
-    texts = {"directory": directory, "run_info": info, "attachments": files}
     things, own = load_task(plan.task).things, own_wires(load_robot(plan.robot))
     usual = asdict(Recording())
     unusual = {key: value for key, value in asdict(plan.recording).items() if value != usual[key]}
+    texts = given(directory=directory, run_info=info, attachments=files)
+    more = given(
+        lossless=bool(chain_of(plan)),
+        things=tuple(thing.name for thing in things),
+        own_topics=tuple(f"{wire.name} {wire.type}" for wire in own),
+    )
     return robot_spec(
         plan,
         "recorder",
         "fulmar_ros.recorder_node",
-        {key: text for key, text in texts.items() if text}
-        | unusual
-        | ({"lossless": True} if chain_of(plan) else {})
-        | ({"things": [thing.name for thing in things]} if things else {})
-        | ({"own_topics": [f"{wire.name} {wire.type}" for wire in own]} if own else {}),
+        texts | unusual | more,
         observed=tuple(wire.name for wire in (*WIRES, *own, *(thing.wire for thing in things)) if wire.recorded),
         loss=plan.loss_of_helpers,
     )

@@ -10,27 +10,10 @@ from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 
 from fulmar_bringup.launch_check import refuse_living_plants
-from fulmar_bringup.launched_system import list_nodes
+from fulmar_bringup.launched_system import ARGUMENTS, list_nodes
 from fulmar_bringup.node_spec import RESTARTS, NodeSpec
-from fulmar_bringup.node_table import OPTIONS
 
 RESPAWN_S = 1.0  # before a helper that has ended is started again [s]
-
-ARGUMENTS = {
-    "system": "a file of configs/systems, without .yaml",
-    "robot": "a file of configs/robots, without .yaml",
-    "name": "what the robot is called: its namespace; its type by default",
-    "task": "a file of configs/tasks, without .yaml, or your own class: mypackage.mymodule:MyTask",
-    "controller": "policy, a classical one such as lqr, mymodule:MyController, or external: a node of yours",
-    "backend": "mujoco, mock, jsbsim or hardware",
-    "hardware": "a file of configs/hardware, without .yaml, or a path to one",
-    "policy": "folder of a policy bundle",
-    "adapter": "with controller external, a file of configs/hardware: commands come in as its driver sends them",
-    "topic": "topic that the adapter takes, in the place of the file's",
-    "emulate": "true: with backend hardware, an emulator stands in for the device",
-    "goals": "a file of configs/goals, without .yaml, that a node of its own publishes",
-    **{name: f"false: not this. {text}" for name, text in OPTIONS.items()},
-}
 
 
 def to_node(spec: NodeSpec) -> Node:
