@@ -13,16 +13,11 @@ from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.node import Node
 
 from fulmar_bringup.emulation import emulation_of
+from fulmar_bringup.emulator_row import emulator_spec
 from fulmar_bringup.goals_row import goals_spec, run_goals_spec
-from fulmar_bringup.node_table import (
-    controller_spec,
-    emulator_spec,
-    guard_specs,
-    plant_spec,
-    recorder_spec,
-)
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.system import Guards
+from fulmar_bringup.system_rows import system_rows
 from fulmar_core.config.errors import ConfigError
 from fulmar_core.loop.controller_settings import ControllerSettings
 from fulmar_core.robots.topics import (
@@ -98,13 +93,9 @@ def test_the_node_table_sends_no_parameter_that_its_node_does_not_have() -> None
     hardware = replace(
         base, backend="hardware", hardware="zero_g_lab", goals="lab_pose", copies=2, guards=Guards()
     )
-    specs = [
-        recorder_spec(base),
-        goals_spec("floating_platform", "lab_pose", give_up_s=5.0),
-        run_goals_spec(hardware),
-    ]
+    specs = [goals_spec("floating_platform", "lab_pose", give_up_s=5.0), run_goals_spec(hardware)]
     for plan in (base, hardware):
-        specs += [plant_spec(plan, port="x"), controller_spec(plan), *guard_specs(plan)]
+        specs += system_rows(plan, record={}, port="x").values()
     specs.append(emulator_spec(hardware, emulation_of(load_hardware("zero_g_lab"), Path("scratch"))))
     for spec in specs:
         known = {field.name for field in fields(SETTINGS.get(spec.module, ControllerSettings))}

@@ -53,7 +53,7 @@ def completed(plan: RunPlan) -> RunPlan:
     plan = replace(plan, controller=usual_controller(plan))
     check_names(plan.robot, plan.task, plan.controller, plan.backend, plan.hardware or None)
     robot, task = load_robot(plan.robot), load_task(plan.task)
-    _check_asked(plan, task)
+    _check_asked(plan, robot)
     policy = Path(plan.policy) if plan.policy else None
     if policy is None and controller_entry(plan.controller).runs_bundle:
         policy = shipped_policy(plan.robot, plan.task)
@@ -77,7 +77,7 @@ def usual_controller(plan: RunPlan) -> str:
     return law if lacks and law else plan.controller
 
 
-def _check_asked(plan: RunPlan, task: Task) -> None:
+def _check_asked(plan: RunPlan, robot: Robot) -> None:
     """Refuse numbers that are none, and choices that exclude one another."""
     if plan.backend != "hardware" and (plan.hardware or plan.emulated):
         raise ConfigError(f"--hardware and --emulate go with --backend hardware, not with {plan.backend}.")
@@ -88,7 +88,7 @@ def _check_asked(plan: RunPlan, task: Task) -> None:
     if plan.goals and plan.goal is not None:
         raise ConfigError("--goals brings its own goals; it takes no --goal.")
     # References of aircraft begin where the craft is, and no single goal holds one.
-    if plan.is_real and plan.goal is None and not (plan.goals or plan.standing or not robot.kind.stops):
+    if plan.is_real and plan.goal is None and robot.kind.stops and not (plan.goals or plan.standing):
         raise ConfigError("a real robot goes nowhere by chance: say where with --goal or --goals.")
 
 
