@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 from dataclasses import replace
 from importlib.util import find_spec
@@ -10,12 +11,15 @@ import pytest
 
 from fulmar_bringup.controller_row import controller_spec
 from fulmar_bringup.estimator_row import estimator_specs
-from fulmar_bringup.launched_system import list_nodes
+from fulmar_bringup.launched_system import ARGUMENTS, list_nodes
+from fulmar_bringup.node_table import OPTIONS, node_rows, row_of
 from fulmar_bringup.plant_row import plant_spec
 from fulmar_bringup.recorder_row import recorder_spec
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.system import Guards, default_control_hz, default_guards, load_system
 from fulmar_bringup.system_rows import system_rows
+from fulmar_cli.commands.run import run
+from fulmar_cli.commands.up import up
 from fulmar_core.config.errors import ConfigError, UnknownNameError
 from fulmar_core.config.paths import OWN_FOLDERS, config_names
 
@@ -318,3 +322,18 @@ def test_measurements_without_noise_may_repeat_while_a_robot_stands(changes, rep
     assert parameters.get("odometry_may_repeat", False) is repeats
     estimating = replace(PLAN, guards=Guards(estimator="mocap_imu"), **changes)
     assert estimator_specs(estimating)[0].parameters.get("exact_sensors", False) is repeats
+
+
+@pytest.mark.parametrize("name", OPTIONS)
+def test_an_optional_node_is_a_row_an_option_of_two_commands_and_a_launch_argument(name):
+    for command, runs in ((run, False), (up, True)):
+        assert inspect.signature(command).parameters[name].default is runs
+    assert name in ARGUMENTS
+    assert name not in system_rows(PLAN)
+    assert name in system_rows(replace(PLAN, extras=(name,)))
+
+
+def test_every_node_has_one_row():
+    names = [name for row in node_rows() for name in row.names]
+    assert len(names) == len(set(names))
+    assert all(row_of(name).names for name in names)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from fulmar_bringup.estimator_row import simulates_without_noise
 from fulmar_bringup.lockstep_chain import estimates_odometry
-from fulmar_bringup.node_row import Launcher, NodeRow, robot_spec
+from fulmar_bringup.node_row import NodeRow, robot_spec
 from fulmar_bringup.node_spec import CONTROLLER, NodeSpec, Parameter, given
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_core.robots.robot_file import load_robot
@@ -73,9 +73,8 @@ def controller_spec(plan: RunPlan) -> NodeSpec:
     )
 
 
-def _specs(plan: RunPlan, _launcher: Launcher) -> tuple[NodeSpec, ...]:
-    """None where a node that Fulmar does not start controls."""
-    return () if controller_entry(plan.controller).is_external else (controller_spec(plan),)
-
-
-ROW = NodeRow(_specs, ("controller",), part=CONTROLLER)
+ROW = NodeRow(  # none where a node that Fulmar does not start controls
+    lambda plan, _: () if controller_entry(plan.controller).is_external else (controller_spec(plan),),
+    ("controller",),
+    part=CONTROLLER,
+)

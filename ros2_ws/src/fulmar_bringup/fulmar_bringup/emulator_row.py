@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fulmar_bringup.emulation import Emulation
-from fulmar_bringup.node_row import Launcher, NodeRow, robot_spec
+from fulmar_bringup.node_row import NodeRow, robot_spec
 from fulmar_bringup.node_spec import NodeSpec, Parameter
 from fulmar_bringup.plant_row import motion_capture
 from fulmar_bringup.run_plan import ORIGIN, RunPlan
@@ -32,8 +32,8 @@ def emulator_spec(plan: RunPlan, emulation: Emulation) -> NodeSpec:
     )
 
 
-def _specs(plan: RunPlan, launcher: Launcher) -> tuple[NodeSpec, ...]:
-    return () if launcher.emulation is None else (emulator_spec(plan, launcher.emulation),)
-
-
-ROW = NodeRow(_specs, ("emulator",), reports=False)
+ROW = NodeRow(
+    lambda plan, launcher: () if launcher.emulation is None else (emulator_spec(plan, launcher.emulation),),
+    ("emulator",),
+    reports=False,
+)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from fulmar_bringup.node_row import Launcher, NodeRow, robot_spec
+from fulmar_bringup.node_row import NodeRow, robot_spec
 from fulmar_bringup.node_spec import NodeSpec, Parameter
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_core.estimators.kinds import KINDS, estimator_kind
@@ -76,8 +76,5 @@ def _row(
     return robot_spec(plan, name, module, parameters, inputs=inputs, observed=observed, outputs=outputs)
 
 
-def _specs(plan: RunPlan, _launcher: Launcher) -> tuple[NodeSpec, ...]:
-    return estimator_specs(plan)
-
-
-ROW = NodeRow(_specs, tuple(dict.fromkeys(kind.node for kind in KINDS.values())))
+NAMES = tuple(dict.fromkeys(kind.node for kind in KINDS.values()))
+ROW = NodeRow(lambda plan, _: estimator_specs(plan), NAMES)

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 
 from fulmar_bringup.goal_plan import goal_rate, is_path_of_places
-from fulmar_bringup.node_row import Launcher, NodeRow
+from fulmar_bringup.node_row import NodeRow
 from fulmar_bringup.node_spec import NodeSpec, Parameter, given, node_spec
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_core.robots.topics import GOAL_WIRES, ODOMETRY
@@ -58,12 +57,9 @@ def run_goals_spec(plan: RunPlan) -> NodeSpec:
     )
 
 
-def _specs(plan: RunPlan, _launcher: Launcher) -> tuple[NodeSpec, ...]:
-    return (run_goals_spec(plan),) if plan.goals else ()
-
-
-def _resume(said: Mapping[str, str]) -> dict[str, Parameter]:
-    return {"place": said["place"]} if said.get("place") else {}
-
-
-ROW = NodeRow(_specs, ("goals",), shown=False, resume=_resume)
+ROW = NodeRow(
+    lambda plan, _: (run_goals_spec(plan),) if plan.goals else (),
+    ("goals",),
+    shown=False,
+    resume=lambda said: given(place=said.get("place")),
+)

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from fulmar_bringup.node_row import Launcher, NodeRow
+from fulmar_bringup.node_row import NodeRow
 from fulmar_bringup.node_spec import NodeSpec, node_spec
-from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.system import System
 from fulmar_core.wires.robot_name import namespace_of
 
@@ -26,8 +25,4 @@ def own_nodes(system: System) -> tuple[NodeSpec, ...]:
     )
 
 
-def _specs(plan: RunPlan, _launcher: Launcher) -> tuple[NodeSpec, ...]:
-    return plan.nodes
-
-
-ROW = NodeRow(_specs, (), shown=False)
+ROW = NodeRow(lambda plan, _: plan.nodes, (), shown=False)

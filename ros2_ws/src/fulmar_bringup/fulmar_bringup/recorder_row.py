@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import asdict
 
 from fulmar_bringup.lockstep_chain import chain_of
-from fulmar_bringup.node_row import Launcher, NodeRow, robot_spec
-from fulmar_bringup.node_spec import NodeSpec, Parameter, given
+from fulmar_bringup.node_row import NodeRow, robot_spec
+from fulmar_bringup.node_spec import NodeSpec, given
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_core.config.recording import Recording
 from fulmar_core.robots.robot_file import load_robot
@@ -43,12 +42,9 @@ def recorder_spec(plan: RunPlan, *, directory: str = "", info: str = "", files: 
     )
 
 
-def _specs(plan: RunPlan, launcher: Launcher) -> tuple[NodeSpec, ...]:
-    return () if launcher.record is None else (recorder_spec(plan, **launcher.record),)
-
-
-def _resume(_said: Mapping[str, str]) -> dict[str, Parameter]:
-    return {"resume": True}
-
-
-ROW = NodeRow(_specs, ("recorder",), beats=True, resume=_resume)
+ROW = NodeRow(
+    lambda plan, launcher: () if launcher.record is None else (recorder_spec(plan, **launcher.record),),
+    ("recorder",),
+    beats=True,
+    resume=lambda _: {"resume": True},
+)
