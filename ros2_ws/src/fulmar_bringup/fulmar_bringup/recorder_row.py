@@ -37,7 +37,9 @@ def recorder_spec(plan: RunPlan, *, directory: str = "", info: str = "", files: 
         "recorder",
         "fulmar_ros.recorder_node",
         texts | unusual | more,
-        observed=tuple(wire.name for wire in (*WIRES, *own, *(thing.wire for thing in things)) if wire.recorded),
+        observed=tuple(
+            wire.name for wire in (*WIRES, *own, *(thing.wire for thing in things)) if wire.recorded
+        ),
         loss=plan.loss_of_helpers,
     )
 
