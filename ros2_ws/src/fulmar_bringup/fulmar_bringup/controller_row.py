@@ -50,7 +50,7 @@ def controller_spec(plan: RunPlan) -> NodeSpec:
     parameters |= given(
         excitation=plan.excitation,
         max_run_time_s=guards.max_run_time_s,
-        area=guards.area if guards.area != NO_AREA else (),
+        area=list(guards.area) if guards.area != NO_AREA else None,
         estop=guards.estop,
         unattended=plan.unattended,
         air_bearing=hardware is not None and hardware.has_bearing,

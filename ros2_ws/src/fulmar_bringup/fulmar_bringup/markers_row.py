@@ -14,7 +14,7 @@ def _specs(plan: RunPlan, _launcher: Launcher) -> tuple[NodeSpec, ...]:
     if "markers" not in plan.extras:
         return ()
     task, area = load_task(plan.task), plan.guards.area
-    parameters = given(robot=plan.robot, task=plan.task, area=area if area != NO_AREA else ())
+    parameters = given(robot=plan.robot, task=plan.task, area=list(area) if area != NO_AREA else None)
     goals = (wire.name for wire in goal_wires(task.goal_topic))
     row = robot_spec(
         plan,

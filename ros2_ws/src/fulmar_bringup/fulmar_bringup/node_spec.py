@@ -45,6 +45,6 @@ def node_spec(
     return NodeSpec(name, package, executable, module, namespace, dict(parameters), **more)
 
 
-def given(**values: Parameter | tuple[float | str, ...] | None) -> dict[str, Parameter]:
-    """Parameters that differ from nothing: none that is false, 0 or empty, as nodes have them by default."""
-    return {name: list(v) if isinstance(v, tuple) else v for name, v in values.items() if v}  # type: ignore[misc]
+def given(**values: Parameter | None) -> dict[str, Parameter]:
+    """The parameters that say something: none is false, 0 or empty, which is what nodes have by default."""
+    return {name: value for name, value in values.items() if value}

@@ -56,7 +56,7 @@ def plant_spec(plan: RunPlan, *, port: str = "") -> NodeSpec:
         estop=plan.guards.estop,
         estimated=estimated,
         truth_in_period=any(TRUTH.name in node.inputs for node in (*plan.nodes, *between(plan))),
-        chain=chain,
+        chain=list(chain),
     )
     if estimated and not captured:
         parameters["captured"] = False

@@ -29,8 +29,8 @@ def recorder_spec(plan: RunPlan, *, directory: str = "", info: str = "", files: 
     texts = given(directory=directory, run_info=info, attachments=files)
     more = given(
         lossless=bool(chain_of(plan)),
-        things=tuple(thing.name for thing in things),
-        own_topics=tuple(f"{wire.name} {wire.type}" for wire in own),
+        things=[thing.name for thing in things],
+        own_topics=[f"{wire.name} {wire.type}" for wire in own],
     )
     return robot_spec(
         plan,

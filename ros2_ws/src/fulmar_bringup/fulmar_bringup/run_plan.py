@@ -125,7 +125,8 @@ class RunPlan(Recorded, Guarded, How, Where, Who):
     @property
     def line(self) -> str:
         """The plan in one line."""
-        pace = "in lock step" if self.lockstep else f"at {self.rate:g} times real time"
+        real = "in real time" if self.rate == 1.0 else f"at {self.rate:g} times real time"
+        pace = "in lock step" if self.lockstep else real
         length = f"for {self.duration_s:g} s" if self.duration_s else "until it is stopped"
         return (
             f"{self.robot_name}: {self.task}, {self.controller} at {self.control_hz:g} Hz on {self.backend}, "
