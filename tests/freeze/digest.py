@@ -24,6 +24,8 @@ def digest(value: Any) -> str:
 def _parts(value: Any) -> Iterator[bytes]:
     if is_dataclass(value) and not isinstance(value, type):
         for field in fields(value):
+            if field.name.startswith("_"):
+                continue  # how it lies in memory
             yield field.name.encode()
             yield from _parts(getattr(value, field.name))
     elif isinstance(value, Mapping):
