@@ -158,9 +158,9 @@ def test_the_policy_file_for_enclaves_has_exactly_the_topics_of_the_table(policy
     assert {name.strip("/") for name in named} - own <= {"parameter_events", "rosout"}
 
 
-def test_the_plant_publishes_and_the_recorder_subscribes_every_sensor_of_the_table():
+def test_plant_controller_and_recorder_have_every_sensor_of_the_table():
     written = POLICY.read_text(encoding="utf-8")
-    assert written.count(BEGIN) == 2
+    assert written.count(BEGIN) == 3
     assert written == with_sensors(written), "out of date: python -m tests.architecture.security_policy"
 
 

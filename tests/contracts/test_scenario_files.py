@@ -62,6 +62,7 @@ class OneByOne:
     """Opens one valve after the other."""
 
     name, control_hz, estimator = "one after the other", 5.0, None
+    readings, observer = (), None
 
     def reset(self):
         self.k = 0

@@ -27,6 +27,7 @@ class Idle:
     """Stands still."""
 
     name, control_hz, estimator = "idle", ROBOT.timing.control_hz, None
+    readings, observer = (), None
 
     def reset(self): ...
 

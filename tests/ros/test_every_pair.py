@@ -64,6 +64,7 @@ class Wanderer:
     """Does something that depends on all that it sees and is reported, and on what it has seen; reaches nothing."""
 
     name, estimator = "wanderer", None
+    readings, observer = (), None
 
     def __init__(self, robot: Robot, task: Task) -> None:
         self.control_hz = robot.timing.control_hz

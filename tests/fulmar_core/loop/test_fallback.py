@@ -20,6 +20,7 @@ class Counting:
     """Counts what it is asked since its last reset, and keeps what it saw."""
 
     name, control_hz, estimator = "counting", ROBOT.timing.control_hz, None
+    readings, observer = (), None
 
     def __init__(self):
         self.seen, self.since_reset = [], 0

@@ -28,6 +28,7 @@ class Scripted:
     """Answers with what it is given, and counts resets."""
 
     control_hz, estimator = ROBOT.timing.control_hz, None
+    readings, observer = (), None
 
     def __init__(self, name, answer=GENTLE):
         self.name, self.answer, self.resets = name, answer, 0

@@ -31,6 +31,7 @@ class OneValve:
     """Opens the first valve."""
 
     name, estimator, control_hz = "one_valve", None, 5.0
+    readings, observer = (), None
 
     def reset(self):
         """Nothing to forget."""
