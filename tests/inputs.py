@@ -75,4 +75,5 @@ def some_of(inputs: Inputs, index: Any) -> Inputs:
         previous=inputs.previous[index],
         estimates=estimates,
         readings={name: values[index] for name, values in inputs.readings.items()},
+        believed=None if inputs.believed is None else inputs.believed[index],
     )

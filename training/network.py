@@ -258,6 +258,8 @@ class NetworkController:
         self.control_hz = control_hz
         self._memory: np.ndarray | None = None
         self.estimator = ESTIMATOR if network.plan.disturbances else None
+        self.readings: tuple[str, ...] = ()
+        self.observer = None
 
     def reset(self) -> None:
         """Clear the memory."""

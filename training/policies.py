@@ -15,6 +15,7 @@ from fulmar_core.config.errors import BundleError
 from fulmar_core.config.paths import config_directory
 from fulmar_core.config.strict_yaml import load_config
 from fulmar_core.loop.policy_bundle import FORMAT, read_passport
+from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.tasks import load_task
 from fulmar_core.worlds.scenario import load_scenario
@@ -70,11 +71,10 @@ def load_policy_table() -> PolicyTable:
 def recipe(policy: ShippedPolicy, settings: TrainingSettings) -> str:
     """Hash of a policy's inputs: robot, task, scenario, settings, seed and number of updates.
 
-    Values at their default do not count, so that a new option keeps the recipes of policies without it. The air bearing
-    does not count either: it is always on in training.
+    Values at their default do not count, so that a new option keeps the recipes of policies without it.
     """
     ingredients = {
-        "robot": _chosen(replace(load_robot(policy.robot), air_bearing=False)),
+        "robot": _as_trained(load_robot(policy.robot)),
         "task": _chosen(load_task(policy.task)),
         "scenario": _chosen(load_scenario(settings.scenario)),
         "settings": _chosen(settings),
@@ -84,6 +84,15 @@ def recipe(policy: ShippedPolicy, settings: TrainingSettings) -> str:
     if own := fallback_settings(settings, load_robot(policy.robot), load_task(policy.task)):
         ingredients["fallback_policy"] = [_chosen(own), _chosen(load_scenario(own.scenario))]
     return hashlib.sha256(json.dumps(ingredients, sort_keys=True, default=str).encode()).hexdigest()[:16]
+
+
+def _as_trained(robot: Robot) -> Any:
+    """A robot as batches have it: on air, its supply full, and without sensors that no policy reads."""
+    actuators: Any = robot.actuators if robot.actuators.tank is None else replace(robot.actuators, tank=None)
+    sensors = replace(robot.sensors, supply=None)
+    found = _chosen(replace(robot, air_bearing=False, actuators=actuators, sensors=sensors))
+    del found["sensors"]["own"]
+    return found
 
 
 def _chosen(values: Any) -> Any:

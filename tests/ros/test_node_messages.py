@@ -6,6 +6,7 @@ import sys
 import threading
 from collections.abc import Iterator
 from types import SimpleNamespace
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -17,12 +18,15 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import JointState
 from visualization_msgs.msg import MarkerArray
 
+from fulmar_bags.reading_messages import reader_of
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.wires.lockstep_period import counts_of
+from fulmar_core.wires.robot_name import PLAIN
+from fulmar_ros import reading_inputs
 from fulmar_ros.lockstep_answer import LockstepAnswer
 from fulmar_ros.markers_node import MarkersNode
 from fulmar_ros.plant_period import PlantPeriod
-from fulmar_ros.satellite_inputs import SatelliteInputs
+from fulmar_ros.reading_inputs import ReadingInputs
 from sim_nodes.event_camera_node import EventCameraNode
 from tests.ros.any_message import any_message
 from tests.ros.neighbour import NAMESPACE, Neighbour
@@ -96,12 +100,19 @@ def test_event_cameras_see_nothing_from_a_state_that_is_none(cameras: EventCamer
 def test_a_controller_of_a_satellite_gets_no_speed_and_no_inertia_that_cannot_be(
     messages: list[object],
 ) -> None:
-    node = SimpleNamespace(create_subscription=lambda *_given, **_named: None)
-    inputs = SatelliteInputs(node, CUBESAT, lambda: None, lockstep=False)
+    node = SimpleNamespace(
+        create_subscription=lambda *_given, **_named: SimpleNamespace(destroy=lambda: None)
+    )
+    with mock.patch.object(reading_inputs, "subscribe_every", lambda *_given, **_named: []):
+        inputs = ReadingInputs(
+            node, CUBESAT, ("wheels", "inertia"), lambda: None, frames=PLAIN, lockstep=False
+        )
+    read = {name: reader_of(kind) for name, kind in inputs.newest.kinds.items()}
     for message in messages:
+        name = "wheels" if isinstance(message, JointState) else "inertia"
         with np.errstate(all="ignore"):
-            (inputs._take_wheels if isinstance(message, JointState) else inputs._take_inertia)(message)
-        found = inputs.readings(0)
+            inputs._take(name, read[name], message)
+        found = inputs.newest.at(0)
         assert np.abs(found.get("wheels", np.zeros(1))).max() < 1.3 * CUBESAT.actuators.top_speed
         assert np.isfinite(found.get("inertia", np.zeros(1))).all()
 

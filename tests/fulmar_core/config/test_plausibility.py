@@ -58,7 +58,7 @@ def test_shipped_files_have_usual_values(family, name, caplog):
         (
             PLATFORM,
             ("thruster_3, position: [-0.2192031, 0.2192031", "thruster_3, position: [-0.45, 0.2192031"),
-            r":34: 'actuators.nozzles.2.position' = \[-0.45, 0.2192031, 0.0\], 0.5005 m .*0 to 0.341 m .*to 0.403 m\.$",
+            r":41: 'actuators.nozzles.2.position' = \[-0.45, 0.2192031, 0.0\], 0.5005 m .*0 to 0.341 m .*to 0.403 m\.$",
         ),
         (
             PLATFORM,

@@ -118,13 +118,8 @@ ENTRIES = {
     ),
     "actuation.supply": (
         STILL,
-        {"actuation": Actuation(supply=Supply(0.1, 2.0, 3.0))},
-        {"supply_left", "supply_from", "supply_over"},
-    ),
-    "actuation.supply.tank": (
-        STILL,
-        {"actuation": Actuation(supply=Supply(tank=0.1))},
-        {"tank_fill"},
+        {"actuation": Actuation(supply=Supply(0.1, 2.0, 3.0, tank=0.1))},
+        {"supply_left", "supply_from", "supply_over", "tank_fill"},
     ),
     "sensing.noise": (SEEING, {"sensing": Sensing(noise=2.0)}, {"noise"}),
     "sensing.bias": (SEEING, {"sensing": Sensing(bias=2.0)}, {"sensor_bias", "sensor_scale"}),
