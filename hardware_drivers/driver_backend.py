@@ -137,7 +137,7 @@ class HaltingDriverBackend(DriverBackend):
         self._halting = halting
 
     def make_safe(self) -> None:
-        """Stop the device before the safe command reaches it; raises as of `DriverBackend`."""
+        """Stop the device before the safe command reaches it; raises as in `DriverBackend`."""
         try:
             self._halting.halt()
         finally:

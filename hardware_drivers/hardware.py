@@ -101,7 +101,7 @@ def hardware_path(name: str) -> Path:
 
 
 def load_hardware(name: str) -> Hardware:
-    """Read a hardware file and check that it fits its robot; `name` is as of `hardware_path`.
+    """Read a hardware file and check that it fits its robot; `name` is as in `hardware_path`.
 
     Raises:
         ConfigError: Unknown name, a mistake in the file, or a driver that does not fit the robot's actuators.

@@ -14,7 +14,7 @@ class Place:
 
     kind: str  # udpin, udpout, tcp or serial
     host: str  # path of a serial port
-    number: int  # port; baud rate of a serial one, 0: as of the settings
+    number: int  # port; baud rate of a serial one, 0: as in the settings
 
     @property
     def is_open(self) -> bool:

@@ -69,7 +69,7 @@ class JsbsimBackend:
 
     @classmethod
     def of(cls, robot: Robot, task: Task, scenario: Scenario, model: str = "") -> JsbsimBackend:
-        """The simulator that a task and a scenario ask for, with a model as of `__init__`."""
+        """The simulator that a task and a scenario ask for, with a model as in `__init__`."""
         return cls(
             robot, model=model, sensor_noise=scenario.sensor_noise, sensors=sensors_in(robot, scenario)
         )

@@ -24,7 +24,7 @@ class OneWorld:
         world: What was drawn for the episode, as a batch of one.
         actuation: What the actuators do.
         dynamics: Of the robot.
-        outside: Push of the surroundings in this control step, as of `Dynamics.outside`, shapes (1,).
+        outside: Push of the surroundings in this control step, as in `Dynamics.outside`, shapes (1,).
         latest_s: How late commands act [s].
     """
 
@@ -34,7 +34,7 @@ class OneWorld:
         self._safe = np.array(robot.actuators.safe_command)[:, None]
 
     def reset(self, episode: Episode, truth: RigidBodyState, *, seed: int, number: int) -> RigidBodyState:
-        """Begin anew, and measure; arguments as of `begin_episode` and `first_measurement`."""
+        """Begin anew, and measure; arguments as in `begin_episode` and `first_measurement`."""
         self.begin_episode(episode)
         return self.first_measurement(truth, seed=seed, number=number)
 
@@ -87,7 +87,7 @@ class OneWorld:
             command: Within the actuators' limits, shape (n,).
             ticks: >= 1.
             truth: Where the robot is.
-            begins: As of `Backend.step`.
+            begins: As in `Backend.step`.
         """
         nominal = begins or self._robot.timing.substeps(self._robot.timing.control_hz)
         if self._measured == 1 and ticks != self._period:

@@ -68,7 +68,7 @@ class CompiledStep:
         self._last: Kernel | None = None  # while the forms of all parts stay
 
     def __call__(self, command: np.ndarray, *, effort: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Move the batch one control step; arguments and results as of `observed_step`.
+        """Move the batch one control step; arguments and results as in `observed_step`.
 
         Raises:
             ConfigError: The compiler fails.

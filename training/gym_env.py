@@ -122,7 +122,7 @@ class TaskVectorEnv(gymnasium.vector.VectorEnv[np.ndarray, np.ndarray, np.ndarra
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[np.ndarray, Infos]:
-        """Begin an episode in every world; arguments, results and errors as of `TaskEnv.reset`."""
+        """Begin an episode in every world; arguments, results and errors as in `TaskEnv.reset`."""
         refuse(options)
         super().reset(seed=seed)
         if seed is not None:

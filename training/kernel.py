@@ -147,7 +147,7 @@ def _laid_as(tensor: torch.Tensor, like: torch.Tensor) -> torch.Tensor:
     return torch.empty_strided(like.shape, like.stride(), dtype=like.dtype, device=like.device).copy_(tensor)
 
 
-Moving = dict[str, Any]  # as of `MutableState.mutable_state`, with dictionaries in it
+Moving = dict[str, Any]  # as in `MutableState.mutable_state`, with dictionaries in it
 Parts = dict[str, Any]  # the same without; what was in a dictionary has a name of two words
 
 

@@ -63,7 +63,7 @@ def begin_run(
     time_limit_s: float | None,
     updates: int | None,
 ) -> None:
-    """Write what `fulmar train --resume` needs into a run folder; arguments as of `train`.
+    """Write what `fulmar train --resume` needs into a run folder; arguments as in `train`.
 
     What is there already stays: `train` may do only a part of the run that was asked for.
     """

@@ -34,7 +34,7 @@ class Worlds:
     def __init__(
         self, robot: Robot, task: Task, scenario: Scenario, *, worlds: int, seed: int, training: bool
     ) -> None:
-        """Build the worlds; arguments as of `TaskVectorEnv`.
+        """Build the worlds; arguments as in `TaskVectorEnv`.
 
         Raises:
             ConfigError: There are no worlds, or the seed is negative.

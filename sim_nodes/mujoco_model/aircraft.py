@@ -67,14 +67,14 @@ class Aircraft(FreeBody):
 
     def own_truth(self, data: mujoco.MjData) -> dict[str, Any]:
         """What air probes and servos would measure without errors."""
-        assert self._actuation is not None  # as of `fly_in`
+        assert self._actuation is not None  # as in `fly_in`
         return self._dynamics.truths(self._state(data), self._actuation, self._world, self._gust)
 
     def drive(
         self, model: mujoco.MjModel, data: mujoco.MjData, applied: np.ndarray, gain: np.ndarray, outside: Any
     ) -> None:
         """Set the forces of the coming step; see `RobotModel.drive`. What flies no longer stops there."""
-        assert self._actuation is not None  # as of `fly_in`
+        assert self._actuation is not None  # as in `fly_in`
         state, dt = self._state(data), self._robot.timing.physics_dt
         if not self._dynamics.is_aloft(state)[0]:
             data.qvel[:] = 0.0

@@ -169,7 +169,7 @@ class RobotModel(Protocol):
             data: Its state.
             applied: What each actuator does, shape (n,).
             gain: Factor on it, shape (n,).
-            outside: Push of the surroundings, as of `batch_dynamics.Dynamics.outside`, of one world.
+            outside: Push of the surroundings, as in `batch_dynamics.Dynamics.outside`, of one world.
         """
         ...
 

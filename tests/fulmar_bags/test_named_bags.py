@@ -56,9 +56,9 @@ def test_a_bag_without_a_name_is_of_a_robot_that_is_called_as_its_type():
 def test_topics_and_frames_are_found_by_the_name(alpha: Path):
     bag, plain = open_bag(alpha), open_bag(LQR)
     assert (bag.robot, bag.name, bag.odometry().name) == (ROBOT, "alpha", "/alpha/odom")
-    course, usual = control_steps_of(bag), control_steps_of(plain)
-    assert course.odometry.frame[0] == "odom"
-    assert len(course.goals) == len(usual.goals) > 0
+    steps, usual = control_steps_of(bag), control_steps_of(plain)
+    assert steps.odometry.frame[0] == "odom"
+    assert len(steps.goals) == len(usual.goals) > 0
     record = read_run(alpha)
     assert not record.warnings
     assert len(record.goals) == len(read_run(LQR).goals)

@@ -18,9 +18,9 @@ from tests.foreign_bag import write_foreign
 
 def test_the_command_of_a_step_is_the_one_that_follows_its_odometry(tmp_path):
     bag = open_bag(write_foreign(tmp_path / "bag", StoragePlugin.MCAP, commands=True))
-    course = control_steps_of(bag, robot="turtlebot2", task="go_to_position", goal=(0.0, 0.0, 0.0))
-    np.testing.assert_allclose(course.commands[:, 0], 0.1 * course.sample)
-    assert (course.commands[:, 1] == 1.0).all()
+    record = control_steps_of(bag, robot="turtlebot2", task="go_to_position", goal=(0.0, 0.0, 0.0))
+    np.testing.assert_allclose(record.commands[:, 0], 0.1 * record.sample)
+    assert (record.commands[:, 1] == 1.0).all()
 
 
 def test_rerun_compares_them(tmp_path):

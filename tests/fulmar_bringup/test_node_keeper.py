@@ -136,7 +136,7 @@ def test_any_other_node_that_ends_or_is_stopped_ends_the_robot(name, system, now
 def test_a_helper_that_is_stopped_in_its_tracks_is_replaced_after_seconds_and_not_after_moments(system, now):
     group, keeper, _, _ = system
     group.stopped = {"recorder"}
-    for _ in range(8):  # two seconds, as of a machine that is busy
+    for _ in range(8):  # two seconds, as on a machine that is busy
         keeper.look()
         now[0] += 0.25
     group.stopped = set()

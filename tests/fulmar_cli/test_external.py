@@ -215,10 +215,10 @@ def test_a_rerun_refuses_an_external_controller_and_compares_another(external, r
         line = complaint(fulmar("bag", "rerun", external, *words))
         assert "an external controller drove" in line
         assert "--controller classical --from odometry" in line
-    course = control_steps_of(open_bag(external))
+    record = control_steps_of(open_bag(external))
     stamped = control_steps_of(open_bag(reached))
-    np.testing.assert_array_equal(course.stamp_ns, stamped.stamp_ns[: len(course)])
-    np.testing.assert_array_equal(course.commands, stamped.commands[: len(course)])
+    np.testing.assert_array_equal(record.stamp_ns, stamped.stamp_ns[: len(record)])
+    np.testing.assert_array_equal(record.commands, stamped.commands[: len(record)])
     code, out, _ = fulmar(
         "bag", "rerun", external, "--controller", "classical", "--from", "odometry", "--json"
     )

@@ -36,14 +36,14 @@ POLICY, LQR = BAGS / "floating_platform_go_to_pose_policy", BAGS / "floating_pla
 EXACT = dict.fromkeys(FIELDS, 0.0)
 
 
-def answered(bag: Path, controller: str, source: str = "observations", course=None):
-    course = course or control_steps_of(open_bag(bag))
-    folder = shipped_policy(course.robot.name, course.task.name) if controller == "policy" else ""
-    hz = course.settings.control_rate(course.robot)
-    loaded = load_controller(controller, course.robot, course.task, Choice(hz, str(folder)))
+def answered(bag: Path, controller: str, source: str = "observations", record=None):
+    record = record or control_steps_of(open_bag(bag))
+    folder = shipped_policy(record.robot.name, record.task.name) if controller == "policy" else ""
+    hz = record.settings.control_rate(record.robot)
+    loaded = load_controller(controller, record.robot, record.task, Choice(hz, str(folder)))
     # Another processor rounds a sine otherwise, of which observations are made anew.
     limits = TOLERANCES if source == "odometry" else EXACT
-    return compare_answers(course, rerun(course, loaded, source=source), limits)
+    return compare_answers(record, rerun(record, loaded, source=source), limits)
 
 
 def ask(*words: str) -> tuple[int, dict]:
@@ -148,16 +148,16 @@ def test_tolerances_are_reported_by_field_and_refused_where_they_make_no_sense()
 
 
 def test_observations_of_another_controller_are_refused_with_the_way_out():
-    course = control_steps_of(open_bag(POLICY))
+    record = control_steps_of(open_bag(POLICY))
     fewer = replace(
-        course, observation_names=course.observation_names[:-1], observations=course.observations[:, :-1]
+        record, observation_names=record.observation_names[:-1], observations=record.observations[:, :-1]
     )
     with pytest.raises(BagError, match="Use --from odometry"):
-        answered(POLICY, "policy", course=fewer)
+        answered(POLICY, "policy", record=fewer)
 
 
 def test_a_controller_forgets_at_a_pause_as_in_the_node():
-    course = control_steps_of(open_bag(POLICY))
+    record = control_steps_of(open_bag(POLICY))
     seen = []
 
     class Forgetful:
@@ -169,10 +169,10 @@ def test_a_controller_forgets_at_a_pause_as_in_the_node():
 
         def act(self, inputs):
             seen.append("act")
-            return course.robot.actuators.safe_command[None]
+            return record.robot.actuators.safe_command[None]
 
-    later = course.stamp_ns + np.where(np.arange(len(course)) >= 40, 3_000_000_000, 0)
-    rerun(replace(course, stamp_ns=later), Forgetful())
+    later = record.stamp_ns + np.where(np.arange(len(record)) >= 40, 3_000_000_000, 0)
+    rerun(replace(record, stamp_ns=later), Forgetful())
     steps = [index for index, what in enumerate(what for what in seen if what) if what == "reset"]
     acts_before = [seen[:index].count("act") for index in steps]
     assert 40 in acts_before
@@ -205,6 +205,6 @@ def test_the_node_is_fed_the_odometry_that_was_chosen(monkeypatch):
     bag = replace(bag, topics={**bag.topics, "/other/odom": other})
     monkeypatch.setattr(live_node.ProcessGroup, "start", lambda group, spec: None)
     monkeypatch.setattr(live_node, "_exchange", lambda raw, *_: (raw["odometry"], None))
-    course = control_steps_of(open_bag(POLICY))
-    fed, _ = live_node.rerun_through_node(bag, course, "policy", "", "/other/odom")
+    record = control_steps_of(open_bag(POLICY))
+    fed, _ = live_node.rerun_through_node(bag, record, "policy", "", "/other/odom")
     assert fed == other.data

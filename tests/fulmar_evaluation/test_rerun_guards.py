@@ -48,17 +48,17 @@ def saying(bag: Bag, wire: Wire, *said: tuple[int, object]) -> Bag:
 
 
 def again(bag: Bag, *, follow: bool = False, paced: bool = False) -> tuple[ControlSteps, Answers]:
-    course = control_steps_of(bag)
+    record = control_steps_of(bag)
     if paced:
-        course = at_its_pace(course)
-    return course, answers_of(course, "policy", BUNDLE, "odometry", follow=follow)[0]
+        record = at_its_pace(record)
+    return record, answers_of(record, "policy", BUNDLE, "odometry", follow=follow)[0]
 
 
-def at_its_pace(course: ControlSteps) -> ControlSteps:
+def at_its_pace(record: ControlSteps) -> ControlSteps:
     """Recorded as slowly as it went: 0.2 s a step, so that an e-stop has time to speak."""
-    began = int(course.log_ns[0])
-    goals = tuple(replace(goal, log_ns=began - MS) for goal in course.goals)
-    return replace(course, log_ns=began + 200 * MS * np.arange(len(course)), goals=goals)
+    began = int(record.log_ns[0])
+    goals = tuple(replace(goal, log_ns=began - MS) for goal in record.goals)
+    return replace(record, log_ns=began + 200 * MS * np.arange(len(record)), goals=goals)
 
 
 def test_max_run_time_ends_the_run_where_the_node_would(bag):
@@ -70,15 +70,15 @@ def test_max_run_time_ends_the_run_where_the_node_would(bag):
 
 def test_a_ring_says_that_the_run_time_is_not_evaluated(bag):
     ring = guarded(bag, max_run_time_s=10.0)
-    course = control_steps_of(replace(ring, info={**ring.info, "recording": {"mode": "ring"}}))
-    assert course.settings.max_run_time_s == 0.0
-    assert any("max_run_time" in warning for warning in course.warnings)
+    record = control_steps_of(replace(ring, info={**ring.info, "recording": {"mode": "ring"}}))
+    assert record.settings.max_run_time_s == 0.0
+    assert any("max_run_time" in warning for warning in record.warnings)
 
 
 def test_a_robot_that_left_its_area_moves_no_more_without_a_new_goal_as_in_the_node(bag):
-    course = control_steps_of(bag)
-    x = course.odometry.pose[course.sample, 0]
-    limit = 0.5 * float(course.goals[0].value[0, 0] + x.min())  # between the goal and the overshoot
+    record = control_steps_of(bag)
+    x = record.odometry.pose[record.sample, 0]
+    limit = 0.5 * float(record.goals[0].value[0, 0] + x.min())  # between the goal and the overshoot
     _, answers = again(guarded(bag, area=[limit, 1e6, -1e6, 1e6]))
     inside = x >= limit
     assert inside[np.argmin(inside) :].any()  # it would have come back
@@ -87,11 +87,11 @@ def test_a_robot_that_left_its_area_moves_no_more_without_a_new_goal_as_in_the_n
 
 
 def test_an_estop_stops_and_takes_the_goal_away(bag):
-    course = at_its_pace(control_steps_of(bag))
-    beats = range(int(course.log_ns[0]) - 50 * MS, int(course.log_ns[60]), 100 * MS)
-    pressed = range(int(course.log_ns[20]) + 100 * MS, int(course.log_ns[30]))
+    record = at_its_pace(control_steps_of(bag))
+    beats = range(int(record.log_ns[0]) - 50 * MS, int(record.log_ns[60]), 100 * MS)
+    pressed = range(int(record.log_ns[20]) + 100 * MS, int(record.log_ns[30]))
     reported = saying(bag, ESTOP, *((log, log in pressed) for log in beats))
-    course, answers = again(guarded(reported, estop=True), paced=True)
+    record, answers = again(guarded(reported, estop=True), paced=True)
     assert answers.acted[:21].all()
     assert not answers.acted[21:].any()
     assert answers.reasons[25].startswith("e-stop: pressed")
@@ -100,11 +100,11 @@ def test_an_estop_stops_and_takes_the_goal_away(bag):
 
 
 def test_in_a_bag_that_lists_resets_only_a_reset_ends_a_press(bag):
-    course = at_its_pace(control_steps_of(bag))
-    beats = range(int(course.log_ns[0]) - 50 * MS, int(course.log_ns[-1]) + 50 * MS, 100 * MS)
-    press = next(log for log in beats if log > course.log_ns[20])
+    record = at_its_pace(control_steps_of(bag))
+    beats = range(int(record.log_ns[0]) - 50 * MS, int(record.log_ns[-1]) + 50 * MS, 100 * MS)
+    press = next(log for log in beats if log > record.log_ns[20])
     reported = saying(bag, ESTOP, *((log, log == press) for log in beats))
-    for resets, reason in (((), "e-stop: pressed"), ((int(course.log_ns[40]),), "no goal yet")):
+    for resets, reason in (((), "e-stop: pressed"), ((int(record.log_ns[40]),), "no goal yet")):
         listed = saying(reported, ESTOP_RELEASED, *((log, "") for log in resets))
         _, answers = again(guarded(listed, estop=True), paced=True)
         assert answers.acted[:20].all()
@@ -113,15 +113,15 @@ def test_in_a_bag_that_lists_resets_only_a_reset_ends_a_press(bag):
 
 
 def test_while_a_press_is_on_its_way_the_record_decides(bag):
-    course = at_its_pace(control_steps_of(bag))
-    beats = range(int(course.log_ns[0]) - 30 * MS, int(course.log_ns[-1]) + 50 * MS, 100 * MS)
-    at = int(course.log_ns[20])
+    record = at_its_pace(control_steps_of(bag))
+    beats = range(int(record.log_ns[0]) - 30 * MS, int(record.log_ns[-1]) + 50 * MS, 100 * MS)
+    at = int(record.log_ns[20])
     reported = saying(bag, ESTOP, *((log, log >= at - 30 * MS) for log in beats))
-    course = at_its_pace(control_steps_of(reported))
+    record = at_its_pace(control_steps_of(reported))
     for acted in (True, False):
-        recorded = course.acted.copy()
+        recorded = record.acted.copy()
         recorded[20] = acted
-        answers, _ = answers_of(replace(course, acted=recorded), "policy", BUNDLE, "odometry")
+        answers, _ = answers_of(replace(record, acted=recorded), "policy", BUNDLE, "odometry")
         assert answers.acted[20] == acted
         assert not answers.acted[21]
 
@@ -129,9 +129,9 @@ def test_while_a_press_is_on_its_way_the_record_decides(bag):
 def test_an_estop_that_the_bag_lacks_is_a_reason_to_refuse(bag):
     with pytest.raises(BagError, match="e-stop, and the bag holds no message of it"):
         again(guarded(bag, estop=True))
-    course = control_steps_of(guarded(bag, estop=True))
+    record = control_steps_of(guarded(bag, estop=True))
     with pytest.raises(BagError, match="--through direct"):
-        rerun_through_node(bag, course, "policy", BUNDLE)
+        rerun_through_node(bag, record, "policy", BUNDLE)
 
 
 class Refused:
@@ -140,9 +140,9 @@ class Refused:
     name, control_hz, estimator = "refused", 5.0, None
     readings, observer = (), None
 
-    def __init__(self, course: ControlSteps, *, after: int, raises: bool = False) -> None:
+    def __init__(self, record: ControlSteps, *, after: int, raises: bool = False) -> None:
         self._left, self._raises = after, raises
-        self._shape = (1, len(course.robot.actuators.names))
+        self._shape = (1, len(record.robot.actuators.names))
 
     def reset(self) -> None:
         pass
@@ -155,9 +155,9 @@ class Refused:
 
 
 def test_three_refused_commands_let_the_fallback_take_over(bag):
-    course = control_steps_of(bag)
-    law = load_classical(course.robot, course.task, control_hz=5.0)
-    answers = rerun(course, Refused(course, after=10), source="odometry", fallback=law)
+    record = control_steps_of(bag)
+    law = load_classical(record.robot, record.task, control_hz=5.0)
+    answers = rerun(record, Refused(record, after=10), source="odometry", fallback=law)
     assert np.isnan(answers.actions[10:13]).all()
     assert np.isfinite(answers.actions[13:]).all()
     assert answers.acted.all()
@@ -165,32 +165,32 @@ def test_three_refused_commands_let_the_fallback_take_over(bag):
 
 
 def test_without_a_fallback_three_refused_commands_are_a_fault(bag):
-    course = control_steps_of(bag)
-    answers = rerun(course, Refused(course, after=10), source="odometry")
+    record = control_steps_of(bag)
+    answers = rerun(record, Refused(record, after=10), source="odometry")
     assert answers.acted.tolist() == [True] * 13 + [False] * 87
     assert "commands in a row were refused" in answers.reasons[13]
 
 
 def test_a_fallback_takes_over_from_a_controller_that_raises(bag):
-    course = control_steps_of(bag)
-    law = load_classical(course.robot, course.task, control_hz=5.0)
-    answers = rerun(course, Refused(course, after=10, raises=True), source="odometry", fallback=law)
+    record = control_steps_of(bag)
+    law = load_classical(record.robot, record.task, control_hz=5.0)
+    answers = rerun(record, Refused(record, after=10, raises=True), source="odometry", fallback=law)
     assert np.flatnonzero(~answers.acted).tolist() == [10]
     assert "raised ValueError at step 10" in answers.reasons[10]
     with pytest.raises(RunFailed, match="raised ValueError at step 10"):
-        rerun(course, Refused(course, after=10, raises=True), source="odometry")
+        rerun(record, Refused(record, after=10, raises=True), source="odometry")
 
 
 def test_a_policy_that_took_over_takes_over_again(bag):
-    course = control_steps_of(bag)
-    law = load_classical(course.robot, course.task, control_hz=5.0)
-    at, sha256 = int(course.log_ns[40]), law.metadata()["sha256"]
+    record = control_steps_of(bag)
+    law = load_classical(record.robot, record.task, control_hz=5.0)
+    at, sha256 = int(record.log_ns[40]), law.metadata()["sha256"]
     reported = saying(bag, SWAP, (at - 2, "lqr"))
     reported = saying(reported, METADATA, (at - 4, metadata(bag)), (at - 1, json.dumps({"sha256": sha256})))
-    course = control_steps_of(reported)
-    assert [change.value for change in course.changes] == [("lqr", sha256)]
-    first = Refused(course, after=1000)
-    answers = rerun(course, first, source="odometry", load=lambda folder: law)
+    record = control_steps_of(reported)
+    assert [change.value for change in record.changes] == [("lqr", sha256)]
+    first = Refused(record, after=1000)
+    answers = rerun(record, first, source="odometry", load=lambda folder: law)
     assert not answers.actions[:40].any()
     assert answers.actions[40].any()
 

@@ -38,7 +38,7 @@ def address_of(bench) -> tuple[str, int]:
 
 
 def spoofed(place: float) -> list[bytes]:
-    """Messages as of the autopilot itself, somewhere else."""
+    """Messages like those of the autopilot itself, somewhere else."""
     speaker = mavlink.MAVLink(None, srcSystem=1, srcComponent=1)
     now_ms = 10_000
     return [

@@ -86,12 +86,12 @@ def test_a_changed_safety_decision_is_reported_with_its_step(monkeypatch):
 
 
 def test_a_narrower_geofence_is_reported(monkeypatch):
-    import fulmar_bags.control_steps as course
+    import fulmar_bags.control_steps as record
 
     def narrow(name):
         robot = load_robot(name)
         return replace(robot, limits=replace(robot.limits, geofence=0.1))
 
-    monkeypatch.setattr(course, "load_robot", narrow)
+    monkeypatch.setattr(record, "load_robot", narrow)
     first = first_difference(check_reference(PLATFORM))
     assert (first.field, first.first_step) == ("decision", 0)

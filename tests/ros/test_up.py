@@ -150,7 +150,7 @@ def test_ctrl_c_counts_no_trip_and_one_bag_holds_all(
     assert not read_run(tmp_path / "bag").warnings
 
 
-@pytest.mark.slow  # as of `fulmar run`
+@pytest.mark.slow  # as in `fulmar run`
 def test_a_node_that_dies_ends_the_system_with_its_name_and_a_whole_bag(start: Any, tmp_path: Path) -> None:
     up = start("mock_lqr")
     up.wait_for("started")

@@ -31,12 +31,12 @@ Columns = dict[str, np.ndarray]  # of one episode, by feature; the first axis is
 
 
 def write_lerobot(
-    courses: Sequence[ControlSteps], titles: Sequence[str], folder: Path
+    records: Sequence[ControlSteps], titles: Sequence[str], folder: Path
 ) -> tuple[Path, list[str]]:
     """Write a dataset.
 
     Args:
-        courses: One for each bag, all of the same robot, observations and rate.
+        records: One for each bag, all of the same robot, observations and rate.
         titles: The task of each in words.
         folder: Absent or empty; is made.
 
@@ -50,9 +50,9 @@ def write_lerobot(
     """
     if folder.exists() and any(folder.iterdir()):
         raise ConfigError(f"{folder} is not empty, and datasets are never mixed. Name a new folder.")
-    parts = [_frames(course) for course in courses]
-    _check_alike(courses)
-    fps = courses[0].settings.control_rate(courses[0].robot)
+    parts = [_frames(record) for record in records]
+    _check_alike(records)
+    fps = records[0].settings.control_rate(records[0].robot)
     tasks = list(dict.fromkeys(titles))
     begin, episodes, named = 0, list[Columns](), list[str]()
     for mine, title in zip(parts, titles, strict=True):
@@ -68,7 +68,7 @@ def write_lerobot(
     _write(_task_table(tasks), folder / "meta/tasks.parquet")
     every = {key: np.concatenate([columns[key] for columns in episodes]) for key in episodes[0]}
     _write_json(folder / "meta/stats.json", {key: _stats(values) for key, values in every.items()})
-    _write_json(folder / "meta/info.json", _info(courses[0], fps, len(episodes), len(tasks), every))
+    _write_json(folder / "meta/info.json", _info(records[0], fps, len(episodes), len(tasks), every))
     split = [
         f"bag {number}: steps are missing; its {len(mine)} parts are episodes of their own."
         for number, mine in enumerate(parts, start=1)
@@ -77,27 +77,27 @@ def write_lerobot(
     return folder, split
 
 
-def _frames(course: ControlSteps) -> list[tuple[np.ndarray, np.ndarray]]:
+def _frames(record: ControlSteps) -> list[tuple[np.ndarray, np.ndarray]]:
     """Observations (n, k) and actions (n, m) of the steps that have both, apart where time does not go on evenly."""
-    answers = course.actions if np.isfinite(course.actions).any() else course.commands
-    both = np.isfinite(course.observations).all(axis=1) & np.isfinite(answers).all(axis=1)
-    if not course.observation_names or not both.any():
+    answers = record.actions if np.isfinite(record.actions).any() else record.commands
+    both = np.isfinite(record.observations).all(axis=1) & np.isfinite(answers).all(axis=1)
+    if not record.observation_names or not both.any():
         raise BagError("the bag holds no observations with actions, which are the frames of such a dataset.")
-    passed = np.diff(course.stamp_ns[both]) * course.settings.control_rate(course.robot) / NS
+    passed = np.diff(record.stamp_ns[both]) * record.settings.control_rate(record.robot) / NS
     ends = np.flatnonzero((passed <= 0.0) | (passed > GAP)) + 1
-    return list(zip(np.split(course.observations[both], ends), np.split(answers[both], ends), strict=True))
+    return list(zip(np.split(record.observations[both], ends), np.split(answers[both], ends), strict=True))
 
 
-def _check_alike(courses: Sequence[ControlSteps]) -> None:
-    def kind(course: ControlSteps) -> tuple[Any, ...]:
-        rate = course.settings.control_rate(course.robot)
-        return course.robot.name, course.robot.actuators.names, course.observation_names, rate
+def _check_alike(records: Sequence[ControlSteps]) -> None:
+    def kind(record: ControlSteps) -> tuple[Any, ...]:
+        rate = record.settings.control_rate(record.robot)
+        return record.robot.name, record.robot.actuators.names, record.observation_names, rate
 
-    for number, course in enumerate(courses):
-        if kind(course) != kind(courses[0]):
+    for number, record in enumerate(records):
+        if kind(record) != kind(records[0]):
             raise BagError(
-                f"bag {number + 1} is of '{course.robot.name}' with {len(course.observation_names)} terms at "
-                f"{course.settings.control_rate(course.robot):g} Hz, the first one is of another kind. "
+                f"bag {number + 1} is of '{record.robot.name}' with {len(record.observation_names)} terms at "
+                f"{record.settings.control_rate(record.robot):g} Hz, the first one is of another kind. "
                 "Export them apart."
             )
 
@@ -190,14 +190,14 @@ def _stats(values: np.ndarray) -> dict[str, list[float] | list[int] | list[bool]
     return {"min": low, "max": high, "mean": mean, "std": std, "count": [len(table)], **quantiles}
 
 
-def _info(course: ControlSteps, fps: float, episodes: int, tasks: int, frames: Columns) -> dict[str, Any]:
+def _info(record: ControlSteps, fps: float, episodes: int, tasks: int, frames: Columns) -> dict[str, Any]:
     def feature(dtype: str, width: int = 1, names: Sequence[str] | None = None) -> dict[str, Any]:
         return {"dtype": dtype, "shape": [width], "names": None if names is None else list(names)}
 
     state, action = frames["observation.state"], frames["action"]
     return {
         "codebase_version": VERSION,
-        "robot_type": course.robot.name,
+        "robot_type": record.robot.name,
         "total_episodes": episodes,
         "total_frames": len(state),
         "total_tasks": tasks,
@@ -209,8 +209,8 @@ def _info(course: ControlSteps, fps: float, episodes: int, tasks: int, frames: C
         "data_path": DATA_PATH,
         "video_path": None,
         "features": {
-            "observation.state": feature("float32", state.shape[1], course.observation_names),
-            "action": feature("float32", action.shape[1], course.robot.actuators.names),
+            "observation.state": feature("float32", state.shape[1], record.observation_names),
+            "action": feature("float32", action.shape[1], record.robot.actuators.names),
             "timestamp": feature("float32"),
             "next.done": feature("bool"),
             **{name: feature("int64") for name in INDICES},

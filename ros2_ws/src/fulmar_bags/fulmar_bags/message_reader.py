@@ -131,7 +131,7 @@ def _pose(pose: Any) -> tuple[tuple[float, ...] | None, str]:
 
 
 def obstacles_of(message: Any, frames: Frames = PLAIN) -> tuple[np.ndarray | None, str]:
-    """Read obstacles; arguments as of `goal_of`.
+    """Read obstacles; arguments as in `goal_of`.
 
     Returns:
         Discs, shape (m, 3), and an empty text, or None and what is wrong with the message.
@@ -154,7 +154,7 @@ def obstacles_of(message: Any, frames: Frames = PLAIN) -> tuple[np.ndarray | Non
 
 
 def thing_of(message: Any, frames: Frames = PLAIN) -> tuple[np.ndarray | None, str]:
-    """Pose that a message gives of a thing, shape (7,) as of `goal_of`, or None and why it gives none."""
+    """Pose that a message gives of a thing, shape (7,) as in `goal_of`, or None and why it gives none."""
     if frames.plain(message.header.frame_id) != FRAME:
         return None, f"frame is '{shortened(message.header.frame_id)}', must be '{FRAME}'"
     pose, problem = _pose(message.pose)

@@ -33,7 +33,7 @@ class Bag(Protocol):
     """Target of the thread: a `BagWriter`, a `BagRing` or a `BagPerGoal`."""
 
     @property
-    def counts(self) -> BagCounts: ...  # noqa: D102 - as of `BagWriter`, all of them
+    def counts(self) -> BagCounts: ...  # noqa: D102 - as in `BagWriter`, all of them
     @property
     def waiting(self) -> int: ...  # noqa: D102
     def write(  # noqa: D102
@@ -107,7 +107,7 @@ class BagThread:
         return self._received
 
     def put(self, topic: str, data: bytes, log_ns: int, publish_ns: int | None = None) -> None:
-        """Offer a message, from one thread only; arguments as of `BagWriter.write`."""
+        """Offer a message, from one thread only; arguments as in `BagWriter.write`."""
         self._received += 1
         if (
             self._queue.qsize() >= self._max_queued

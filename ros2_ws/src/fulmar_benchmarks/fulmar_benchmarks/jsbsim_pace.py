@@ -32,7 +32,7 @@ class JsbsimPace:
         self._folder = tempfile.TemporaryDirectory(prefix="fulmar-jsbsim-")
         folder = Path(self._folder.name)
         write_aircraft(robot, folder)
-        assert robot.airframe is not None  # as of `write_aircraft`
+        assert robot.airframe is not None  # as in `write_aircraft`
         self._model = model = silent_model()
         model.set_aircraft_path(str(folder))
         if not model.load_model(robot.name, True):

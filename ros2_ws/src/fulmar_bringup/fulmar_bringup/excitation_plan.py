@@ -37,13 +37,13 @@ def torques_note(goals: str, robot: Robot, controller: str) -> str:
     """Warning about torques under which wheels saturate, as their file wants; empty for all other goals.
 
     Raises:
-        ConfigError: As of `excitation_of`.
+        ConfigError: As in `excitation_of`.
     """
     torques = excitation_of(goals, robot, controller)
     if not torques:
         return ""
     file, wheels = load_torques(torques), robot.actuators
-    assert isinstance(wheels, ReactionWheels)  # as of `excitation_of`
+    assert isinstance(wheels, ReactionWheels)  # as in `excitation_of`
     gain = gain_of(robot.name, wheels)
     profile = profile_of(file.profile, wheels, gain=gain, seed=file.seed, saturate=file.saturate)
     return f"'{goals}' saturates the wheels of '{robot.name}', as its file wants" if profile.saturates else ""

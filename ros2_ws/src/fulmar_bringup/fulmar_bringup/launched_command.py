@@ -183,7 +183,7 @@ class LaunchedCommand:
 def launched(
     words: Sequence[str], *, environment: Mapping[str, str], folder: Path
 ) -> Iterator[LaunchedCommand]:
-    """A command that runs until the context ends, at the latest; arguments as of `LaunchedCommand`."""
+    """A command that runs until the context ends, at the latest; arguments as in `LaunchedCommand`."""
     command = LaunchedCommand(words, environment=environment, folder=folder)
     try:
         yield command

@@ -41,5 +41,5 @@ class NodeRow:
 def robot_spec(
     plan: RunPlan, name: str, module: str, parameters: Mapping[str, Parameter], **more: Any
 ) -> NodeSpec:
-    """The process of a Python module for a plan's robot, with its topics renamed; `more` as of `NodeSpec`."""
+    """The process of a Python module for a plan's robot, with its topics renamed; `more` as in `NodeSpec`."""
     return node_spec(plan.namespace, name, module, parameters, remappings=dict(plan.remappings), **more)

@@ -120,7 +120,7 @@ def wait_for_publisher(plan: RunPlan, overseer: Supervisor, alive: Callable[[], 
 
 
 def wait_for_reader(plan: RunPlan, overseer: Supervisor, alive: Callable[[], None]) -> None:
-    """Wait until a plant in lock step, which was started, has its subscribers; `alive` as of `wait_for_publisher`.
+    """Wait until a plant in lock step, which was started, has its subscribers; `alive` as in `wait_for_publisher`.
 
     Raises:
         RunFailed: Too few nodes subscribe its odometry within the time for it.

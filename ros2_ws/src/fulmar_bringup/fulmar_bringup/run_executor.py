@@ -83,7 +83,7 @@ def run_nodes(plan: RunPlan, watch: Watch, on_restart: OnRestart = lambda *_: No
         on_restart: Called with the name of a node that was started again, and why.
 
     Raises:
-        ConfigError: As of `execute`.
+        ConfigError: As in `execute`.
         DeviceError: The device is not there.
     """
     if plan.is_real:
@@ -159,7 +159,7 @@ def _with_ends(failure: str, ends: list[Ended]) -> str:
 def _watch(plan: RunPlan, overseer: Supervisor, group: ProcessGroup, keeper: NodeKeeper) -> str:
     """Start the run and wait for its end; returns why it failed, or an empty text."""
     external = controller_entry(plan.controller).is_external
-    assert plan.mission is not None  # as of `completed`
+    assert plan.mission is not None  # as in `completed`
     try:
         if external:
             wait_for_publisher(plan, overseer, lambda: raise_if_ended(group))

@@ -53,7 +53,7 @@ def keep_up(plan: RunPlan, emit: Emit, show: Show) -> Ending:
         How it ended.
 
     Raises:
-        ConfigError: As of `execute`.
+        ConfigError: As in `execute`.
         DeviceError: The device is not there.
     """
     stopped, plant_report = "", Report()
@@ -107,7 +107,7 @@ def _get_ready(plan: RunPlan, overseer: Supervisor, group: ProcessGroup) -> None
     A plant alone starts at once, and begins when its controller has come.
     """
     external = controller_entry(plan.controller).is_external
-    assert plan.mission is not None  # as of `completed`
+    assert plan.mission is not None  # as in `completed`
     if plan.only == PLANT:
         if not plan.is_real:
             now_ns = time.time_ns() if plan.hardware else SIMULATION_START_NS

@@ -220,7 +220,7 @@ class Supervisor:
         return not lost()
 
     def give_obstacles(self, goal: Goal, *, time_ns: int, alive: Callable[[], None]) -> None:
-        """The obstacles alone, if the task has any; arguments as of `give_goal`."""
+        """The obstacles alone, if the task has any; arguments as in `give_goal`."""
         if self._obstacles is None:
             return
         self.publish_obstacles(goal, time_ns)

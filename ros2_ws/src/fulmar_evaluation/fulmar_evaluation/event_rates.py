@@ -68,7 +68,7 @@ def cameras_of(
 
     Raises:
         ConfigError: The robot has no event camera, or fewer than there are files.
-        BagError: As of `open_event_file`.
+        BagError: As in `open_event_file`.
     """
     its = tuple(each.camera for each in robot.event_cameras)
     if not its:
@@ -98,7 +98,7 @@ def packets_of(sources: Sequence[Path], cameras: Sequence[StarCamera]) -> Iterat
     """Packets of one bag, or of a file for each camera, by time.
 
     Raises:
-        BagError: There is no packet of events in a bag, or as of `open_event_file`.
+        BagError: There is no packet of events in a bag, or as in `open_event_file`.
     """
     files = [path for path in sources if is_event_file(path)]
     if files and len(files) == len(sources):

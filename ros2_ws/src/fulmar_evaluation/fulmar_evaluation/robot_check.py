@@ -42,7 +42,7 @@ class RobotCheck:
         return not self.problems
 
     def as_json(self) -> dict[str, Any]:
-        """Keys as of `fulmar check robot --json`; what is not known is null."""
+        """Keys as in `fulmar check robot --json`; what is not known is null."""
         return {
             "robot": self.name,
             **UNKNOWN,
@@ -61,7 +61,7 @@ def check_robot(
 
     Args:
         name: Of a robot, or a path that ends in .yaml or .yml.
-        speed: Of an aircraft; as the rest as of `check_aircraft` [m/s].
+        speed: Of an aircraft; as the rest as in `check_aircraft` [m/s].
         altitude: Same; None: 0 [m].
         height: Same [m].
 

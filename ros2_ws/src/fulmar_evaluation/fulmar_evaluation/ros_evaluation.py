@@ -83,7 +83,7 @@ class RosPool:
     def roll_out(
         self, plan: RunPlan, *, episodes: int, progress: Progress = lambda steps: None
     ) -> Trajectories:
-        """Run episodes; arguments, result and errors as of `roll_out_through_ros`."""
+        """Run episodes; arguments, result and errors as in `roll_out_through_ros`."""
         jobs = min(len(self._domains), episodes)
         shares = [range(first, episodes, jobs) for first in range(jobs)]
         for count in self._counts:

@@ -40,7 +40,7 @@ class OdometryTransform:
             node: Its owner.
             frames: Of the robot.
             publish: Publishes a message, or its bytes.
-            lockstep: As of `publisher_qos`.
+            lockstep: As in `publisher_qos`.
         """
         message = TransformStamped()
         message.header.frame_id, message.child_frame_id = frames.odom, frames.base
@@ -63,7 +63,7 @@ class OdometryTransform:
 def odometry_transform(
     node: Node, frames: Frames, *, wanted: bool, **options: Any
 ) -> OdometryTransform | None:
-    """One where it is wanted and tf2_msgs is installed; options as of `OdometryTransform`."""
+    """One where it is wanted and tf2_msgs is installed; options as in `OdometryTransform`."""
     return OdometryTransform(node, frames, **options) if wanted and TFMessage is not None else None
 
 

@@ -57,7 +57,7 @@ def refuse_living_plant(
 
 
 def sees_living_plant(node: Node, namespace: str, *, since_s: float, within_s: float = DISCOVERY_S) -> bool:
-    """Whether another plant is discovered under a namespace; arguments as of `refuse_living_plant`."""
+    """Whether another plant is discovered under a namespace; arguments as in `refuse_living_plant`."""
     while not living_plants(node, namespace):
         if time.monotonic() > since_s + within_s:
             return False

@@ -50,7 +50,7 @@ class MarkersSettings:
 
     robot: str = "floating_platform"
     task: str = "go_to_pose"
-    area: tuple[float, ...] = NO_AREA  # as of `Guards.area` [m]
+    area: tuple[float, ...] = NO_AREA  # as in `Guards.area` [m]
 
     def __post_init__(self) -> None:
         """Refuse an area that is none."""

@@ -51,11 +51,11 @@ class MotionCapture:
 class SteppedCapture:
     """Poses at a fixed rate above that of the measurements, in lock step.
 
-    Between two measurements the pose moves on from the first at constant velocity, as of `PacedCapture`.
+    Between two measurements the pose moves on from the first at constant velocity, as in `PacedCapture`.
     """
 
     def __init__(self, *, rate_hz: float, late_s: float = 0.0) -> None:
-        """Begin without a pose; arguments as of `MotionCapture`."""
+        """Begin without a pose; arguments as in `MotionCapture`."""
         self._period_s = 1.0 / rate_hz
         self._line = MotionCapture(late_s=late_s)
         self._last: tuple[int, RigidBodyState] | None = None
@@ -96,7 +96,7 @@ class PacedCapture:
         Args:
             publish: Called by the thread.
             rate_hz: Captures, in the time of the stamps [Hz].
-            late_s: As of `MotionCapture` [s].
+            late_s: As in `MotionCapture` [s].
             rate: Seconds of the stamps a wall-clock second.
             longest_s: A measurement older than this is not moved on any further: the plant stands still [s].
         """
@@ -154,7 +154,7 @@ def capture_maker(
     Args:
         robot: Says how often a plant ticks.
         rate_hz: Captures; 0: at every tick [Hz].
-        late_s: As of `MotionCapture` [s].
+        late_s: As in `MotionCapture` [s].
         rate: Simulated seconds a wall-clock second.
         lockstep: Whether time stands still between commands; then poses are of the plant's own thread.
     """

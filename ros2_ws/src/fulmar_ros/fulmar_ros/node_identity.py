@@ -40,7 +40,7 @@ def identity_of(
 
 
 def setup_of(robot: str, task: str, control_hz: float, rate: float) -> dict[str, str]:
-    """What plant and controller of one system have in common; arguments as of `identity_of`."""
+    """What plant and controller of one system have in common; arguments as in `identity_of`."""
     return {ROBOT: robot, TASK: task, CONTROL_HZ: f"{control_hz:g}", RATE: f"{rate:g}"}
 
 

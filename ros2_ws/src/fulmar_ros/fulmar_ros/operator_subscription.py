@@ -50,11 +50,11 @@ def subscribe_every(
         wire: The wire.
         callback: Called with each message once, and, if asked for, with its info.
         topic: Name of the topic, where it is another than the wire's.
-        depth: Messages that may wait for the callback; as of `subscriber_qos`. By default enough that the message of
+        depth: Messages that may wait for the callback; as in `subscriber_qos`. By default enough that the message of
             one publisher does not overwrite that of another.
         raw: Deliver serialized messages.
         with_info: Call back with the message info too.
-        lossless: As of `subscriber_qos`.
+        lossless: As in `subscriber_qos`.
 
     Returns:
         The subscriptions, for `destroy_all`; a later one joins the list.

@@ -42,7 +42,7 @@ class PlantHealth:
         self.awaited = 0
         self._unnamed_looks = 0
         self._robot = robot
-        self._identity: dict[str, str] = {}  # as of `node_identity`
+        self._identity: dict[str, str] = {}  # as in `node_identity`
         self._said: tuple[object, ...] = ()
         self._said_at = 0.0
         self.more: Callable[[], dict[str, str]] = dict

@@ -75,7 +75,7 @@ def subscriber_qos(
         reliable: Ask for every message again that got lost; only where publishers offer it.
         depth: Messages that may wait for the callback, >= 1, or `EVERYTHING`.
         latched: Ask for what was published before; as the wire is by default.
-        lossless: Let `reliable` hold for best-effort wires, too; as of `publisher_qos`.
+        lossless: Let `reliable` hold for best-effort wires, too; as in `publisher_qos`.
 
     Returns:
         A profile that matches `publisher_qos(wire)`.

@@ -122,7 +122,7 @@ class SensorWires:
             self._transform.publish(readings[ODOMETRY].value, sample_ns)
 
     def publish_odometry(self, readings: Mapping[str, Reading], sample_ns: int) -> None:
-        """Publish the odometry of a sample, subscribed or not; arguments as of `publish`."""
+        """Publish the odometry of a sample, subscribed or not; arguments as in `publish`."""
         if ODOMETRY in self._made and ODOMETRY in readings:
             self._publish(self._made[ODOMETRY], self._encode[ODOMETRY](readings[ODOMETRY], sample_ns))
 

@@ -43,7 +43,7 @@ def approach_bound(
         control_dt: Time of one [s].
 
     Returns:
-        Percentages as of `metrics` (PT5 has a radius of 0.05 m), shape (episodes,) [%].
+        Percentages as in `metrics` (PT5 has a radius of 0.05 m), shape (episodes,) [%].
 
     Raises:
         ConfigError: The robot is none with thrusters on air.

@@ -39,7 +39,7 @@ def run_drift(
 ) -> CampaignResult[Key]:
     """Evaluate every controller in every row, but for what was evaluated before with the same code and configuration.
 
-    Arguments beside the request as of `evaluate_units`.
+    Arguments beside the request as in `evaluate_units`.
     """
     began = time.monotonic()
     robot = load_robot(ROBOT)

@@ -49,7 +49,7 @@ class Request:
     policy: str = ""  # folder of a bundle; empty: the shipped ones
 
 
-Flights = dict[str, dict[str, dict[str, Any]]]  # by task and controller, as of `cells.first_flight`
+Flights = dict[str, dict[str, dict[str, Any]]]  # by task and controller, as in `cells.first_flight`
 
 
 def run_falcon(request: Request, progress: Progress) -> tuple[dict[str, Any], Flights]:

@@ -39,7 +39,7 @@ def draw_flights(flights: dict[str, dict[str, dict[str, Any]]]) -> Figure:
 
 
 def name_lines(figure: Figure, panels: np.ndarray, **how: Any) -> None:
-    """One legend under a figure with every label of some panels once; `how` as of matplotlib's `legend`."""
+    """One legend under a figure with every label of some panels once; `how` as in matplotlib's `legend`."""
     handles: dict[str, Any] = {}
     for axes in panels:
         drawn, names = axes.get_legend_handles_labels()

@@ -130,7 +130,7 @@ def watched_system(plan: RunPlan, environment: Mapping[str, str]) -> Iterator[Wa
 
 def _begin(plan: RunPlan, overseer: Supervisor, group: ProcessGroup) -> None:
     alive = while_starting(group, overseer)
-    assert plan.mission is not None  # as of `completed`
+    assert plan.mission is not None  # as in `completed`
     overseer.give_goal(
         plan.mission, time_ns=SIMULATION_START_NS, alive=alive, listeners=CONTROLLER_AND_RECORDER
     )

@@ -40,7 +40,7 @@ def run_rans3d(
 ) -> CampaignResult[Key]:
     """Measure everything that is asked for; evaluations with the same code and configuration are not repeated.
 
-    Arguments beside the request as of `evaluate_units`.
+    Arguments beside the request as in `evaluate_units`.
     """
     began = time.monotonic()
     keys = _keys(request)

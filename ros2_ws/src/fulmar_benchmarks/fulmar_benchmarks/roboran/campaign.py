@@ -57,7 +57,7 @@ def run_benchmark(
 ) -> CampaignResult:
     """Evaluate every pair, but for what was evaluated before with the same code, configuration and controller.
 
-    Arguments beside the request as of `evaluate_units`.
+    Arguments beside the request as in `evaluate_units`.
     """
     began = time.monotonic()
     longest_s = max(load_task(task).episode_s for task in request.tasks)

@@ -91,7 +91,7 @@ def with_line(text: str, key: str, values: Sequence[object]) -> str:
 
 
 def write_line(source: Path, target: Path, key: str, values: Sequence[object]) -> None:
-    """Write `with_line` of one file to another, or to the same; errors as of `with_line`, and OSError."""
+    """Write `with_line` of one file to another, or to the same; errors as in `with_line`, and OSError."""
     try:
         text = with_line(source.read_text(encoding="utf-8"), key, values)
     except ConfigError as error:

@@ -29,7 +29,7 @@ PROGRAMS = {
 
 
 def layout_text(robot: str, program: str, name: str | None = None) -> str:
-    """The text of a layout; arguments as of `write_layout`.
+    """The text of a layout; arguments as in `write_layout`.
 
     Raises:
         ConfigError: Unknown robot, program or name.

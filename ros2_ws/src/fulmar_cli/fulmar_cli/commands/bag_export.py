@@ -63,9 +63,9 @@ def export(
                     f"{bag.path}: others recorded it, without the observations of a controller. Use --to csv or npz."
                 )
         with knowing_what_it_carries(*opened):
-            courses = [control_steps_of(bag, task=task) for bag in opened]
-            titles = [course.task.title for course in courses]
-            folder, notes = write_lerobot(courses, titles, out or beside / "lerobot")
+            records = [control_steps_of(bag, task=task) for bag in opened]
+            titles = [record.task.title for record in records]
+            folder, notes = write_lerobot(records, titles, out or beside / "lerobot")
         files, left_out = [folder], []
         warn(notes)
     warn(f"left out: {line}" for line in left_out)

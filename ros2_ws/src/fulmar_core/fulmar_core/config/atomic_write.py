@@ -24,7 +24,7 @@ def write_whole(contents: Mapping[Path, bytes]) -> None:
 
 @contextlib.contextmanager
 def whole_file(path: Path) -> Iterator[BinaryIO]:
-    """Open one such file for writing until the context ends; errors as of `write_whole`."""
+    """Open one such file for writing until the context ends; errors as in `write_whole`."""
     new = path.with_name(f".{path.name}.{os.getpid()}.new")  # of each process its own, should two write it
     try:
         with _named(path), new.open("wb") as file:

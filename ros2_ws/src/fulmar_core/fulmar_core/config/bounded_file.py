@@ -56,7 +56,7 @@ def bounded_file(path: Path, most: int) -> Iterator[BinaryIO]:
 
 
 def read_bounded(path: Path, most: int) -> bytes:
-    """Read a whole file; arguments and errors as of `bounded_file`."""
+    """Read a whole file; arguments and errors as in `bounded_file`."""
     with bounded_file(path, most) as file:
         content = file.read(most + 1)
     if len(content) > most:  # files of the kernel have no size
@@ -91,7 +91,7 @@ def load_arrays(
         names: Which arrays; all by default.
 
     Raises:
-        RefusedFileError: As of `bounded_file`.
+        RefusedFileError: As in `bounded_file`.
         OSError: It cannot be opened.
         ValueError: It is no such file, it lacks an array, it is damaged, or its arrays are larger.
     """

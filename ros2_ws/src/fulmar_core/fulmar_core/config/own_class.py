@@ -86,7 +86,7 @@ def construct(cls: type[Any], call: str, what: str, *arguments: Any, **named: An
     Args:
         cls: The class.
         call: How it is called, for the message.
-        what: Role of the class, as of `load_class`.
+        what: Role of the class, as in `load_class`.
         arguments: Of its constructor.
         named: Same.
 

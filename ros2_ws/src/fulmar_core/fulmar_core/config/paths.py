@@ -56,7 +56,7 @@ def config_files(family: str) -> dict[str, Path]:
 
 
 def config_names(family: str) -> list[str]:
-    """Names of all files in one family, sorted; arguments as of `config_files`."""
+    """Names of all files in one family, sorted; arguments as in `config_files`."""
     return list(config_files(family))
 
 

@@ -109,12 +109,12 @@ def gains_of(robot: Robot, law: str | None = None) -> Any:
 
 
 def gains_path(robot: Robot, law: str | None = None) -> Path | None:
-    """The file with the gains of a law for a robot; None where default gains are used; rest as of `gains_of`."""
+    """The file with the gains of a law for a robot; None where default gains are used; rest as in `gains_of`."""
     return _find_gains(robot, entry_of(robot, law))
 
 
 def default_gains_note(robot: Robot, law: str | None = None) -> str:
-    """Note on a robot that drives with default gains; empty where it has a file; rest as of `gains_of`."""
+    """Note on a robot that drives with default gains; empty where it has a file; rest as in `gains_of`."""
     if gains_path(robot, law) is not None:
         return ""
     name = entry_of(robot, law).law.law

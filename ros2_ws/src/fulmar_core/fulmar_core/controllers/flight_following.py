@@ -19,7 +19,7 @@ class FlightFollowing(FlightLaw):
     """A law that flies an aircraft along a reference that is known ahead."""
 
     def follow(self, *, smooth_s: float, observer: ObserverNoise | None) -> None:
-        """Prepare for robot and task; arguments as of `FlightWeights`.
+        """Prepare for robot and task; arguments as in `FlightWeights`.
 
         Raises:
             ValueError: The robot is no aircraft, or the task has no reference.

@@ -30,7 +30,7 @@ class FlightLaw(Law):
         self._dt = self.robot.timing.substeps(self.control_hz) * self.robot.timing.physics_dt
 
     def believe(self, noise: ObserverNoise | None, *, any_heading: bool = False) -> None:
-        """Believe states as of a `FlightObserver`, whose arguments these are, or, without noise, as measured."""
+        """Believe states of a `FlightObserver`, whose arguments these are, or, without noise, as measured."""
         self.observer = (
             None if noise is None else FlightObserver(self.robot, noise, self._dt, any_heading=any_heading)
         )

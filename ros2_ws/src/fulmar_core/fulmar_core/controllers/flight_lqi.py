@@ -123,7 +123,7 @@ class FlightLqi(FlightFollowing):
         return self.answer(state, aim, self.servos_after(inputs))
 
     def servos_after(self, inputs: Inputs) -> np.ndarray:
-        """Deflections and thrust levels, then rates of the servos, as of the commands that were sent, shape (n, k)."""
+        """Deflections and thrust levels, then rates of the servos, by the commands that were sent, shape (n, k)."""
         count = len(inputs.previous)
         if self._sums is None or len(self._sums) != count:
             self._sums = np.zeros((count, 2))
@@ -135,12 +135,12 @@ class FlightLqi(FlightFollowing):
         Args:
             state: Believed, shapes (n,).
             aim: Of n craft.
-            servos: As of `servos_after`.
+            servos: As in `servos_after`.
         """
         level = self.level(self.schedule, aim)
         x = self._departures(state, aim, servos, level)
         if self._integrates:
-            assert self._sums is not None  # as of `servos_after`
+            assert self._sums is not None  # as in `servos_after`
             off = x[:, :2]
             x = np.concatenate((x, self._sums), axis=-1)
             free = np.abs(off) < self.gains.error_limit

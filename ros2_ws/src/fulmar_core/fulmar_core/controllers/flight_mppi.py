@@ -41,7 +41,7 @@ class MppiSettings:
     knot_s: float = 0.2  # between two corrections of a plan, with a straight line between them [s]
     temperature: float = 1.0  # cost by which a flight's weight falls to 1/e [-]
     seed: int = 0  # of the noise
-    observer: ObserverNoise | None = None  # as of `FlightWeights`
+    observer: ObserverNoise | None = None  # as in `FlightWeights`
 
     def __post_init__(self) -> None:
         if self.rollouts < 2 or self.rollouts % 2:

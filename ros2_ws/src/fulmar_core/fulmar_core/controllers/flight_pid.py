@@ -2,7 +2,7 @@
 
 Height to climb rate to pitch to elevator; place to the side to drift to bank to aileron; a yaw damper on the rudder;
 airspeed to throttle (Beard and McLain, Small Unmanned Aircraft, 2012, chapter 6, has such loops and their order). What
-the reference asks for ahead goes in as of the LQI. Gains without a file follow from the craft's own linear model.
+the reference asks for ahead goes in as in the LQI. Gains without a file follow from the craft's own linear model.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ class FlightPidGains:
     pitch_limit_deg: float  # largest departure of the pitch that is asked for [deg]
     bank_limit_deg: float  # same of the bank [deg]
     smooth_s: float  # half of the time that the reference is smoothed over [s]
-    observer: ObserverNoise | None = None  # as of `FlightWeights`
+    observer: ObserverNoise | None = None  # as in `FlightWeights`
 
     def __post_init__(self) -> None:
         limits = self.height_limit, self.side_limit, self.pitch_limit_deg, self.bank_limit_deg, self.smooth_s
@@ -140,5 +140,5 @@ class FlightPid(FlightFollowing):
         """Go on with the integrals, but not where an error, a demand (n, 3) or a command is cut: no wind-up."""
         most = np.array([self.gains.side_limit, self.gains.height_limit, np.inf])
         free = (np.abs(errors) < most) & ~(self.saturated(command) | cut)
-        assert self._sums is not None  # as of `command`
+        assert self._sums is not None  # as in `command`
         self._sums = self._sums + self._dt * np.where(free, errors, 0.0)

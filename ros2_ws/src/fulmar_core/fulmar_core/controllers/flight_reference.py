@@ -39,11 +39,11 @@ class SmoothReference:
         self._targets: np.ndarray | None = None
 
     def at(self, inputs: Inputs) -> Aim:
-        """The aim of now; `inputs` as of a controller."""
+        """The aim of now; `inputs` as for a controller."""
         return self.ahead(inputs, (0.0,))[0]
 
     def ahead(self, inputs: Inputs, times_s: Sequence[float]) -> list[Aim]:
-        """The aims after some times from now [s]; `inputs` as of a controller."""
+        """The aims after some times from now [s]; `inputs` as for a controller."""
         targets = np.asarray(inputs.goal.targets, dtype=float)
         now = np.asarray(reference_of(inputs.goal), dtype=float)
         if targets.shape[-2] == 1:

@@ -1,4 +1,4 @@
-"""Where servos and motors of aircraft are, which nothing measures: as of the commands that were sent."""
+"""Where servos and motors of aircraft are, which nothing measures: by the commands that were sent."""
 
 from __future__ import annotations
 

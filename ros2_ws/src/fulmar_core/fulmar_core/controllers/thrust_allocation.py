@@ -29,7 +29,7 @@ class ThrustAllocation:
 
         Args:
             actuators: Those that push.
-            weight: Cost of a wrench error, symmetric positive definite, shape (k, k); columns as of `wrench_columns`.
+            weight: Cost of a wrench error, symmetric positive definite, shape (k, k); columns as in `wrench_columns`.
             cost: Of each actuator at full thrust, >= 0.
         """
         self._full = (

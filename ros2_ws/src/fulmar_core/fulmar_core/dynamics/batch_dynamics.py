@@ -54,8 +54,8 @@ class Steps:
     """Integration steps under a command and a push that stay the same."""
 
     count: int
-    latest_s: float = 0.0  # as of `longest_delay` [s]
-    off_centre: bool = False  # as of `Dynamics.is_off_centre`
+    latest_s: float = 0.0  # as in `longest_delay` [s]
+    off_centre: bool = False  # as in `Dynamics.is_off_centre`
 
 
 class Dynamics(ABC, Generic[W, S]):
@@ -107,7 +107,7 @@ class Dynamics(ABC, Generic[W, S]):
             state: Of the body's origin, shapes (worlds,).
             actuation: What the actuators do.
             world: Bodies and surroundings.
-            outside: As of `outside`.
+            outside: As in `outside`.
             steps: Integration steps.
 
         Returns:
@@ -136,7 +136,7 @@ class Dynamics(ABC, Generic[W, S]):
         """Odometry of one body, without a batch axis: what is measured, and of the rest the truth."""
 
     def push_things(self, things: Sequence[Thing], poses: Poses, before: S, after: S) -> tuple[Poses, S]:
-        """Move the things of a task; arguments and result as of `things.push_things`. By default they stay."""
+        """Move the things of a task; arguments and result as in `things.push_things`. By default they stay."""
         return poses, after
 
 
@@ -344,7 +344,7 @@ class GyrostatDynamics(SpatialDynamics):
         self, state: SpatialState, actuation: ActuationState, world: SpatialWorld, outside: Push, steps: Steps
     ) -> SpatialState:
         """See `Dynamics.move`; of `outside` what is left out is nothing."""
-        assert isinstance(actuation, WheelActuation)  # as of `actuation_of`
+        assert isinstance(actuation, WheelActuation)  # as in `actuation_of`
         dt, wheels = self.robot.timing.physics_dt, self._wheels
         force: Vector = (outside[0], outside[1], outside[2])
         tensor = tuple(world.inertia)[: 6 if self._full else 3]

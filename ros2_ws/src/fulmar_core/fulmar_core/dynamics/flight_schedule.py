@@ -77,7 +77,7 @@ class Schedule:
         make: Callable[[FlightModel], np.ndarray],
         models: tuple[FlightModel, ...] = (),
     ) -> None:
-        """Solve the trims; arguments as of `flight_model`, and what is computed of each model, all of one shape.
+        """Solve the trims; arguments as in `flight_model`, and what is computed of each model, all of one shape.
 
         `models`: those of another schedule of the same robot, speed and step, which are not solved again.
 

@@ -170,7 +170,7 @@ class GuardedLoop:
             self._change(bearing_off=not on)
 
     def take_goal(self, targets: np.ndarray, stamp_ns: int, now_ns: int) -> str:
-        """Take a goal as of `Task.goal_of`; none outside the robot's area, and none while a received e-stop holds."""
+        """Take a goal as in `Task.goal_of`; none outside the robot's area, and none while a received e-stop holds."""
         goal = self.loop.task.goal_of(targets)
         with self._lock:
             beyond = self._beyond(goal)

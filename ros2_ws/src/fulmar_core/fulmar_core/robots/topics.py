@@ -204,7 +204,7 @@ PERIOD = Wire(
 ANSWER = Wire(
     "lockstep/answer", "sensor_msgs/msg/JointState", "estimator", "stream",
     "control rate, from each node between plant and controller in lock step",
-    "the node `header.frame_id` has processed the period of the stamp; `name` and `position` as of `lockstep/period`",
+    "the node `header.frame_id` has processed the period of the stamp; `name` and `position` as in `lockstep/period`",
     recorded=False,
 )  # fmt: skip
 TRANSFORMS = Wire(

@@ -169,7 +169,7 @@ class ActuatorGuard:
         *,
         plant_ns: int | None = None,
     ) -> bool:
-        """Take a person's command if it can be carried out, and the actuators with it; arguments as of `offer`."""
+        """Take a person's command if it can be carried out, and the actuators with it; arguments as in `offer`."""
         if not self._check(names, values, None):
             return False
         if not self.person:
@@ -229,7 +229,7 @@ class ActuatorGuard:
     ) -> np.ndarray:
         """What to apply in lock step, where time stands still between commands and only the e-stop may end one.
 
-        What cannot stop flies on by its safe controller, for which `state` is the newest one; as of `output`.
+        What cannot stop flies on by its safe controller, for which `state` is the newest one; as in `output`.
         """
         since_ns = self._ended_by_decision(now_ns)
         if since_ns is None or self._steers:

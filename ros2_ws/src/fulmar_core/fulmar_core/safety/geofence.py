@@ -14,7 +14,7 @@ if TYPE_CHECKING:  # the command line checks areas without loading NumPy
 
 NO_AREA = (0.0, 0.0, 0.0, 0.0)  # an area without extent stands for none
 FARTHEST_M = (
-    1000.0  # of a goal from the origin, unless a robot's geofence reaches farther: as of `farthest_goal`
+    1000.0  # of a goal from the origin, unless a robot's geofence reaches farther: as in `farthest_goal`
 )
 OUT_OF_BOUNDS = "out of bounds: "  # how the reason begins by which a controller refuses such a goal
 
@@ -80,7 +80,7 @@ def unreachable(
         places: Each x [m], y [m] and whatever follows in the plane: at most three numbers; x, y, z [m] and the attitude
             in space: more.
         area: Area of the robot.
-        farthest_m: From the origin, as of `farthest_goal`.
+        farthest_m: From the origin, as in `farthest_goal`.
     """
     for numbers in places:
         place = numbers[: 3 if len(numbers) > 3 else 2]
@@ -98,7 +98,7 @@ def check_places(
     area: Sequence[float] = NO_AREA,
     farthest_m: float = FARTHEST_M,
 ) -> None:
-    """Reject places that a robot must not go to; arguments as of `unreachable`.
+    """Reject places that a robot must not go to; arguments as in `unreachable`.
 
     Raises:
         ConfigError: For the first of them.

@@ -61,7 +61,7 @@ def load_task(name: str) -> Task:
     """Load a task by a name that `fulmar list tasks` shows, or by the dotted path of a user's own class.
 
     Raises:
-        ConfigError: Unknown name, a mistake in the file, or a class as of `load_own_task`.
+        ConfigError: Unknown name, a mistake in the file, or a class as in `load_own_task`.
     """
     if is_own(name):
         task = load_own_task(name)
@@ -81,7 +81,7 @@ def load_recorded_task(name: str, bag: Path) -> Task:
     """Load the task that a bag names, as `load_task` does, without importing a class that only the bag names.
 
     Raises:
-        ConfigError: As of `load_task`; or a class that this process has not loaded by `load_task` before.
+        ConfigError: As in `load_task`; or a class that this process has not loaded by `load_task` before.
     """
     if is_own(name) and name not in _asked_for:  # a bag from elsewhere must not have its code run
         raise ConfigError(

@@ -108,7 +108,7 @@ class FollowReference(FileTask[SpatialState]):
         """See `Task.check`; and the reference lies where the craft can be.
 
         Raises:
-            ConfigError: As of `Task.check`, or the lowest start lies in the water.
+            ConfigError: As in `Task.check`, or the lowest start lies in the water.
         """
         super().check(robot)
         if self.reference == "hold":
@@ -216,7 +216,7 @@ class FollowReference(FileTask[SpatialState]):
             return goal.targets[..., 0, 0] + self.cruise
         return (goal.targets[..., 1, 0] - goal.targets[..., 0, 0]) / self.spacing_s
 
-    cruise: float = 0.0  # of the craft, as of `fitted`; 0 in a file [m/s]
+    cruise: float = 0.0  # of the craft, as in `fitted`; 0 in a file [m/s]
 
     def fitted(self, robot: Robot) -> FollowReference:
         """The task with the cruising speed of a craft; see `Task.fitted`."""

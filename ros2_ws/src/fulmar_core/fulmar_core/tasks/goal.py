@@ -98,7 +98,7 @@ def goals_at(targets: Array) -> Goal:
     """A batch of goals with one target each.
 
     Args:
-        targets: Poses or body velocities as of `Goal`, shape (n, 3).
+        targets: Poses or body velocities as in `Goal`, shape (n, 3).
     """
     zero = array_namespace(targets).zeros_like(targets[:, 0])
     return Goal(targets[:, None, :], zero, no_obstacles(len(targets)))

@@ -223,7 +223,7 @@ def load_goal_file(name: str) -> GoalFile | Torques:
 
 
 def goal_file_path(name: str) -> Path:
-    """Where the goals of a name are; argument as of `load_goal_file`.
+    """Where the goals of a name are; argument as in `load_goal_file`.
 
     Raises:
         ConfigError: Unknown name.
@@ -232,7 +232,7 @@ def goal_file_path(name: str) -> Path:
 
 
 def load_goals(name: str) -> GoalFile:
-    """Read a file of goals; argument and errors as of `load_goal_file`, and torques are none."""
+    """Read a file of goals; argument and errors as in `load_goal_file`, and torques are none."""
     file = load_goal_file(name)
     if isinstance(file, Torques):
         raise ConfigError(
@@ -243,7 +243,7 @@ def load_goals(name: str) -> GoalFile:
 
 
 def load_torques(name: str) -> Torques:
-    """Read a file of torques; argument and errors as of `load_goal_file`, and goals are none."""
+    """Read a file of torques; argument and errors as in `load_goal_file`, and goals are none."""
     file = load_goal_file(name)
     if not isinstance(file, Torques):
         raise ConfigError(f"the goals '{name}' are no torques: their file says 'kind: {file.kind}'.")

@@ -81,7 +81,7 @@ class _HoldFlight(FileTask[SpatialState]):
     kinds = (AIRCRAFT,)
     scale: ClassVar[float]  # of errors in the reward [rad or m/s]
 
-    cruise: float = 0.0  # speed of the craft, as of `fitted`; 0 in a file [m/s]
+    cruise: float = 0.0  # speed of the craft, as in `fitted`; 0 in a file [m/s]
 
     def fitted(self, robot: Robot) -> Self:
         """The task with the cruising speed of a craft; see `Task.fitted`."""
@@ -91,7 +91,7 @@ class _HoldFlight(FileTask[SpatialState]):
         """See `Task.check`; and the hull is in the air at the lowest start.
 
         Raises:
-            ConfigError: As of `Task.check`, or the lowest start lies on the ground.
+            ConfigError: As in `Task.check`, or the lowest start lies on the ground.
         """
         super().check(robot)
         check_above_ground(self.name, robot, self.start.height[0])

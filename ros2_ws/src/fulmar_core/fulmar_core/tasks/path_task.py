@@ -52,7 +52,7 @@ class FollowPath(TrackVelocities):
         return state, self.advance(goal, state, np.zeros_like(yaw))
 
     def advance(self, goal: Goal, state: PlanarState, time_s: Array) -> Goal:
-        """The velocity towards the aim, from where the robot is; arguments and steps as of `LookAhead.aim`."""
+        """The velocity towards the aim, from where the robot is; arguments and steps as in `LookAhead.aim`."""
         path, count = self.path, len(self.path.points)
         ahead = max(1, round(path.look_ahead / path.spacing))
         here = np.stack((state.x + self.lead_s * state.vx, state.y + self.lead_s * state.vy), axis=-1)
@@ -85,7 +85,7 @@ def evaluated_task(name: str, *, episode_s: float = 0.0, goals: str = "") -> Tas
     """The task that evaluates episodes.
 
     Args:
-        name: As of `load_task`.
+        name: As in `load_task`.
         episode_s: Length of an episode; 0: the task's own [s].
         goals: Goal file whose path is followed; empty: none.
 

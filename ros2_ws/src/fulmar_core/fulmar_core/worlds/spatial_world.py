@@ -136,7 +136,7 @@ def zenith(orbit_rate: Array, time_s: Array) -> Vector:
 
 
 def magnetic_field(orbit_rate: Array, time_s: Array) -> Vector:
-    """Direction of the planet's magnetic field in the world, a unit vector; arguments as of `zenith`.
+    """Direction of the planet's magnetic field in the world, a unit vector; arguments as in `zenith`.
 
     That of a dipole whose axis is inclined to the orbit's plane (Wertz, Spacecraft Attitude Determination and Control,
     1978, app. H): 3 (m·u) u − m.

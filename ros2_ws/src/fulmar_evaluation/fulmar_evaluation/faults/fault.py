@@ -40,7 +40,7 @@ class FaultResult:
     """One line of the report."""
 
     name: str
-    detected_by: str  # as of `Outcome`
+    detected_by: str  # as in `Outcome`
     reaction: str
     time_to_safe_s: float | None
     limit_s: float | None
@@ -106,7 +106,7 @@ def went_on(
         detected_by: Who said it; empty if nobody did.
         reaction: What was said.
         correct: Whether that is what had to be said.
-        recorder_away: As of `Outcome`.
+        recorder_away: As in `Outcome`.
         recorder_again: Same.
     """
     statuses = live.observer.statuses_since(since_s - WORDS_S)  # with one from before, to compare with
@@ -156,7 +156,7 @@ class Fault:
 def killed_and_stopped(
     do: Callable[..., Outcome], killed: str, stopped: str, **more: Any
 ) -> tuple[Fault, Fault]:
-    """Two faults that send SIGKILL or SIGSTOP to a process, by their names; `more` as of `Fault`."""
+    """Two faults that send SIGKILL or SIGSTOP to a process, by their names; `more` as in `Fault`."""
     return (
         Fault(partial(do, number=signal.SIGKILL), called=killed, **more),
         Fault(partial(do, number=signal.SIGSTOP), called=stopped, **more),

@@ -48,7 +48,7 @@ class WrittenPlan:
 def command_of(launcher: str, plan: RunPlan, folder: Path) -> list[str]:
     """Command line of a launcher of a plan, which is written into a folder."""
     mission = plan.mission
-    assert mission is not None  # as of `completed`
+    assert mission is not None  # as in `completed`
     rows = np.asarray(mission.targets).tolist(), np.asarray(mission.obstacles).tolist()
     path = folder / "plan.json"
     path.write_text(json.dumps(asdict(WrittenPlan(replace(plan, mission=None), *rows))), encoding="utf-8")

@@ -164,7 +164,7 @@ class LiveSystem:
         """As `fulmar goals` gives one to a system that is up."""
         wire, form = GOAL_WIRES[load_task(self.plan.task).goal_topic], self.robot.state_type
         now_ns = time.time_ns() if self.plan.hardware else SIMULATION_START_NS
-        assert self.plan.mission is not None  # as of `completed`
+        assert self.plan.mission is not None  # as in `completed`
         message = goal_message(self.plan.mission, wire.name, now_ns, self.plan.frames, form=form)
         publisher = self.bystander.create_publisher(TYPES[wire.name], wire.name, publisher_qos(wire))
         wait_for(lambda: publisher.get_subscription_count() > 0, MATCH_S)
@@ -213,7 +213,7 @@ class LiveSystem:
         For faults whose very next tick may be safe. The time is at most two ticks ago.
 
         Raises:
-            NothingShown: As of `until_it_moves`.
+            NothingShown: As in `until_it_moves`.
         """
         since_s = self.until_it_moves()
         if not wait_for(lambda: any(moves for _, moves in self.observer.applied_since(since_s)), RECORD_S):
@@ -311,7 +311,7 @@ def live_system(
 
 
 def _intercepted(plan: RunPlan, about: FaultEnvironment) -> tuple[tuple[str, str, str], ...]:
-    """Outputs of nodes that the injectors pass on, as of `RunPlan.intercepted`."""
+    """Outputs of nodes that the injectors pass on, as in `RunPlan.intercepted`."""
     commands = command_wire(load_robot(plan.robot))
     wires = [about.intercepted] if about.intercepted is not None else []
     wires += [commands] if about.answers_pass else []

@@ -33,7 +33,7 @@ class BoatModel(PushedModel):
 
     def __init__(self, robot: Robot, propellers: Propellers) -> None:
         """Prepare for the nominal robot; its thrust curve, slew and added mass are taken for true."""
-        assert robot.hydrodynamics is not None  # as of `by_kind.MODELS`
+        assert robot.hydrodynamics is not None  # as in `by_kind.MODELS`
         self._robot, self._propellers, self._water = robot, propellers, robot.hydrodynamics
         unknowns = [
             Unknown("mass", robot.body.mass, "kg"),

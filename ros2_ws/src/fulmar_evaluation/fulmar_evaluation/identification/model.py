@@ -75,7 +75,7 @@ class Model(Protocol):
             windows: Their commands and times.
 
         Returns:
-            Shape (steps + 1, channels, copies, windows), as of `drives.Drive.pose`.
+            Shape (steps + 1, channels, copies, windows), as in `drives.Drive.pose`.
         """
         ...
 

@@ -56,15 +56,15 @@ REASONING_S = 2.0  # for observation and action, which come after the command
 DEPTH = 50
 
 
-def without_repeats(course: ControlSteps) -> ControlSteps:
-    """The same course with each measurement once: in lock step a node answers one only once."""
-    kept = np.concatenate(([True], np.diff(course.stamp_ns) != 0))
+def without_repeats(record: ControlSteps) -> ControlSteps:
+    """The same record with each measurement once: in lock step a node answers one only once."""
+    kept = np.concatenate(([True], np.diff(record.stamp_ns) != 0))
     rows = ("stamp_ns", "log_ns", "observations", "actions", "commands", "acted", "sample")
-    return replace(course, **{name: getattr(course, name)[kept] for name in rows})
+    return replace(record, **{name: getattr(record, name)[kept] for name in rows})
 
 
 def rerun_through_node(
-    bag: Bag, course: ControlSteps, controller: str, policy: str, odometry: str | None = None
+    bag: Bag, record: ControlSteps, controller: str, policy: str, odometry: str | None = None
 ) -> tuple[Answers, str | None]:
     """Feed a recorded run to a controller node of its own, in a ROS domain of its own.
 
@@ -73,10 +73,10 @@ def rerun_through_node(
 
     Args:
         bag: Where the messages themselves are.
-        course: Of that bag, from `without_repeats`.
+        record: Of that bag, from `without_repeats`.
         controller: Name of the controller.
         policy: Folder of a bundle; empty where there is none.
-        odometry: Topic that the course is made of, where it is not the robot's.
+        odometry: Topic that the record is made of, where it is not the robot's.
 
     Returns:
         Its answers and the SHA-256 that it reports.
@@ -85,33 +85,33 @@ def rerun_through_node(
         BagError: The bag lacks odometry that was answered, or its run cannot be led from outside.
         RunFailed: The node refuses to start, ends, or does not answer.
     """
-    missing = int(np.sum(course.sample == ABSENT))
+    missing = int(np.sum(record.sample == ABSENT))
     if missing:
         raise BagError(
             f"{bag.path}: lacks the odometry of {missing} steps, which a node must have. Use --through direct."
         )
-    if not course.own:
+    if not record.own:
         raise BagError(
             f"{bag.path}: others recorded it, and a node takes odometry in its own frames only. Use --through direct."
         )
-    if any(goal.index == ABSENT for goal in course.goals):
+    if any(goal.index == ABSENT for goal in record.goals):
         raise BagError("a node receives the recorded goals, and takes no --goal. Use --through direct.")
-    if course.presses or course.settings.estop:
+    if record.presses or record.settings.estop:
         raise BagError(
             f"{bag.path}: its e-stop goes by the clock on the wall, not by steps. Use --through direct."
         )
     if len(bag.of(GOAL_POSES)):
         raise BagError(f"{bag.path}: has goals on {GOAL_POSES.name}. Use --through direct.")
-    if course.changes:
+    if record.changes:
         raise BagError(f"{bag.path}: its policy was changed on the way. Use --through direct.")
-    settings = course.settings
+    settings = record.settings
     plan = RunPlan(
-        robot=course.robot.name,
-        task=course.task.name,
+        robot=record.robot.name,
+        task=record.task.name,
         controller=controller,
         backend="mock",
         name=bag.name,
-        control_hz=course.settings.control_rate(course.robot),
+        control_hz=record.settings.control_rate(record.robot),
         policy=os.path.abspath(policy) if policy else "",
         lockstep=True,
         goals="streamed" if settings.goals_streamed else "",
@@ -123,7 +123,7 @@ def rerun_through_node(
         group = ProcessGroup(environment)
         try:
             group.start(system_rows(plan)["controller"])
-            return _exchange(_raw_messages(bag, course, odometry), course, plan.namespace, group)
+            return _exchange(_raw_messages(bag, record, odometry), record, plan.namespace, group)
         finally:
             group.stop_all()
 
@@ -155,19 +155,19 @@ class _Received:
 
 
 def _exchange(
-    raw: dict[str, list[bytes]], course: ControlSteps, namespace: str, group: ProcessGroup
+    raw: dict[str, list[bytes]], record: ControlSteps, namespace: str, group: ProcessGroup
 ) -> tuple[Answers, str | None]:
     init_ros()
     try:
         node = rclpy.create_node("plant", namespace=namespace)
         received = _Received()
-        wires = _Wires(node, course, received)
+        wires = _Wires(node, record, received)
 
         def fail(error: Exception) -> None:
             received.error = error
 
         with spinning(node, fail):
-            return _feed(raw, course, group, wires, received)
+            return _feed(raw, record, group, wires, received)
     finally:
         rclpy.try_shutdown()
 
@@ -175,19 +175,19 @@ def _exchange(
 class _Wires:
     """Our endpoints: those of a plant and of an operator."""
 
-    def __init__(self, node: Node, course: ControlSteps, received: _Received) -> None:
+    def __init__(self, node: Node, record: ControlSteps, received: _Received) -> None:
         self._node, self._received = node, received
-        goal = GOAL_WIRES[course.task.goal_topic]
+        goal = GOAL_WIRES[record.task.goal_topic]
         self.odometry = node.create_publisher(Odometry, ODOMETRY.name, publisher_qos(ODOMETRY))
         self.goal = node.create_publisher(TYPES[goal.name], goal.name, publisher_qos(goal))
         self.obstacles = node.create_publisher(MarkerArray, OBSTACLES.name, publisher_qos(OBSTACLES))
         self.things = {
             thing.wire.name: node.create_publisher(PoseStamped, thing.wire.name, publisher_qos(thing.wire))
-            for thing in course.task.things
+            for thing in record.task.things
         }
         self.bearing = node.create_publisher(Bool, AIR_BEARING.name, publisher_qos(AIR_BEARING))
         self.applied = node.create_publisher(JointState, ACTUATORS_STATE.name, publisher_qos(ACTUATORS_STATE))
-        wire = command_wire(course.robot)
+        wire = command_wire(record.robot)
         by_velocity = wire is VELOCITY_COMMAND
         self._subscribe(TwistStamped if by_velocity else JointState, wire, self._on_command)
         self._subscribe(JointState, OBSERVATION, self._on_observation)
@@ -236,7 +236,7 @@ class _Wires:
 
 
 def _feed(
-    raw: dict[str, list[bytes]], course: ControlSteps, group: ProcessGroup, wires: _Wires, received: _Received
+    raw: dict[str, list[bytes]], record: ControlSteps, group: ProcessGroup, wires: _Wires, received: _Received
 ) -> tuple[Answers, str | None]:
     def wait(condition: Callable[[], bool], limit_s: float, what: str) -> None:
         until = time.monotonic() + limit_s
@@ -252,21 +252,21 @@ def _feed(
 
     wait(lambda: wires.matched and bool(received.metadata), START_TIMEOUT_S, "did not get ready")
     time.sleep(SETTLE_S)
-    wires.bearing.publish(Bool(data=not course.bearing or bool(course.bearing[0].value)))
-    every = {name: getattr(course, name) for name in ("goals", "obstacles", "bearing")}
-    every |= {thing.wire.name: course.things[thing.name] for thing in course.task.things}
-    messages = {name: course.before(each) for name, each in every.items()}
+    wires.bearing.publish(Bool(data=not record.bearing or bool(record.bearing[0].value)))
+    every = {name: getattr(record, name) for name in ("goals", "obstacles", "bearing")}
+    every |= {thing.wire.name: record.things[thing.name] for thing in record.task.things}
+    messages = {name: record.before(each) for name, each in every.items()}
     applied_at = np.searchsorted(
-        course.applied.stamp_ns, course.stamp_ns
+        record.applied.stamp_ns, record.stamp_ns
     )  # the first state of each step or after it
-    count, width = len(course), len(course.robot.actuators.names)
+    count, width = len(record), len(record.robot.actuators.names)
     actions, commands = np.full((count, width), np.nan), np.full((count, width), np.nan)
     shown: list[np.ndarray | None] = [None] * count
     acted = np.zeros(count, dtype=bool)
     for step in range(count):
-        stamp = int(course.stamp_ns[step])
-        _publish(step, messages, raw, wires, wait, received, streamed=course.settings.goals_streamed)
-        data = raw["odometry"][int(course.sample[step])]
+        stamp = int(record.stamp_ns[step])
+        _publish(step, messages, raw, wires, wait, received, streamed=record.settings.goals_streamed)
+        data = raw["odometry"][int(record.sample[step])]
         answered = _answered(received, stamp)
         until = time.monotonic() + ANSWER_TIMEOUT_S
         while not answered:
@@ -279,11 +279,11 @@ def _feed(
                 answered = received.changed.wait_for(received.command_to(stamp), RESEND_S)
             if not answered and group.ended() is not None:
                 wait(lambda: False, 0.0, "ended")
-        expects = bool(course.acted[step])
+        expects = bool(record.acted[step])
         with received.changed:
             both = received.changed.wait_for(received.reasons_for(stamp), REASONING_S if expects else 0.0)
         commands[step] = received.commands[stamp]
-        _publish_applied(course, step, applied_at, commands[step], wires)
+        _publish_applied(record, step, applied_at, commands[step], wires)
         if both:
             acted[step] = True
             shown[step], actions[step] = received.observations[stamp], received.actions[stamp]
@@ -296,15 +296,15 @@ def _feed(
 
 
 def _publish_applied(
-    course: ControlSteps, step: int, applied_at: np.ndarray, answer: np.ndarray, wires: _Wires
+    record: ControlSteps, step: int, applied_at: np.ndarray, answer: np.ndarray, wires: _Wires
 ) -> None:
     """Publish what the actuators did from a step to the next as recorded; the answer where that is not known."""
-    write = VectorWriter(course.robot.actuators.names)
-    end = int(applied_at[step + 1]) if step + 1 < len(course) else len(course.applied)
+    write = VectorWriter(record.robot.actuators.names)
+    end = int(applied_at[step + 1]) if step + 1 < len(record) else len(record.applied)
     for index in range(int(applied_at[step]), end):
-        wires.applied.publish(write.write(course.applied.values[index], int(course.applied.stamp_ns[index])))
-    if not len(course.applied):
-        wires.applied.publish(write.write(answer, int(course.stamp_ns[step])))
+        wires.applied.publish(write.write(record.applied.values[index], int(record.applied.stamp_ns[index])))
+    if not len(record.applied):
+        wires.applied.publish(write.write(answer, int(record.stamp_ns[step])))
 
 
 def _answered(received: _Received, stamp: int) -> bool:
@@ -312,13 +312,13 @@ def _answered(received: _Received, stamp: int) -> bool:
         return stamp in received.commands
 
 
-def _raw_messages(bag: Bag, course: ControlSteps, odometry: str | None) -> dict[str, list[bytes]]:
+def _raw_messages(bag: Bag, record: ControlSteps, odometry: str | None) -> dict[str, list[bytes]]:
     return {
         "odometry": bag.odometry(odometry).data,
-        "goals": bag.of(GOAL_WIRES[course.task.goal_topic]).data,
+        "goals": bag.of(GOAL_WIRES[record.task.goal_topic]).data,
         "obstacles": bag.of(OBSTACLES).data,
         "bearing": bag.of(AIR_BEARING).data,
-        **{thing.wire.name: bag.of(thing.wire).data for thing in course.task.things},
+        **{thing.wire.name: bag.of(thing.wire).data for thing in record.task.things},
     }
 
 

@@ -183,8 +183,8 @@ def check_reference(path: Path) -> list[Field]:
     from policy_server.controllers import shipped_policy
 
     bag = open_bag(path)
-    course = control_steps_of(bag)
+    record = control_steps_of(bag)
     name = str((bag.info or {}).get("controller"))
-    folder = shipped_policy(course.robot.name, course.task.name) if name == "policy" else None
-    answers, _ = answers_of(course, name, str(folder or ""), "odometry")
-    return compare_answers(course, answers, TOLERANCES)
+    folder = shipped_policy(record.robot.name, record.task.name) if name == "policy" else None
+    answers, _ = answers_of(record, name, str(folder or ""), "odometry")
+    return compare_answers(record, answers, TOLERANCES)

@@ -10,12 +10,12 @@ from policy_server.controllers import Choice, controller_entry, load_controller
 
 
 def answers_of(
-    course: ControlSteps, name: str, folder: str, source: str, *, follow: bool = False
+    record: ControlSteps, name: str, folder: str, source: str, *, follow: bool = False
 ) -> tuple[Answers, str | None]:
     """Let a controller answer a recorded run, with the fallback that the run had.
 
     Args:
-        course: The run.
+        record: The run.
         name: Of the controller.
         folder: Of its bundle; empty where it has none.
         source: As `rerun` takes it.
@@ -27,17 +27,17 @@ def answers_of(
     Raises:
         FulmarError: It cannot be loaded, or as `rerun` says.
     """
-    hz = course.settings.control_rate(course.robot)
+    hz = record.settings.control_rate(record.robot)
 
     def load(bundle: str) -> Controller:
-        settings = course.settings
+        settings = record.settings
         choice = Choice(hz, bundle, excitation=settings.excitation, seed=settings.seed)
-        return load_controller(name, course.robot, course.task, choice)
+        return load_controller(name, record.robot, record.task, choice)
 
-    law, fallback = course.settings.fallback, None
+    law, fallback = record.settings.fallback, None
     if controller_entry(name).runs_bundle and law:  # nothing else has one in the node
         law_of = None if law == "classical" else law
-        fallback = load_classical(course.robot, course.task, control_hz=hz, law=law_of)
+        fallback = load_classical(record.robot, record.task, control_hz=hz, law=law_of)
     loaded = load(folder)
-    answers = rerun(course, loaded, source=source, fallback=fallback, load=load if follow else None)
+    answers = rerun(record, loaded, source=source, fallback=fallback, load=load if follow else None)
     return answers, loaded.metadata().get("sha256")

@@ -34,7 +34,7 @@ NEVER_S = 1e9  # input timeout of a record, which has no steady clock [s]
 
 @dataclass(frozen=True)
 class Answers:
-    """What a controller said to each step of a course; NaN where it was not asked."""
+    """What a controller said to each step of a record; NaN where it was not asked."""
 
     observations: np.ndarray  # (n, k) what it was shown
     observation_names: tuple[str, ...]
@@ -45,7 +45,7 @@ class Answers:
 
 
 def rerun(
-    course: ControlSteps,
+    record: ControlSteps,
     controller: Controller,
     *,
     source: str = "observations",
@@ -55,7 +55,7 @@ def rerun(
     """Let a controller answer a recorded run, under the guards that the run had.
 
     Args:
-        course: The run.
+        record: The run.
         controller: Made anew; warmed up or not.
         source: `observations` shows what was recorded; `odometry` makes observations anew, with the node's gates. Laws
             read the measured state, which is that of the odometry either way.
@@ -71,21 +71,21 @@ def rerun(
         RunFailed: The controller raises and nobody takes over; with the step.
     """
     if source == "observations":
-        _check_observations(course, controller)
-        if isinstance(controller, Law) and not len(course.odometry):
+        _check_observations(record, controller)
+        if isinstance(controller, Law) and not len(record.odometry):
             raise BagError(f"the bag holds no odometry, which '{controller.name}' reads.")
-    elif not len(course.odometry):
+    elif not len(record.odometry):
         raise BagError("the bag holds no odometry to make observations from. Use --from observations.")
-    return _Rerun(course, controller, source, fallback, load).run()
+    return _Rerun(record, controller, source, fallback, load).run()
 
 
-def _check_observations(course: ControlSteps, controller: Controller) -> None:
-    if not course.observation_names:
+def _check_observations(record: ControlSteps, controller: Controller) -> None:
+    if not record.observation_names:
         raise BagError("the bag holds no observations. Use --from odometry to make them anew.")
-    names = Observer(course.robot, course.task).names
-    if course.observation_names != names:
-        gone = [name for name in course.observation_names if name not in names]
-        new = [name for name in names if name not in course.observation_names]
+    names = Observer(record.robot, record.task).names
+    if record.observation_names != names:
+        gone = [name for name in record.observation_names if name not in names]
+        new = [name for name in names if name not in record.observation_names]
         what = (
             f"lacks {', '.join(new)}"
             if new
@@ -103,53 +103,53 @@ class _Rerun:
 
     def __init__(
         self,
-        course: ControlSteps,
+        record: ControlSteps,
         controller: Controller,
         source: str,
         fallback: Controller | None,
         load: Callable[[str], Controller] | None,
     ) -> None:
-        self._course, self._source, self._load = course, source, load
-        self._robot, self._states = course.robot, _States(course)
+        self._record, self._source, self._load = record, source, load
+        self._robot, self._states = record.robot, _States(record)
         # Which steps were gated is known of lock step alone: in real time it hangs on when messages came.
-        self._gated = source == "odometry" and (course.settings.lockstep or not course.own)
-        self._estop = RecordedEstop(course.presses, required=self._gated and course.settings.estop)
-        self._history = AppliedHistory(course.settings.hold_ns(course.robot))
+        self._gated = source == "odometry" and (record.settings.lockstep or not record.own)
+        self._estop = RecordedEstop(record.presses, required=self._gated and record.settings.estop)
+        self._history = AppliedHistory(record.settings.hold_ns(record.robot))
         self._states_fed = 0  # states of the actuators that the history has taken
-        settings = replace(course.settings, input_timeout_s=NEVER_S)
+        settings = replace(record.settings, input_timeout_s=NEVER_S)
         self._guard = GuardedLoop(
-            course.robot,
-            course.task,
+            record.robot,
+            record.task,
             settings,
             ControllerSwitch(
                 Standby(controller, "", ""),
-                warm_up(fallback, course.robot, course.task) if fallback else None,
+                warm_up(fallback, record.robot, record.task) if fallback else None,
             ),
             self._estop,
-            gate=InputGate(course.robot.limits, frozen_after=0),
-            applied=self._history if len(course.applied) else None,
+            gate=InputGate(record.robot.limits, frozen_after=0),
+            applied=self._history if len(record.applied) else None,
         )
         names = [name for each in self._guard.switch.known for name in each.controller.readings]
-        self._readings = NewestReadings(course.robot, names, in_step=course.settings.lockstep)
-        self._to_read = {name: deque(course.readings(kind)) for name, kind in self._readings.kinds.items()}
+        self._readings = NewestReadings(record.robot, names, in_step=record.settings.lockstep)
+        self._to_read = {name: deque(record.readings(kind)) for name, kind in self._readings.kinds.items()}
         # Of a robot without a bearing, and in a bag that says nothing of it, there is none to wait for.
-        self._guard.take_bearing(not course.bearing or bool(course.bearing[0].value))
+        self._guard.take_bearing(not record.bearing or bool(record.bearing[0].value))
         self._guard.activate()
         self._fed = 0
 
     def run(self) -> Answers:
-        course, count, guard = self._course, len(self._course), self._guard
+        record, count, guard = self._record, len(self._record), self._guard
         actuators = len(self._robot.actuators.names)
         names = guard.loop.observer.names
         shown = np.full((count, len(names)), np.nan)
         safe = self._robot.actuators.safe_command
         actions, commands = np.full((count, actuators), np.nan), np.tile(safe, (count, 1)).astype(float)
         acted, reasons = np.zeros(count, dtype=bool), [""] * count
-        goals = course.before(course.goals)
-        bearing = course.before(course.bearing)
-        obstacles = course.before(course.obstacles)
-        things = {name: course.before(poses) for name, poses in course.things.items()}
-        changes = course.before(course.changes) if self._load else {}
+        goals = record.before(record.goals)
+        bearing = record.before(record.bearing)
+        obstacles = record.before(record.obstacles)
+        things = {name: record.before(poses) for name, poses in record.things.items()}
+        changes = record.before(record.changes) if self._load else {}
         guard.loop.controller.reset()
         for step in range(count):
             for message in obstacles.get(step, ()):
@@ -175,26 +175,26 @@ class _Rerun:
                     if done.action.shape == done.command.shape:
                         actions[step] = done.action[0]
                     guard.note(done.refusal)
-            recorded = course.commands[step]
+            recorded = record.commands[step]
             if not np.isnan(recorded).any():
                 guard.loop.previous = recorded[None]
-        if not course.own and guard.mission.lacking:  # in a bag of our own, it belongs to the run
+        if not record.own and guard.mission.lacking:  # in a bag of our own, it belongs to the run
             raise self._goalless()
         return Answers(shown, names, actions, commands, acted, tuple(reasons))
 
     def _inputs(self, step: int) -> tuple[str, Inputs | None]:
         """Why the controller is not asked at a step, and else what it acts on."""
-        course, guard = self._course, self._guard
+        record, guard = self._record, self._guard
         log_ns, stamp, recorded = (
-            int(course.log_ns[step]),
-            int(course.stamp_ns[step]),
-            bool(course.acted[step]),
+            int(record.log_ns[step]),
+            int(record.stamp_ns[step]),
+            bool(record.acted[step]),
         )
         self._feed_odometry(step)
         self._feed_applied(stamp)
         self._feed_readings(stamp, log_ns)
         self._estop.recorded = recorded
-        sample = int(course.sample[step])
+        sample = int(record.sample[step])
         state = self._states[sample] if sample != ABSENT else None
         measurement = None if state is None else Measurement(stamp, "odom", "base_link", state)
         if self._gated:
@@ -212,7 +212,7 @@ class _Rerun:
 
     def _inputs_as_recorded(self, step: int, measurement: Measurement | None) -> Inputs:
         """What a controller acts on that was asked in the record, whatever its guards would say now."""
-        loop, stamp = self._guard.loop, int(self._course.stamp_ns[step])
+        loop, stamp = self._guard.loop, int(self._record.stamp_ns[step])
         if measurement is not None and loop.goal is not None:
             inputs = self._guard.observe(measurement)
         elif self._source == "odometry":
@@ -221,28 +221,28 @@ class _Rerun:
             inputs = unknown_inputs(loop, stamp)
         if self._source == "observations":
             inputs = replace(
-                inputs, observation=np.asarray(self._course.observations[step], dtype=float)[None]
+                inputs, observation=np.asarray(self._record.observations[step], dtype=float)[None]
             )
         return inputs
 
     def _feed_odometry(self, step: int) -> None:
         """Take all odometry up to that of a step, as the node's subscription does."""
-        course, last = self._course, int(self._course.sample[step])
+        record, last = self._record, int(self._record.sample[step])
         while self._fed <= last:
             index = self._fed
             self._fed += 1
-            frame, child = course.odometry.frame[index], course.odometry.child_frame[index]
-            if not course.own:  # others name their frames as they please
+            frame, child = record.odometry.frame[index], record.odometry.child_frame[index]
+            if not record.own:  # others name their frames as they please
                 frame, child = "odom", "base_link"
-            stamp = int(course.odometry.stamp_ns[index])
-            if course.settings.lockstep and index and stamp == int(course.odometry.stamp_ns[index - 1]):
+            stamp = int(record.odometry.stamp_ns[index])
+            if record.settings.lockstep and index and stamp == int(record.odometry.stamp_ns[index - 1]):
                 continue  # the plant asked again, and had the same answer
             measurement = Measurement(stamp, frame, child, self._states[index])
-            self._guard.take(measurement, int(course.log_ns[step]))
+            self._guard.take(measurement, int(record.log_ns[step]))
 
     def _feed_applied(self, stamp_ns: int) -> None:
         """Take all states of the actuators up to a measurement [ns]."""
-        states = self._course.applied
+        states = self._record.applied
         while self._states_fed < len(states) and states.stamp_ns[self._states_fed] < stamp_ns:
             index = self._states_fed
             self._states_fed += 1
@@ -250,7 +250,7 @@ class _Rerun:
 
     def _feed_readings(self, stamp_ns: int, log_ns: int) -> None:
         """Take what else was measured up to a step: in lock step it waited for that, in real time it had come [ns]."""
-        lockstep = self._course.settings.lockstep
+        lockstep = self._record.settings.lockstep
         for name, waiting in self._to_read.items():
             while waiting and (waiting[0].stamp_ns <= stamp_ns if lockstep else waiting[0].log_ns <= log_ns):
                 received = waiting.popleft()
@@ -258,7 +258,7 @@ class _Rerun:
         self._guard.readings = self._readings.at(stamp_ns)
 
     def _goalless(self) -> BagError:
-        what, task = self._guard.mission.lacking, self._course.task.name
+        what, task = self._guard.mission.lacking, self._record.task.name
         return BagError(f"the bag holds no {what} for '{task}'. Give --goal x,y,deg.")
 
     def _give_up(self, step: int, error: Exception) -> str:
@@ -276,7 +276,7 @@ class _Rerun:
         assert self._load is not None
         where = f"the run went on with the policy of {folder}"
         try:
-            found = warm_up(self._load(folder), self._robot, self._course.task)
+            found = warm_up(self._load(folder), self._robot, self._record.task)
         except FulmarError as error:
             raise BagError(f"{where}, which cannot be loaded: {error}") from error
         if found.sha256 != sha256:
@@ -287,8 +287,8 @@ class _Rerun:
 class _States:
     """The state of each odometry message, made when it is asked for."""
 
-    def __init__(self, course: ControlSteps) -> None:
-        seen = course.odometry
+    def __init__(self, record: ControlSteps) -> None:
+        seen = record.odometry
         self._pose, self._turn = seen.pose, seen.twist[:, 3:]
         # The arithmetic of `message_reader.measurement_of`, for all messages at once: equal to the last bit.
         self._velocity = rotate(seen.pose[:, 3:], seen.twist[:, :3])

@@ -90,7 +90,7 @@ def rerun_bag(
     began = time.monotonic()
     source = "odometry" if bag.info is None else request.source
     with knowing_what_it_carries(bag), calibrated_as(bag):
-        course = control_steps_of(
+        record = control_steps_of(
             bag,
             robot=request.robot,
             task=request.task,
@@ -98,27 +98,27 @@ def rerun_bag(
             control_hz=request.control_hz,
             odometry=request.odometry,
         )
-        warn(course.warnings)
-        name, folder = _chosen(bag, course, request, warn)
+        warn(record.warnings)
+        name, folder = _chosen(bag, record, request, warn)
         if request.through == "node":
             from fulmar_evaluation.rerun.live_node import rerun_through_node, without_repeats
 
-            course = without_repeats(course)
-            answers, sha256 = rerun_through_node(bag, course, name, folder, request.odometry)
+            record = without_repeats(record)
+            answers, sha256 = rerun_through_node(bag, record, name, folder, request.odometry)
         else:
             follow = request.policy is None and name == (bag.info or {}).get("controller")
-            if course.changes and not follow:
+            if record.changes and not follow:
                 warn(["the run changed its policy on the way; here one policy re-runs all of it"])
-            answers, sha256 = answers_of(course, name, folder, source, follow=follow)
-    fields = compare_answers(course, answers, tolerances)
+            answers, sha256 = answers_of(record, name, folder, source, follow=follow)
+    fields = compare_answers(record, answers, tolerances)
     first = first_difference(fields)
     recorded = [each.get("sha256") for each in controllers_of(bag)]
     if request.out is not None:
-        write_answers(course, answers, request.out)
-    compared = bool(fields) and course.answered
+        write_answers(record, answers, request.out)
+    compared = bool(fields) and record.answered
     return {
-        "robot": course.robot.name,
-        "task": course.task.name,
+        "robot": record.robot.name,
+        "task": record.task.name,
         "controller": name,
         "policy": folder or None,
         "sha256": sha256,
@@ -126,7 +126,7 @@ def rerun_bag(
         "recorded_sha256s": recorded,
         "from": source,
         "through": request.through,
-        "steps": len(course),
+        "steps": len(record),
         "asked": int(answers.acted.sum()),
         "not_asked": [vars(each) for each in pauses(answers)],
         "answers": None if request.out is None else str(request.out),
@@ -135,13 +135,13 @@ def rerun_bag(
         "first_difference": None if first is None else as_json([first])[0],
         "fields": as_json(fields),
         "sums": [vars(each) for each in sums(fields)],
-        "warnings": list(course.warnings),
+        "warnings": list(record.warnings),
         "elapsed_s": time.monotonic() - began,
     }
 
 
 def _chosen(
-    bag: Bag, course: ControlSteps, request: RerunRequest, warn: Callable[[Iterable[str]], None]
+    bag: Bag, record: ControlSteps, request: RerunRequest, warn: Callable[[Iterable[str]], None]
 ) -> tuple[str, str]:
     """Name of the controller, and folder of its bundle, empty where it has none."""
     policy = request.policy
@@ -164,10 +164,10 @@ def _chosen(
             )
         return name, ""
     recorded = policy_folder(bag)
-    folder = policy or recorded or shipped_policy(course.robot.name, course.task.name)
+    folder = policy or recorded or shipped_policy(record.robot.name, record.task.name)
     if folder is None:
         raise ConfigError(
-            f"no policy is shipped for '{course.robot.name}' and '{course.task.name}'. Give one: --policy DIR."
+            f"no policy is shipped for '{record.robot.name}' and '{record.task.name}'. Give one: --policy DIR."
         )
     named = (bag.info or {}).get("policy")
     if named and not policy and not recorded:

@@ -20,25 +20,25 @@ FIELDS = ("decision", "observation", "action", "command")
 NUMBER = re.compile(r"-?[0-9]+([.][0-9]+)?")
 
 
-def compare_answers(course: ControlSteps, answers: Answers, tolerances: Mapping[str, float]) -> list[Field]:
+def compare_answers(record: ControlSteps, answers: Answers, tolerances: Mapping[str, float]) -> list[Field]:
     """Compare every field that the bag has.
 
     Returns:
         `decision` (1: the controller was asked), `observation`, `action` (before limits) and `command` (after them), as
         far as they were recorded.
     """
-    actuators = course.robot.actuators.names
-    kept = ~_lost(course)  # what the record has lost, cannot be compared
+    actuators = record.robot.actuators.names
+    kept = ~_lost(record)  # what the record has lost, cannot be compared
     parts: list[tuple[str, Sequence[str], np.ndarray, np.ndarray]] = []
-    if course.own:
-        parts.append(("decision", ("acted",), course.acted[:, None], answers.acted[:, None]))
-    if course.observation_names == answers.observation_names:
-        parts.append(("observation", course.observation_names, course.observations, answers.observations))
-    if np.isfinite(course.actions).any():
-        parts.append(("action", actuators, course.actions, answers.actions))
-    if np.isfinite(course.commands).any():
-        there = np.isnan(course.commands)
-        parts.append(("command", actuators, course.commands, np.where(there, np.nan, answers.commands)))
+    if record.own:
+        parts.append(("decision", ("acted",), record.acted[:, None], answers.acted[:, None]))
+    if record.observation_names == answers.observation_names:
+        parts.append(("observation", record.observation_names, record.observations, answers.observations))
+    if np.isfinite(record.actions).any():
+        parts.append(("action", actuators, record.actions, answers.actions))
+    if np.isfinite(record.commands).any():
+        there = np.isnan(record.commands)
+        parts.append(("command", actuators, record.commands, np.where(there, np.nan, answers.commands)))
     return [
         line
         for field, names, recorded, found in parts
@@ -47,18 +47,18 @@ def compare_answers(course: ControlSteps, answers: Answers, tolerances: Mapping[
             names,
             recorded.astype(float),
             found.astype(float) if field == "command" else np.where(kept[:, None], found, recorded),
-            course.stamp_ns,
+            record.stamp_ns,
             tolerances[field],
         )
     ]
 
 
-def _lost(course: ControlSteps) -> np.ndarray:
+def _lost(record: ControlSteps) -> np.ndarray:
     """Steps whose observation is not in the bag, though a command that is not the safe one shows that there was one."""
-    driven = np.isfinite(course.commands).all(axis=1) & (
-        course.commands != course.robot.actuators.safe_command
+    driven = np.isfinite(record.commands).all(axis=1) & (
+        record.commands != record.robot.actuators.safe_command
     ).any(axis=1)
-    return ~course.acted & driven
+    return ~record.acted & driven
 
 
 @dataclass(frozen=True)
@@ -117,25 +117,25 @@ def check_answers_file(path: Path) -> None:
         raise ConfigError(f"--out {path}: answers are written as .csv or .npz. Give such a name.")
 
 
-def write_answers(course: ControlSteps, answers: Answers, path: Path) -> None:
+def write_answers(record: ControlSteps, answers: Answers, path: Path) -> None:
     """Write one row for each step: stamp [ns], whether the controller was asked and why not, and its vectors.
 
     Args:
-        course: The run.
+        record: The run.
         answers: To it.
         path: A `.csv` table with one column for each number, or `.npz` arrays; its folder is made.
 
     Raises:
         OSError: It cannot be written.
     """
-    names = course.robot.actuators.names
+    names = record.robot.actuators.names
     vectors = {
         "observation": (answers.observation_names, answers.observations),
         "action": (names, answers.actions),
         "command": (names, answers.commands),
     }
     columns: dict[str, Any] = {
-        "stamp_ns": course.stamp_ns,
+        "stamp_ns": record.stamp_ns,
         "asked": answers.acted,
         "reason": np.array(answers.reasons),
     }
@@ -152,5 +152,5 @@ def write_answers(course: ControlSteps, answers: Answers, path: Path) -> None:
         )
         tables = np.concatenate([values for _, values in vectors.values()], axis=1)
         for step, row in enumerate(tables.tolist()):
-            first_columns = (int(course.stamp_ns[step]), int(answers.acted[step]), answers.reasons[step])
+            first_columns = (int(record.stamp_ns[step]), int(answers.acted[step]), answers.reasons[step])
             table.writerow([*first_columns, *("" if np.isnan(value) else value for value in row)])

@@ -92,7 +92,7 @@ def _path(targets: np.ndarray, robot: Robot, *, turns: bool) -> list[Shape]:
 
 
 def geofence_shapes(targets: np.ndarray, done: int, robot: Robot) -> list[Shape]:
-    """How far the robot may be from its current target; nothing around velocities. Arguments as of `goal_shapes`."""
+    """How far the robot may be from its current target; nothing around velocities. Arguments as in `goal_shapes`."""
     if targets.shape[1] != POSE:
         return []
     center, radius = targets[done % len(targets), :3].tolist(), robot.limits.geofence
@@ -105,7 +105,7 @@ def area_shapes(area: Sequence[float]) -> list[Shape]:
     """The area that the robot must not leave: a rectangle on the floor, or a box; nothing where there is none.
 
     Args:
-        area: As of `Guards.area` [m].
+        area: As in `Guards.area` [m].
     """
     if tuple(area) == NO_AREA:
         return []

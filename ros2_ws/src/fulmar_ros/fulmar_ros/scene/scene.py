@@ -46,7 +46,7 @@ class Scene:
         self._gone: set[Key] = set()
 
     def give_goal(self, targets: np.ndarray, stamp_ns: int) -> None:
-        """Take a goal that was received, as of `goal_shapes`."""
+        """Take a goal that was received, as in `goal_shapes`."""
         self._goals.append((stamp_ns, targets))
 
     def give_status(self, values: Mapping[str, str]) -> None:
@@ -54,7 +54,7 @@ class Scene:
         self._status = values
 
     def give_obstacles(self, obstacles: np.ndarray) -> None:
-        """Take obstacles as of `obstacle_shapes`."""
+        """Take obstacles as in `obstacle_shapes`."""
         self._obstacles = obstacles
 
     def give_applied(self, names: Sequence[str], effort: Sequence[float]) -> None:

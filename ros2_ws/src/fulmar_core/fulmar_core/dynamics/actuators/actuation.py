@@ -149,7 +149,7 @@ class ActuationState(MutableState):
         return target
 
     def _target(self, dt: float, *, latest_s: float) -> Array:
-        """What actuators move to while time passes, shape (n, worlds); arguments as of `advance`."""
+        """What actuators move to while time passes, shape (n, worlds); arguments as in `advance`."""
         commanded = self._commanded(dt, latest_s=latest_s)
         if self._sticking is None:
             return commanded
@@ -158,7 +158,7 @@ class ActuationState(MutableState):
         return reached
 
     def _commanded(self, dt: float, *, latest_s: float) -> Array:
-        """The command that acts while time passes, shape (n, worlds); arguments as of `advance`."""
+        """The command that acts while time passes, shape (n, worlds); arguments as in `advance`."""
         if self._line.shape[0]:
             return self._from_line(dt)
         target = self._wanted

@@ -30,7 +30,7 @@ class FlightActuation(ActuationState):
     MUTABLE = (*ActuationState.MUTABLE, "servo_rates", "gusts", "gust_steps")
 
     def __init__(self, actuators: ControlSurfaces, safe: Array, **kwargs: Any) -> None:
-        """Begin in the safe state, in still air; arguments as of `ActuationState`, and nothing opens late."""
+        """Begin in the safe state, in still air; arguments as in `ActuationState`, and nothing opens late."""
         super().__init__(actuators, safe, **{**kwargs, "opens_late": False})
         self._actuators, self._count = actuators, actuators.positions
         xp, worlds = array_namespace(safe), safe.shape[1]
@@ -44,7 +44,7 @@ class FlightActuation(ActuationState):
         self._servo: dict[float, np.ndarray] = {}
 
     def reset(self, which: Array, safe: Array) -> None:
-        """Bring some worlds back to the safe state; arguments as of `ActuationState.reset`."""
+        """Bring some worlds back to the safe state; arguments as in `ActuationState.reset`."""
         super().reset(which, safe)
         xp = array_namespace(safe)
         for name in ("servo_rates", "gust_steps"):
@@ -89,7 +89,7 @@ class FlightActuation(ActuationState):
     def blow(
         self, keys: Array, wind: Array, *, airspeed: Array, height: Array, span: float, dt: float
     ) -> Gust:
-        """Let the air move past for a time step; arguments and result as of `turbulence.gust_step`."""
+        """Let the air move past for a time step; arguments and result as in `turbulence.gust_step`."""
         self.gusts, gust = gust_step(
             self.gusts, keys, self.gust_steps, airspeed=airspeed, height=height, wind=wind, span=span, dt=dt
         )

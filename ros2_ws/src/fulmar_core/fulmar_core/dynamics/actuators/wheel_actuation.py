@@ -23,7 +23,7 @@ class WheelActuation(ActuationState):
     MUTABLE = (*ActuationState.MUTABLE, "speeds")
 
     def __init__(self, actuators: ReactionWheels, safe: Array, **kwargs: Any) -> None:
-        """Begin with wheels at rest; arguments as of `ActuationState`."""
+        """Begin with wheels at rest; arguments as in `ActuationState`."""
         super().__init__(actuators, safe, **kwargs)
         self._names = actuators.wheel_names
         self.speeds: Array = 0.0 * self.applied[: actuators.count]
@@ -38,7 +38,7 @@ class WheelActuation(ActuationState):
         return {NAME: WheelSpeeds(self._names, self.readings[NAME][0])}
 
     def reset(self, which: Array, safe: Array) -> None:
-        """Bring some worlds back to the safe state, wheels at rest; arguments as of `ActuationState.reset`."""
+        """Bring some worlds back to the safe state, wheels at rest; arguments as in `ActuationState.reset`."""
         super().reset(which, safe)
         speeds = array_namespace(safe).asarray(self.speeds, copy=True)
         speeds[:, which] = 0.0

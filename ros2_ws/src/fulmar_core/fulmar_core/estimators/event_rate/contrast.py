@@ -148,7 +148,7 @@ class _Camera:
         return self._information(weights, times), self._slopes(weights, times, off).sum(axis=0)
 
     def scores(self, motion: np.ndarray, weights: np.ndarray, scale: float) -> tuple[np.ndarray, np.ndarray]:
-        """Curvature of the contrast, and the sum of squared slopes of each star's, shapes as of `normal`."""
+        """Curvature of the contrast, and the sum of squared slopes of each star's, shapes as in `normal`."""
         times = self._off(self.times[: len(motion) // 3].T, weights).T
         off = self._off(self.carried(motion), weights)
         bent = weights * (

@@ -3,7 +3,7 @@
 Readings: `star_tracker` is the attitude of the body in the world, a quaternion x, y, z, w, with its covariance about
 the body's axes, shape (3, 3) [rad²]; `imu` an `ImuSample`; `wheels` a `WheelSpeeds`; `rate` a turn rate in the body,
 shape (3,) [rad/s], with its covariance (3, 3). The estimate is a `RigidBodyState` that stays at the origin; its
-covariance, shape (12, 12), is as of `SpatialMotionEstimator`, of which place and velocity are known.
+covariance, shape (12, 12), is as in `SpatialMotionEstimator`, of which place and velocity are known.
 
 A multiplicative extended Kalman filter (Markley and Crassidis, Fundamentals of Spacecraft Attitude Determination and
 Control, 2014, §6.2) whose turn rate is a state of its own: Euler's equation with the measured speeds of the wheels
@@ -96,7 +96,7 @@ class AttitudeEstimator:
             return f"reading '{name}' is not known here, only {', '.join(takers)}"
         if problem := self._times.problem(f"'{name}'", reading.stamp_ns):
             return problem
-        assert reading.stamp_ns is not None  # as of `problem`
+        assert reading.stamp_ns is not None  # as in `problem`
         return takers[name](reading, reading.stamp_ns) or None
 
     def estimate(self, stamp_ns: int | None = None) -> Estimate | None:

@@ -167,7 +167,7 @@ class ReactionWheels(Actuators):
         return xp.minimum(xp.maximum(wanted, least), most)
 
     def friction_torque(self, speed: Array) -> Array:
-        """Torque of the bearings on each wheel, against its motion [N·m]; `speed` as of `motor_torque`."""
+        """Torque of the bearings on each wheel, against its motion [N·m]; `speed` as in `motor_torque`."""
         return -self.viscous * speed - self.coulomb * array_namespace(speed).tanh(speed / SLOW)
 
     @property

@@ -117,7 +117,7 @@ class Flow:
 
     speed: Array  # [m/s]
     turned: tuple[Array, Array, Array, Array]  # cosine and sine of α and of β
-    factors: dict[str, Array]  # as of `Coefficients.at`
+    factors: dict[str, Array]  # as in `Coefficients.at`
 
 
 def flow_past(velocity: Vector, rate: Vector, surfaces: Mapping[str, Array], airframe: Airframe) -> Flow:
@@ -150,7 +150,7 @@ def alpha_rate(velocity: Vector, acceleration: Vector) -> Array:
     """How fast the angle of attack changes, shape (...,) [rad/s].
 
     Args:
-        velocity: As of `flow_past`.
+        velocity: As in `flow_past`.
         acceleration: Its change in the body's own axes [m/s²].
     """
     u, _, w = velocity

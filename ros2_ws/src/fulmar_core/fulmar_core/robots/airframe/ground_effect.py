@@ -49,7 +49,7 @@ def lift_ratio(height: Array, aspect_ratio: float, taper: float) -> Array:
 
 
 def induced_drag_ratio(height: Array, aspect_ratio: float, taper: float) -> Array:
-    """C_Di / C_L² near the ground over that in free air, shape (...,) [-]; arguments as of `lift_ratio`."""
+    """C_Di / C_L² near the ground over that in free air, shape (...,) [-]; arguments as in `lift_ratio`."""
     xp = array_namespace(height)
     delta = 1.0 - 0.157 * (taper**0.775 - 0.373) * (aspect_ratio**0.417 - 1.27)
     log = xp.log(height)

@@ -56,7 +56,7 @@ class PistonEngine:
             raise ValueError("thrust, power and efficiency must be greater than 0.")
 
     def thrust_at(self, throttle: Array, airspeed: Array, density: Array) -> Array:
-        """Thrust, shape (...,) [N]; arguments as of `ElectricMotor.thrust_at`."""
+        """Thrust, shape (...,) [N]; arguments as in `ElectricMotor.thrust_at`."""
         return clip(
             throttle * (self.power * self.efficiency) / clip(airspeed, SLOWEST, None), 0.0, self.thrust
         )

@@ -32,6 +32,6 @@ class SimulatedSensors:
             sensor.reset(seed, number)
 
     def measure(self, truth: Truth, time_s: float) -> dict[str, Reading]:
-        """New readings by name; arguments as of `SimulatedSensor.measure`."""
+        """New readings by name; arguments as in `SimulatedSensor.measure`."""
         found = {name: sensor.measure(truth, time_s) for name, sensor in self._sensors.items()}
         return {name: reading for name, reading in found.items() if reading is not None}

@@ -45,7 +45,7 @@ def few(**turns: float) -> None:
 def along_curve(
     curve: Callable[[np.ndarray], np.ndarray], count: int, *, closed: bool, centre: Point
 ) -> np.ndarray:
-    """Points as of `spread_along`, with the origin at a centre [m]."""
+    """Points as in `spread_along`, with the origin at a centre [m]."""
     return np.asarray(spread_along(curve, count, closed=closed) + np.array(centre))
 
 
