@@ -15,33 +15,14 @@ from fulmar_core.states.spatial import SpatialState
 from hardware_drivers.settings import (
     Driver,
     GpioValves,
-    KingfisherNmea,
-    Kobuki,
-    MavlinkBoat,
     OwnDriver,
     ThrustTopic,
     ValveTopic,
     VelocityTopic,
-    XPlane,
 )
 from hardware_drivers.wiring import AS_NAMED
 
-NEEDS: dict[type, tuple[str, ...]] = {  # modules of the extra `hardware`
-    GpioValves: ("gpiod",),
-    Kobuki: ("serial",),
-    KingfisherNmea: ("serial",),
-    MavlinkBoat: ("pymavlink",),
-    XPlane: ("serial",),  # beside serial ports, `ports` has those of UDP
-}
 TOPIC_DRIVERS = (ValveTopic, VelocityTopic, ThrustTopic)
-SEEN_FROM_OUTSIDE = (GpioValves, ValveTopic)  # drivers of robots that only motion capture localises
-MEASURES = (Kobuki, KingfisherNmea, MavlinkBoat, XPlane)  # drivers whose device measures odometry
-FITS = {
-    "thrusters": (GpioValves, ValveTopic),
-    "differential_drive": (Kobuki, VelocityTopic),
-    "propellers": (KingfisherNmea, MavlinkBoat, ThrustTopic),
-    "control_surfaces": (XPlane,),
-}
 
 
 @dataclass(frozen=True)
@@ -55,7 +36,7 @@ class Hardware:
     @property
     def needs(self) -> tuple[str, ...]:
         """Modules that its driver imports, from the extra `hardware`."""
-        return NEEDS.get(type(self.driver), ())
+        return self.driver.needs
 
     @property
     def arms(self) -> bool:
@@ -70,25 +51,17 @@ class Hardware:
     @property
     def measures_odometry(self) -> bool:
         """Whether the device measures odometry; if not, motion capture or another node does."""
-        if isinstance(self.driver, OwnDriver):
-            return self.driver.odometry == "device"
-        return isinstance(self.driver, MEASURES)
+        return self.driver.measures
 
     @property
     def has_bearing(self) -> bool:
         """Whether the driver switches an air bearing, without which nothing may move."""
-        if isinstance(self.driver, OwnDriver):
-            return self.driver.air_bearing
-        if isinstance(self.driver, GpioValves):
-            return self.driver.bearing is not None
-        return isinstance(self.driver, ValveTopic)
+        return self.driver.has_bearing
 
     @property
     def seen_from_outside(self) -> bool:
         """Whether only motion capture localises the robot."""
-        if isinstance(self.driver, OwnDriver):
-            return self.driver.odometry == "motion_capture"
-        return isinstance(self.driver, SEEN_FROM_OUTSIDE)
+        return self.driver.seen_from_outside
 
 
 def hardware_path(name: str) -> Path:
@@ -112,7 +85,7 @@ def load_hardware(name: str) -> Hardware:
     actuators = robot.actuators
     if isinstance(hardware.driver, OwnDriver):
         hardware = replace(hardware, driver=_with_order(hardware.driver, actuators))
-    elif not isinstance(hardware.driver, FITS.get(actuators.kind, ())):
+    elif actuators.kind not in hardware.driver.fits:
         raise ConfigError(
             f"{path}: driver '{hardware.driver.kind}' cannot move '{hardware.robot}', which has {actuators.kind}."
         )

@@ -13,9 +13,6 @@ from hardware_drivers.gpio import FILE_CHIP, line_of
 from hardware_drivers.settings import (
     Driver,
     GpioValves,
-    KingfisherNmea,
-    Kobuki,
-    MavlinkBoat,
     OwnDriver,
     XPlane,
 )
@@ -45,8 +42,7 @@ def check_presence(driver: Driver, port: str = "") -> None:
         XPlaneLink(port or driver.port, within_s=CONNECT_S).close()
     elif isinstance(driver, OwnDriver) and "/gpiochip" in (port or driver.port):
         _check_chip(port or driver.port, ())
-    elif isinstance(driver, (Kobuki, KingfisherNmea, MavlinkBoat, OwnDriver)) and (port or driver.port):
-        address = port or driver.port
+    elif hasattr(driver, "port") and (address := port or driver.port):
         if address.startswith(TCP):
             _check_host(address)
         elif not address.startswith(UDP):

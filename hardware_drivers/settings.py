@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from fulmar_core.config.errors import ConfigError
 from fulmar_core.config.own_class import check_class_path
@@ -33,7 +33,58 @@ def check_order(order: tuple[int, ...], count: int) -> None:
         raise ValueError(f"'order' must hold each of 0 to {count - 1} once.")
 
 
-class _Wired:
+@dataclass(frozen=True)
+class OwnWatchdog:
+    """A watchdog below the driver."""
+
+    by: str  # whose it is
+    within_s: float  # after the last command or heartbeat [s]
+
+
+class DriverFacts:
+    """What is known of the devices of a driver, whatever their file says.
+
+    Attributes:
+        fits: Families of actuators that it can move.
+        needs: Modules of the extra `hardware` that it imports.
+        moves_on: What moves on where nothing stops the device, in capitals.
+        emulator: Device of `sim_nodes.emulator_node` that stands in for theirs; empty: none does.
+        instead: What a user does about that; empty: builds in a supply that closes without the driver.
+    """
+
+    fits: ClassVar[tuple[str, ...]] = ()
+    needs: ClassVar[tuple[str, ...]] = ()
+    moves_on: ClassVar[str] = "ACTUATORS"
+    emulator: ClassVar[str] = ""
+    instead: ClassVar[str] = ""
+
+    @property
+    def made_by(self) -> str:
+        """Module and class of the driver that talks to the device; empty: the driver node publishes messages."""
+        return ""
+
+    @property
+    def measures(self) -> bool:
+        """Whether the device measures odometry; if not, motion capture or another node does."""
+        return False
+
+    @property
+    def seen_from_outside(self) -> bool:
+        """Whether only motion capture localises the robot."""
+        return False
+
+    @property
+    def has_bearing(self) -> bool:
+        """Whether the driver switches an air bearing, without which nothing may move."""
+        return False
+
+    @property
+    def stopped_by(self) -> OwnWatchdog | None:
+        """The watchdog that stops the device when the driver dies; None if none is known."""
+        return None
+
+
+class _Wired(DriverFacts):
     """Settings with a wiring of two sides."""
 
     wiring: tuple[str, ...]
@@ -72,7 +123,7 @@ class Supply:
 
 
 @dataclass(frozen=True)
-class GpioValves:
+class GpioValves(DriverFacts):
     """Solenoid valves on lines of a GPIO chip, by libgpiod."""
 
     kind: Literal["gpio_valves"]
@@ -84,6 +135,12 @@ class GpioValves:
     min_on_s: float = 0.0  # an opened valve stays open so long, except when all must close [s]
     supply: Supply | None = None  # None: nothing shuts it off but a hand
 
+    fits = ("thrusters",)
+    emulator = "valves"
+    needs = ("gpiod",)
+    seen_from_outside = True
+    moves_on = "VALVES"  # the chip's pins keep them as they are
+
     def __post_init__(self) -> None:
         every = self.every_line
         if len(set(every)) != len(every):
@@ -93,6 +150,17 @@ class GpioValves:
             raise ValueError("min_on_s must be from 0 to 0.2 s.")
 
     @property
+    def made_by(self) -> str:
+        """See `DriverFacts`."""
+        name = "ValveDriver" if self.bearing is None else "ThrusterDriver"
+        return f"hardware_drivers.thruster_driver:{name}"
+
+    @property
+    def has_bearing(self) -> bool:
+        """See `DriverFacts`."""
+        return self.bearing is not None
+
+    @property
     def every_line(self) -> tuple[str, ...]:
         """Those of the valves, then those of the bearing and of the supply, if there are any."""
         others = [part.line for part in (self.bearing, self.supply) if part]
@@ -100,7 +168,7 @@ class GpioValves:
 
 
 @dataclass(frozen=True)
-class ValveTopic:
+class ValveTopic(DriverFacts):
     """A valve node of another stack: an array of zeros and ones, the bearing first."""
 
     kind: Literal["valve_topic"]
@@ -111,6 +179,12 @@ class ValveTopic:
     message: ValveMessage = "int16"
     bearing_on_at_start: bool = True
     linger_s: float = 1.0  # it carries the platform so long after the last valve has closed for good [s]
+
+    fits = ("thrusters",)
+    emulator = "valve_topic"
+    seen_from_outside = True
+    has_bearing = True
+    moves_on = "VALVES"  # the lab's node keeps them as they are
 
     def __post_init__(self) -> None:
         check_linger(self.linger_s)
@@ -127,6 +201,13 @@ class Kobuki(_Wired):
     silent_s: float = 0.3  # a base that reports nothing for so long is gone [s]
     wiring: tuple[str, ...] = AS_NAMED  # wheel that each channel turns, `-left` where backwards
 
+    fits = ("differential_drive",)
+    emulator = "kobuki"
+    made_by = "hardware_drivers.kobuki_driver:KobukiDriver"
+    needs = ("serial",)
+    measures = True
+    stopped_by = OwnWatchdog("the firmware of the base, without base control", 0.6)
+
 
 @dataclass(frozen=True)
 class VelocityTopic(_Wired):
@@ -137,6 +218,10 @@ class VelocityTopic(_Wired):
     stamped: bool
     wiring: tuple[str, ...] = AS_NAMED  # wheel that each channel turns, `-left` where backwards
 
+    fits = ("differential_drive",)
+    emulator = "velocity_topic"
+    stopped_by = OwnWatchdog("kobuki_node, without a velocity; another node may have no timeout", 0.6)
+
 
 @dataclass(frozen=True)
 class ThrustTopic(_Wired):
@@ -145,6 +230,10 @@ class ThrustTopic(_Wired):
     kind: Literal["thrust_topic"]
     topic: str
     wiring: tuple[str, ...] = AS_NAMED  # propeller that each channel turns, `-left` where backwards
+
+    fits = ("propellers",)
+    emulator = "thrust_topic"
+    moves_on = "PROPELLERS"  # RoboRAN's bridge to /action is not public
 
 
 @dataclass(frozen=True)
@@ -183,9 +272,16 @@ class KingfisherNmea(_Wired):
     silent_s: float = 1.0  # a boat that reports nothing for so long is gone [s]
     wiring: tuple[str, ...] = AS_NAMED  # propeller that each channel turns, `-left` where backwards
 
+    fits = ("propellers",)
+    emulator = "kingfisher"
+    made_by = "hardware_drivers.kingfisher_driver:KingfisherDriver"
+    needs = ("serial",)
+    measures = True
+    stopped_by = OwnWatchdog("the front seat of the boat, without $PYDIR", 0.5)
+
 
 @dataclass(frozen=True)
-class MavlinkBoat:
+class MavlinkBoat(DriverFacts):
     """A boat with ArduPilot and skid steering, by MAVLink."""
 
     kind: Literal["mavlink_boat"]
@@ -201,6 +297,13 @@ class MavlinkBoat:
     arm: bool = False  # whether the driver sets MANUAL, arms and overrides RC; else it only receives
     signing_key: str = ""  # file with the key of MAVLink 2's signatures; empty: nothing is signed
 
+    fits = ("propellers",)
+    emulator = "ardupilot"
+    made_by = "hardware_drivers.mavlink_driver:MavlinkDriver"
+    needs = ("pymavlink",)
+    measures = True
+    stopped_by = OwnWatchdog("ArduPilot, without heartbeats: FS_GCS_ENABLE 1, FS_TIMEOUT", 1.5)
+
     def __post_init__(self) -> None:
         check_wiring(self.wiring)
         place_of(self.port)
@@ -214,7 +317,7 @@ class MavlinkBoat:
 
 
 @dataclass(frozen=True)
-class XPlane:
+class XPlane(DriverFacts):
     """An aircraft in X-Plane, by the UDP protocol of the plugin XPlaneConnect."""
 
     kind: Literal["xplane"]
@@ -224,6 +327,14 @@ class XPlane:
     elevation: float = 0.0  # of z = 0, the water or the runway, above mean sea level [m]
     rate_hz: float = 250.0  # of questions at most; there is one for each frame of X-Plane
     silent_s: float = 0.5  # an X-Plane that sends nothing new and believable for so long is lost [s]
+
+    fits = ("control_surfaces",)
+    emulator = "xplane"
+    made_by = "hardware_drivers.xplane_driver:XPlaneDriver"
+    needs = ("serial",)  # beside serial ports, `ports` has those of UDP
+    measures = True
+    moves_on = "AIRCRAFT"
+    instead = "X-Plane flies on with the last commands; its key P pauses it"
 
     def __post_init__(self) -> None:
         if not self.port.startswith("udp://"):
@@ -237,7 +348,7 @@ class XPlane:
 
 
 @dataclass(frozen=True)
-class OwnDriver:
+class OwnDriver(DriverFacts):
     """A class of the user's own, by its dotted path; see `hardware_drivers.driver.DeviceDriver`."""
 
     kind: str  # mypackage.mymodule:MyDriver, found in the current folder, then on PYTHONPATH
@@ -265,6 +376,27 @@ class OwnDriver:
             raise ValueError("device_timeout_s must not be negative.")
         if self.baud <= 0:
             raise ValueError(f"baud = {self.baud} must be greater than 0.")
+
+    @property
+    def measures(self) -> bool:
+        """See `DriverFacts`."""
+        return self.odometry == "device"
+
+    @property
+    def seen_from_outside(self) -> bool:
+        """See `DriverFacts`."""
+        return self.odometry == "motion_capture"
+
+    @property
+    def has_bearing(self) -> bool:
+        """See `DriverFacts`."""
+        return self.air_bearing
+
+    @property
+    def stopped_by(self) -> OwnWatchdog | None:
+        """See `DriverFacts`."""
+        within_s = self.device_timeout_s
+        return OwnWatchdog("the device, says its hardware file", within_s) if within_s else None
 
 
 Driver = (

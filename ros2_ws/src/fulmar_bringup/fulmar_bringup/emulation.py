@@ -36,14 +36,15 @@ class Emulation:
 
 
 def check_emulated(driver: Driver) -> None:
-    """Raise ConfigError for a driver of the user's own, whose device has no emulator, and for a boat that signs."""
+    """Raise ConfigError for a driver whose device has no emulator, such as a user's own, and for a boat that signs."""
     if isinstance(driver, MavlinkBoat) and driver.signing_key:
         raise ConfigError(
             "the emulated boat has no key: leave 'signing_key' out of the hardware file, or --emulate."
         )
-    if isinstance(driver, OwnDriver):
+    if not driver.emulator:
+        whose = "your own driver" if isinstance(driver, OwnDriver) else "driver"
         raise ConfigError(
-            f"no emulator exists for the device of your own driver '{driver.kind}'. Leave --emulate out, and let "
+            f"no emulator exists for the device of {whose} '{driver.kind}'. Leave --emulate out, and let "
             "`port:` of the hardware file name an emulator of your own, such as a pseudo-terminal."
         )
 
@@ -56,15 +57,14 @@ def emulation_of(hardware: Hardware, folder: Path) -> Emulation:
     """
     driver = hardware.driver
     check_emulated(driver)
-    assert not isinstance(driver, OwnDriver)
     if isinstance(driver, ValveTopic):
         takes: Parameters = {"order": list(driver.order), "message": driver.message}
-        return Emulation(driver.kind, driver.topic, "", takes)
+        return Emulation(driver.emulator, driver.topic, "", takes)
     if isinstance(driver, VelocityTopic):
         sides: Parameters = {"stamped": driver.stamped, "sides": list(driver.wiring)}
-        return Emulation(driver.kind, driver.topic, "", sides)
+        return Emulation(driver.emulator, driver.topic, "", sides)
     if isinstance(driver, ThrustTopic):
-        return Emulation(driver.kind, driver.topic, "", {"sides": list(driver.wiring)})
+        return Emulation(driver.emulator, driver.topic, "", {"sides": list(driver.wiring)})
     if isinstance(driver, GpioValves):
         pins = folder / "gpio"
         more: Parameters = {
@@ -73,19 +73,19 @@ def emulation_of(hardware: Hardware, folder: Path) -> Emulation:
             "bearing": driver.bearing is not None,
             "supply": driver.supply is not None,
         }
-        return Emulation("valves", str(pins), f"file://{pins}", more)
+        return Emulation(driver.emulator, str(pins), f"file://{pins}", more)
     if isinstance(driver, XPlane):
         number = _free_port(socket.SOCK_DGRAM)
-        return Emulation(driver.kind, f"udp:{number}", f"udp://127.0.0.1:{number}")
+        return Emulation(driver.emulator, f"udp:{number}", f"udp://127.0.0.1:{number}")
+    assert isinstance(driver, (MavlinkBoat, Kobuki, KingfisherNmea))
     more = {"sides": list(driver.wiring)}
     if isinstance(driver, MavlinkBoat):
         number = _free_port(socket.SOCK_DGRAM)
-        return Emulation("ardupilot", f"udp:{number}", f"udpin:127.0.0.1:{number}", more)
-    device = "kobuki" if isinstance(driver, Kobuki) else "kingfisher"
+        return Emulation(driver.emulator, f"udp:{number}", f"udpin:127.0.0.1:{number}", more)
     if isinstance(driver, KingfisherNmea) and driver.port.startswith("tcp://"):
         number = _free_port(socket.SOCK_STREAM)
-        return Emulation(device, f"tcp:{number}", f"tcp://127.0.0.1:{number}", more)
-    return Emulation(device, str(folder / "serial"), str(folder / "serial"), more)
+        return Emulation(driver.emulator, f"tcp:{number}", f"tcp://127.0.0.1:{number}", more)
+    return Emulation(driver.emulator, str(folder / "serial"), str(folder / "serial"), more)
 
 
 def _free_port(kind: socket.SocketKind) -> int:

@@ -14,7 +14,7 @@ from fulmar_core.config.errors import ConfigError
 from fulmar_core.robots.actuators.differential_drive import DifferentialDrive
 from fulmar_core.robots.actuators.family import Actuators
 from hardware_drivers.hardware import Hardware
-from hardware_drivers.settings import GpioValves, OwnDriver, ValveTopic, XPlane
+from hardware_drivers.settings import GpioValves, ValveTopic
 from hardware_drivers.wiring import SIDES
 
 WHEEL_SPEED = 0.1  # of the rim of one wheel, our value: a step of some centimetres [m/s]
@@ -36,12 +36,13 @@ def wires_of(hardware: Hardware) -> list[Wire]:
         return [Wire(f"line {line}", nozzle) for line, nozzle in zip(driver.lines, driver.order, strict=True)]
     if isinstance(driver, ValveTopic):
         return [Wire(f"value {number}", nozzle) for number, nozzle in enumerate(driver.order, start=1)]
-    if isinstance(driver, OwnDriver) and driver.order:
-        return [Wire(f"channel {number}", nozzle) for number, nozzle in enumerate(driver.order)]
-    assert not isinstance(driver, XPlane)  # there are no pulses for aircraft
+    if order := getattr(driver, "order", ()):
+        return [Wire(f"channel {number}", nozzle) for number, nozzle in enumerate(order)]
+    wiring = getattr(driver, "wiring", ())
+    assert wiring  # there are no pulses for aircraft
     return [
         Wire(f"{channel} channel", SIDES.index(side.removeprefix("-")), -1.0 if side.startswith("-") else 1.0)
-        for channel, side in zip(SIDES, driver.wiring, strict=True)
+        for channel, side in zip(SIDES, wiring, strict=True)
     ]
 
 
