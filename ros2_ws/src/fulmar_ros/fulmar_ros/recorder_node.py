@@ -45,7 +45,7 @@ from fulmar_ros.recorder_settings import RecorderSettings
 from fulmar_ros.runtime import RequestExit, run_node
 
 QUIET_S = 0.2  # nothing came for this long: what was published before the stop is here
-LONGEST_GOODBYE_S = 5.0
+LONGEST_GOODBYE_S = 2.5  # others may go on publishing for ever; who stops us kills us after 4 s
 REMEMBERED = 1024  # messages of a topic: more than one period has
 # What plant and estimators publish once more in lock step, and among how many of the newest messages it is looked for.
 # Each has a stamp, but for the air bearing: of its states the changes count.
@@ -217,8 +217,8 @@ class RecorderNode(Node):
 
     def stop(self) -> int:
         """Wait until no more messages come, close the bag, and print its content."""
-        self._provenance.join(LONGEST_GOODBYE_S)
         deadline = time.monotonic() + LONGEST_GOODBYE_S
+        self._provenance.join(LONGEST_GOODBYE_S)
         before = -1
         while self._thread.received != before and time.monotonic() < deadline:
             before = self._thread.received
