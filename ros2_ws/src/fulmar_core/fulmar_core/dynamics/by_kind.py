@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -54,13 +55,9 @@ DYNAMICS: dict[str, Made] = {
     "satellite": _satellite,
     "aircraft": _aircraft,
 }
-ACTUATIONS: dict[str, Callable[..., ActuationState]] = {
-    "planar": ActuationState,
-    "rolling": ActuationState,
-    "free_flyer": ActuationState,
-    "satellite": WheelActuation,
-    "aircraft": FlightActuation,
-}
+ACTUATIONS: dict[str, Callable[..., ActuationState]] = defaultdict(
+    lambda: ActuationState, satellite=WheelActuation, aircraft=FlightActuation
+)
 
 
 def dynamics_of(robot: Robot, scenario: Scenario | None = None) -> Dynamics[Any, Any]:

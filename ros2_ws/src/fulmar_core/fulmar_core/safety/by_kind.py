@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -28,12 +29,8 @@ class Effort:
     acceleration: Callable[[Robot], float] = _thrust  # towards it [m/s²]
 
 
-USUAL = Effort()
-EFFORTS = {
-    "planar": USUAL,
-    "rolling": USUAL,
-    "free_flyer": USUAL,
-    "satellite": USUAL,
+EFFORTS = defaultdict(
+    Effort,
     # Gusts move it all the time, and it returns to its course on a path that is not steep.
-    "aircraft": Effort(slack=20.0, authority=0.95, speed=0.1, acceleration=_banking),
-}
+    aircraft=Effort(slack=20.0, authority=0.95, speed=0.1, acceleration=_banking),
+)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -11,6 +12,7 @@ from fulmar_core.states.state import RigidBodyState
 STAYS = "it stays where it is"  # why what only turns has no limits of place
 UNSEEN = "it is not seen by motion capture"
 CONTRADICTS = "its controller steers against a drift, and faster odometry contradicts itself (gnss_creeps)"
+_STARLESS = dict.fromkeys(("star_tracker_frozen", "star_tracker_drifts"), "no star tracker is in its loop")
 TOO_MUCH = 2.0  # times the limit
 OF_EACH = 0.8  # of the limit, about each of three axes: together 1.39 of it
 
@@ -52,20 +54,19 @@ class Faults:
         creep: Of a position from satellites, with a velocity that knows nothing of it [m/s].
     """
 
-    excused: Mapping[str, str]
+    excused: Mapping[str, str] = field(default_factory=lambda: _STARLESS)
     too_fast: Mapping[str, float] = field(default_factory=lambda: dict.fromkeys("xyz", OF_EACH))
     distance: Distance = Distance(_apart, near=0.3, astray=0.5)
     creep: float = 0.3
 
 
-_STARLESS = dict.fromkeys(("star_tracker_frozen", "star_tracker_drifts"), "no star tracker is in its loop")
 _OF_PLACE = ("odometry_leaves_the_area", "odometry_leaves_the_geofence")
-_IN_PLANE = Faults(_STARLESS, {"z": TOO_MUCH})
-FAULTS: dict[str, Faults] = {
-    "planar": _IN_PLANE,
-    "rolling": _IN_PLANE,
-    "free_flyer": Faults(_STARLESS),
-    "satellite": Faults(
+_IN_PLANE = Faults(too_fast={"z": TOO_MUCH})
+FAULTS = defaultdict(
+    Faults,
+    planar=_IN_PLANE,
+    rolling=_IN_PLANE,
+    satellite=Faults(
         {
             "mocap_frozen": UNSEEN,
             "time_jump_backwards": "its wheels stamp what they measure by the same clock, and are not relayed",
@@ -74,5 +75,5 @@ FAULTS: dict[str, Faults] = {
         distance=Distance(_turned, near=5.0, astray=5.0),
     ),
     # At its speed a creep as slow as that of others is within the error of its velocity.
-    "aircraft": Faults(_STARLESS | dict.fromkeys(_OF_PLACE, CONTRADICTS), creep=3.0),
-}
+    aircraft=Faults(_STARLESS | dict.fromkeys(_OF_PLACE, CONTRADICTS), creep=3.0),
+)

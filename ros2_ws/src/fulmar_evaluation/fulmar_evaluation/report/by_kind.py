@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -87,12 +88,12 @@ class Plots:
 
 
 _IN_PLANE = Plots(path=(figures.trajectory, figures.progress), draw_path=_draw_trajectory, in_space=False)
-PLOTS: dict[str, Plots] = {
-    "planar": _IN_PLANE,
-    "rolling": _IN_PLANE,
-    "free_flyer": Plots(),
-    "satellite": Plots(path=(figures.progress, figures.motion)),  # it stays where it is
-    "aircraft": Plots(
+PLOTS = defaultdict(
+    Plots,
+    planar=_IN_PLANE,
+    rolling=_IN_PLANE,
+    satellite=Plots(path=(figures.progress, figures.motion)),  # it stays where it is
+    aircraft=Plots(
         of_check=write_envelope_plot,
         path=(figures.flight_path, figures.progress, figures.flight, figures.motion),
         use=(figures.surfaces,),
@@ -101,7 +102,7 @@ PLOTS: dict[str, Plots] = {
         use_height=lambda _runs: 3.6,
         path_rows=PATH_ROWS + FLIGHT_ROWS,
     ),
-}
+)
 
 
 def plots_of(runs: Sequence[View]) -> Plots:
