@@ -22,12 +22,10 @@ from fulmar_core.estimators.motion.settings import (
     SpatialMotionSettings,
 )
 from fulmar_core.estimators.readings import READINGS, readings_of
+from fulmar_core.robots.kinds import GOING
 from fulmar_core.robots.kinds import KINDS as ROBOT_KINDS
 from fulmar_core.robots.kinds.aircraft import AIRCRAFT
-from fulmar_core.robots.kinds.free_flyer import FREE_FLYER
 from fulmar_core.robots.kinds.kind import Kind
-from fulmar_core.robots.kinds.planar import PLANAR
-from fulmar_core.robots.kinds.rolling import ROLLING
 from fulmar_core.robots.kinds.satellite import SATELLITE
 from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.sensors.repetition import without_noise
@@ -45,6 +43,8 @@ from fulmar_core.robots.topics import (
     SENSOR_WIRES,
     Wire,
 )
+from fulmar_core.states.planar import PlanarState
+from fulmar_core.states.spatial import SpatialState
 
 Motion = TypeVar("Motion", bound=MotionSettings)
 
@@ -128,7 +128,7 @@ KINDS: dict[str, EstimatorKind] = {
         takes={"mocap": MOCAP, "imu": IMU},
         publishes=(ODOMETRY,),
         takes_if_there={"star_tracker": SENSOR_WIRES["star_tracker"]},
-        kinds=(PLANAR, ROLLING),
+        kinds=GOING[PlanarState],
         needs=("filterpy",),
     ),
     "spatial_motion": EstimatorKind(
@@ -137,7 +137,7 @@ KINDS: dict[str, EstimatorKind] = {
         takes={"mocap": MOCAP, "imu": IMU},
         publishes=(ODOMETRY,),
         takes_if_there={"star_tracker": SENSOR_WIRES["star_tracker"]},
-        kinds=(FREE_FLYER, AIRCRAFT),
+        kinds=(*GOING[SpatialState], AIRCRAFT),
         needs=("filterpy",),
     ),
     "attitude": EstimatorKind(
