@@ -69,7 +69,7 @@ def test_the_robot_of_the_page_stops_before_the_wall_that_its_sensor_sees(
     ("change", "said"),
     [
         (("class WallRange", "class WallRanger"), "has no class 'WallRange'. Did you mean 'WallRanger'?"),
-        (("fields =", "felds ="), "lacks fields"),
+        (("fields =", "columns ="), "lacks fields"),
         (("sensor_msgs/msg/Range", "Range"), "message 'Range' names no type"),
         (
             ("sensor_msgs/msg/Range", "sensor_msgs/msg/Ranges"),
