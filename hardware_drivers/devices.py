@@ -9,8 +9,9 @@ from fulmar_core.config.errors import ConfigError
 from fulmar_core.robots.robot import Robot
 from hardware_drivers.driver import DeviceDriver
 from hardware_drivers.driver_backend import DriverBackend, backend_of
+from hardware_drivers.driver_facts import OwnWatchdog
 from hardware_drivers.hardware import TOPIC_DRIVERS, Hardware
-from hardware_drivers.settings import Driver, OwnDriver, OwnWatchdog
+from hardware_drivers.settings import Driver, OwnDriver
 
 
 def make_device(robot: Robot, hardware: Hardware, *, port: str, patience_s: float) -> DriverBackend:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, Literal
 
 from fulmar_core.config.errors import ConfigError
 from fulmar_core.config.own_class import check_class_path
 from fulmar_core.config.strict_yaml import Named
+from hardware_drivers.driver_facts import DriverFacts, OwnWatchdog
 from hardware_drivers.mavlink_address import place_of
 from hardware_drivers.valves import VALVE_ORDERS
 from hardware_drivers.wiring import AS_NAMED, check_wiring
@@ -31,57 +32,6 @@ def check_order(order: tuple[int, ...], count: int) -> None:
     """Reject orders that do not name each of `count` thrusters once; raises ValueError."""
     if sorted(order) != list(range(count)):
         raise ValueError(f"'order' must hold each of 0 to {count - 1} once.")
-
-
-@dataclass(frozen=True)
-class OwnWatchdog:
-    """A watchdog below the driver."""
-
-    by: str  # whose it is
-    within_s: float  # after the last command or heartbeat [s]
-
-
-class DriverFacts:
-    """What is known of the devices of a driver, whatever their file says.
-
-    Attributes:
-        fits: Families of actuators that it can move.
-        needs: Modules of the extra `hardware` that it imports.
-        moves_on: What moves on where nothing stops the device, in capitals.
-        emulator: Device of `sim_nodes.emulator_node` that stands in for theirs; empty: none does.
-        instead: What a user does about that; empty: builds in a supply that closes without the driver.
-    """
-
-    fits: ClassVar[tuple[str, ...]] = ()
-    needs: ClassVar[tuple[str, ...]] = ()
-    moves_on: ClassVar[str] = "ACTUATORS"
-    emulator: ClassVar[str] = ""
-    instead: ClassVar[str] = ""
-
-    @property
-    def made_by(self) -> str:
-        """Module and class of the driver that talks to the device; empty: the driver node publishes messages."""
-        return ""
-
-    @property
-    def measures(self) -> bool:
-        """Whether the device measures odometry; if not, motion capture or another node does."""
-        return False
-
-    @property
-    def seen_from_outside(self) -> bool:
-        """Whether only motion capture localises the robot."""
-        return False
-
-    @property
-    def has_bearing(self) -> bool:
-        """Whether the driver switches an air bearing, without which nothing may move."""
-        return False
-
-    @property
-    def stopped_by(self) -> OwnWatchdog | None:
-        """The watchdog that stops the device when the driver dies; None if none is known."""
-        return None
 
 
 class _Wired(DriverFacts):
