@@ -127,6 +127,15 @@ def test_a_gauge_that_falls_silent_or_lies_is_said():
     assert (check.warning, check.pressure) == ("", None)
 
 
+def test_a_device_without_a_gauge_is_not_one_whose_gauge_fell_silent():
+    check = SupplyCheck(PLATFORM)
+    for _ in range(60):
+        check.see(1.0, {})
+    assert check.warning == ""
+    check.see(1.0, {"supply": Reading(float("nan"))})
+    assert "the gauge of the supply reports a value that is not finite" in check.warning
+
+
 @pytest.mark.parametrize(
     ("changed", "said"),
     [

@@ -48,7 +48,9 @@ class SupplyCheck:
         self.warning = self._words()
 
     def _words(self) -> str:
+        if self.pressure is None:  # drivers of devices without a gauge never say one
+            return f"the supply pressure is refused: {self._refusal}" if self._refusal else ""
         if self._silent_s > self._silent_after_s:
             why = f": {self._refusal}" if self._refusal else ""
             return f"no supply pressure for {self._silent_s:.0f} s{why}. Is the gauge connected?"
-        return "" if self.pressure is None else self._robot.actuators.supply_warning(self.pressure)
+        return self._robot.actuators.supply_warning(self.pressure)
