@@ -133,6 +133,16 @@ def test_a_step_of_lock_step_waits_for_what_is_measured_at_each_step(wired):
     assert not wired("wheels").inputs.lacks_something_of(SECOND)
 
 
+def test_a_first_step_of_lock_step_waits_for_a_silent_sensor_and_not_for_ever(wired):
+    made = wired("wheels", "inertia", lockstep=True)
+    assert made.inputs.lacks_the_first(again=False)
+    assert [made.inputs.lacks_the_first(again=True) for _ in range(4)] == [True, True, False, False]
+    spoken = wired("wheels", lockstep=True)
+    spoken.send("wheels/state", speeds(100.0))
+    assert not spoken.inputs.lacks_the_first(again=False)
+    assert not wired("wheels").inputs.lacks_the_first(again=False)
+
+
 def test_a_message_that_cannot_be_read_is_refused_and_breaks_nothing(wired):
     made = wired("wheels")
     made.send("wheels/state", JointState(name=["wheel_x"], velocity=[]))

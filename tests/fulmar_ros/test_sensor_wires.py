@@ -9,6 +9,7 @@ import pytest
 
 from fulmar_bags.message_reader import reading_of
 from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.robots.sensors.imu import ImuSample
 from fulmar_core.robots.sensors.star_tracker import StarTrackerSpec
 from fulmar_core.robots.sensors.table import SENSORS
 from fulmar_core.wires.reading import Reading
@@ -77,6 +78,24 @@ def test_a_robot_publishes_the_sensors_of_its_file_and_no_others(node):
     wires_of(node, robot=PLATFORM).publish(sample(), 5)
     assert list(node.topics) == ["odom", "imu/data", "supply/pressure"]
     assert len(node.topics["odom"].sent) == 1
+
+
+@pytest.mark.parametrize(("lockstep", "last"), [(True, "odom"), (False, "imu/data")])
+def test_in_lock_step_the_odometry_goes_out_after_what_belongs_to_it(node, lockstep, last):
+    sent = []
+    wires = SensorWires(
+        node,
+        PLATFORM,
+        PLAIN,
+        lambda wire: wire,
+        lambda topic, _: sent.append(topic.name),
+        odometry=True,
+        lockstep=lockstep,
+    )
+    force = ImuSample(np.zeros(3), np.zeros(3))
+    wires.publish(sample() | {"imu": Reading(force)}, 5)
+    assert sent[-1] == last
+    assert set(sent) == {"odom", "imu/data"}
 
 
 def test_odometry_of_another_node_is_not_published(node):

@@ -46,7 +46,7 @@ def warm_up(
     try:
         for number in range(WARM_UP):
             loop.step(episode.start, {}, round(1e9 * number * loop.dt))
-        controller.reset()
+        loop.reset()
     except TaskError:
         raise
     except Exception as error:

@@ -193,7 +193,7 @@ class Sensors:
         """The robot's sensors by name, in the order of the table."""
         return {name: spec for name in SENSORS if (spec := getattr(self, name)) is not None} | self.own
 
-    @property
+    @functools.cached_property
     def kinds(self) -> dict[str, SensorKind]:
         """Their rows; a user's own class is loaded here.
 
