@@ -119,9 +119,9 @@ def open_link(port: str, baud: int, key: bytes, patience_s: float) -> MavlinkLin
     """Open a link as soon as it can be opened.
 
     Args:
-        port: As of `place_of`.
+        port: As in `place_of`.
         baud: Of a serial port.
-        key: As of `MavlinkLink`.
+        key: As in `MavlinkLink`.
         patience_s: Try again for so long [s].
 
     Raises:

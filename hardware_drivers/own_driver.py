@@ -43,7 +43,7 @@ def make_own_driver(robot: Robot, settings: OwnDriver, *, patience_s: float) -> 
         patience_s: Wait so long for the device [s].
 
     Raises:
-        ConfigError: As of `check_own_driver`; or the constructor raised.
+        ConfigError: As in `check_own_driver`; or the constructor raised.
         DeviceError: The device is not there, says the class.
     """
     cls = _driver_class(settings)

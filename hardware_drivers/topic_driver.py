@@ -51,7 +51,7 @@ class TopicDriver(DeviceDriver):
         Args:
             send: Publishes a command.
             listeners: Of its topic.
-            patience_s: As of `DeviceDriver`.
+            patience_s: As in `DeviceDriver`.
 
         Raises:
             DeviceError: There is none.
@@ -98,7 +98,7 @@ class ValveTopicDriver(TopicDriver):
             count: Number of valves.
             bearing_on: Whether it is, from the start on.
             linger_s: The bearing stays on so long after the last command [s].
-            patience_s: As of `DeviceDriver`.
+            patience_s: As in `DeviceDriver`.
 
         Raises:
             DeviceError: There is none.

@@ -69,7 +69,7 @@ def from_message(data: Sequence[int], order: Sequence[int]) -> tuple[bool, np.nd
 
     Args:
         data: The message.
-        order: As of `to_message`.
+        order: As in `to_message`.
 
     Returns:
         Whether the bearing is on, and zeros and ones in the robot's order, shape (n,); None where the message has

@@ -37,7 +37,7 @@ class WheelOdometry:
         """Why no base has rolled so since the last report, such as one that was switched off and on; empty if one may.
 
         Args:
-            left: As of `see`.
+            left: As in `see`.
             right: Same.
             time_s: Same.
             fastest: Highest speed of a rim [m/s].

@@ -39,7 +39,7 @@ def channel_velocity(
     """Speed and turn rate to send, so that a base with this wiring moves at those that are commanded.
 
     Args:
-        wiring: As of `channels`.
+        wiring: As in `channels`.
         track: Between the wheels [m].
         speed: Ahead [m/s].
         turn_rate: To the left [rad/s].

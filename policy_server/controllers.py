@@ -154,7 +154,7 @@ def load_controller(name: str, robot: Robot, task: Task, choice: Choice) -> Cont
     """Load a controller by its name.
 
     Args:
-        name: As of `controller_entry`.
+        name: As in `controller_entry`.
         robot: The robot.
         task: What it does.
         choice: Rate and bundle.

@@ -21,7 +21,7 @@ class CanStand(Backend, Protocol):
 
         Args:
             ticks: Number of physics steps, >= 1.
-            begins: As of `Backend.step`.
+            begins: As in `Backend.step`.
 
         Returns:
             Sample at their end; the body is at rest.

@@ -1,4 +1,4 @@
-"""Completes a plan: what nobody said comes from a system file, the robot's kind, the goal file and the seed."""
+"""Completes a plan: defaults come from a system file, the robot's kind, the goal file and the seed."""
 
 from __future__ import annotations
 

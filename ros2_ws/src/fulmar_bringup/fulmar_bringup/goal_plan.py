@@ -166,7 +166,7 @@ def check_file_places(file: GoalFile, goals: str, robot: Robot, area: Sequence[f
     """Reject goals, of a file of some name or of `--pose`, that lie where a robot must not go.
 
     Raises:
-        ConfigError: As of `geofence.check_places`.
+        ConfigError: As in `geofence.check_places`.
     """
     what = f"the goal of '{goals}'" if goals else "the goal"
     check_places(what, _places_of(file).tolist(), area, farthest_goal(robot))

@@ -42,7 +42,7 @@ def list_nodes(**asked: str | None) -> tuple[NodeSpec, ...]:
         asked: Texts by the names of `ARGUMENTS`; None: not given.
 
     Returns:
-        As of `system_rows`. The row of an external controller is not there, or is that of its adapter.
+        As in `system_rows`. The row of an external controller is not there, or is that of its adapter.
 
     Raises:
         ConfigError: Unknown name, or a mistake in a file.

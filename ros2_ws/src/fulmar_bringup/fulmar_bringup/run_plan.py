@@ -75,14 +75,14 @@ class How:
     seed: int = 0
     start: PoseTuple = ()  # as `State.NUMBERS`, or a place alone; empty: as the seed draws it [m, deg]
     goal: PoseTuple | None = None  # the same; None: as the seed draws it, or not one place [m, deg]
-    goals: str = ""  # goal file that a node of its own publishes; empty: somebody else gives the goal
+    goals: str = ""  # goal file that a node of its own publishes; empty: the goal comes from outside
     excitation: str = ""  # goal file of torques that the controller plays; empty: none
     duration_s: float = 0.0  # 0: as goal file or task ask for; of a complete plan, until it is stopped [s]
     standing: bool = False  # it has no end, and goals come from outside
     lockstep: bool = False  # plant and controller wait for each other
     rate: float = 1.0  # simulated seconds a wall-clock second
     mocap_hz: float = 0.0  # simulated motion capture beside the odometry; 0: only for an estimator [Hz]
-    supervised: bool = False  # somebody else activates the plant when all are ready
+    supervised: bool = False  # the supervisor activates the plant when all are ready
     mission: Goal | None = field(default=None, compare=False)  # every target and obstacle of a complete plan
 
 
@@ -119,7 +119,7 @@ class RunPlan(Recorded, Guarded, How, Where, Who):
 
     @property
     def loss_of_helpers(self) -> str:
-        """What the loss of a node means that takes no robot's control away; lock step waits for nobody's return."""
+        """What the loss of a node means that takes no robot's control away; lock step does not go on without it."""
         return ENDS if self.lockstep else RESTARTS
 
     @property

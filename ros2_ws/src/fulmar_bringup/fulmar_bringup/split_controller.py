@@ -60,7 +60,7 @@ def _control(plan: RunPlan, overseer: Supervisor, group: ProcessGroup, emit: Emi
 
     Raises:
         RunFailed: The controller ended or hangs.
-        ConfigError: As of `keep_controller_up`.
+        ConfigError: As in `keep_controller_up`.
     """
     events, own = SystemEvents(emit), set[str]()
     first = True

@@ -57,7 +57,7 @@ def task_of(plan: RunPlan) -> str:
     """Name of the task of a plan: the one that is given, or what its goal, its goal file or its robot asks for.
 
     Raises:
-        ConfigError: As of `default_task`.
+        ConfigError: As in `default_task`.
     """
     if plan.task:
         return plan.task
@@ -74,7 +74,7 @@ def goal_note(plan: RunPlan) -> str:
     """Warning about a part of a plan's goal that has no effect, or that asks much; empty if there is none.
 
     Raises:
-        ConfigError: As of `whole_pose`, `check_heading` and `excitation_of`.
+        ConfigError: As in `whole_pose`, `check_heading` and `excitation_of`.
     """
     robot = load_robot(plan.robot)
     if plan.goal is not None:

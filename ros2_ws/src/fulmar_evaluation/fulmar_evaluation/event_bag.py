@@ -30,7 +30,7 @@ class EventBag:
         """Create it, with what its packets come from.
 
         Raises:
-            BagError: As of `BagWriter`.
+            BagError: As in `BagWriter`.
         """
         self._store, self._frames = type_store(), frames_of(robot.name, robot.name)
         self._writer = BagWriter(

@@ -21,7 +21,7 @@ class Row:
     crashed: bool = False
 
     def as_json(self) -> dict[str, Any]:
-        """As of `fulmar benchmark falcon --json`."""
+        """As in `fulmar benchmark falcon --json`."""
         return asdict(self)
 
 

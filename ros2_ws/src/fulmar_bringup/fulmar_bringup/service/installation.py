@@ -49,7 +49,7 @@ def write_files(files: Files, texts: Mapping[Path, str]) -> list[Path]:
 
     Args:
         files: Of the service.
-        texts: As of `texts_of`.
+        texts: As in `texts_of`.
 
     Returns:
         What was written.

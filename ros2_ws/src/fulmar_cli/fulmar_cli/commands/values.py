@@ -91,7 +91,7 @@ def read_pose(text: str | None, option: str, robot: str = "") -> tuple[float, ..
     Args:
         text: What was given.
         option: What gave it.
-        robot: As of `read_goal`.
+        robot: As in `read_goal`.
 
     Raises:
         ConfigError: If it is not three or six finite numbers.

@@ -25,7 +25,7 @@ def check_permissions(devices: Sequence[Path], *, hardware: bool) -> Finding:
     """Whether this user may read and write devices.
 
     Args:
-        devices: As of `devices_of`.
+        devices: As in `devices_of`.
         hardware: Whether a robot is to be driven through them.
     """
     what = "serial ports and GPIO"

@@ -40,7 +40,7 @@ def allocation_of(actuators: Pushing, *, weight: np.ndarray, cost: float) -> All
         cost: Of each actuator at full command, >= 0.
 
     Raises:
-        ValueError: As of `check_allocation`.
+        ValueError: As in `check_allocation`.
     """
     check_allocation(actuators, len(weight))
     if actuators.binary:

@@ -38,7 +38,7 @@ class DeltaSigma:
 
         Args:
             wanted: Wrench in the body frame, shape (..., 6) [N, N·m].
-            alive: As of `Allocation.best`.
+            alive: As in `Allocation.best`.
 
         Returns:
             Shape (..., n).

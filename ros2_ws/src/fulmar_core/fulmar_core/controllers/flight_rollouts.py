@@ -75,7 +75,7 @@ class FlightRollouts:
 
         Args:
             state: Of n craft, shapes (n,).
-            servos: As of `FlightLqi.servos_after`, shape (n, ...).
+            servos: As in `FlightLqi.servos_after`, shape (n, ...).
             aims: At the beginning and after each step.
             corrections: Added to the commands of each step, shape (steps, n, flights, m).
 

@@ -62,7 +62,7 @@ class SpaceFrame:
         """The same motion, less that of the target.
 
         Args:
-            now: As of `motion`.
+            now: As in `motion`.
             inputs: It came from them.
             velocity: Of the target, in the world, shape (n, 3) [m/s].
             rate: Of the target, about its own axes; of none where no attitude is wanted, shape (n, 3) [rad/s].

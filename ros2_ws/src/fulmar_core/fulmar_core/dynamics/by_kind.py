@@ -85,8 +85,8 @@ def actuation_of(
     Args:
         robot: The robot.
         safe: Its safe command in every world, shape (n, worlds).
-        opens_late: As of `may_open_late`.
-        latest_s: As of `longest_delay` [s].
+        opens_late: As in `may_open_late`.
+        latest_s: As in `longest_delay` [s].
         step_s: Least time between two commands [s].
         changes: Whether a part may stick or the supply may fall within an episode.
         world: Says how full tanks are; None: they never empty, which costs less.

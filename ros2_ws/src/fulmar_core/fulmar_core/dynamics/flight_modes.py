@@ -39,7 +39,7 @@ class Mode:
         return -self.real / self.frequency if self.frequency else 0.0
 
     def as_json(self) -> dict[str, float | str]:
-        """As of `fulmar check robot --json`."""
+        """As in `fulmar check robot --json`."""
         return {
             "name": self.name,
             "real": self.real,

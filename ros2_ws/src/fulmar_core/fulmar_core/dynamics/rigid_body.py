@@ -113,7 +113,7 @@ def turned(
         after: Turn rate after it [rad/s].
         begin: Turn acceleration at its begin [rad/s²].
         end: Same at its end.
-        force: As of `rigid_body_step`; None: nothing.
+        force: As in `rigid_body_step`; None: nothing.
         force_in_world: Same.
         mass: Same.
         dt: Same.

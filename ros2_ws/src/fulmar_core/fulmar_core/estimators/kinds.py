@@ -244,7 +244,7 @@ def check_estimator(name: str, robot: Robot) -> None:
     """Refuse a file that cannot be read, and an estimator that does not estimate how a robot moves.
 
     Raises:
-        ConfigError: As of `load_estimator`, or the estimator is for other kinds of robots.
+        ConfigError: As in `load_estimator`, or the estimator is for other kinds of robots.
     """
     load_estimator(name)
     kind = estimator_kind(name, robot)

@@ -82,7 +82,7 @@ class PushBlock(FileTask[PlanarState]):
         return (Thing(BLOCK, self.block),)
 
     def farthest_start(self, *, training: bool) -> tuple[str, float]:
-        """As of `Task`: the block's and the robot's distances add up."""
+        """As in `Task`: the block's and the robot's distances add up."""
         name = "training_block_distance" if training else "block_distance"
         return f"{name}' + 'start_distance", getattr(self, name)[1] + self.start_distance[1]
 

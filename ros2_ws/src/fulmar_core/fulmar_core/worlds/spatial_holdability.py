@@ -25,7 +25,7 @@ def hold_margin_in_space(
         com: Centre of mass in the body's frame, shape (3,) [m].
 
     Returns:
-        As of `hold_margin`, along the body's three axes and about them.
+        As in `hold_margin`, along the body's three axes and about them.
 
     Raises:
         ConfigError: The robot's actuators do not push one way.

@@ -18,7 +18,7 @@ _NAMES: dict[type, tuple[str, ...]] = {}  # of the fields of each kind of `Drawn
 class Drawn:
     """What is drawn for episodes, world axis last: fields of the shape (...,), or (k, ...) with rows of their own."""
 
-    # As of `packed`: every number, and how many rows each field has; 0: one, without an axis for it.
+    # As in `packed`: every number, and how many rows each field has; 0: one, without an axis for it.
     _packing: tuple[Array, tuple[int, ...]] | None = field(
         init=False, repr=False, compare=False, default=None
     )

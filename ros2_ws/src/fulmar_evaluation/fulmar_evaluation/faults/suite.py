@@ -143,7 +143,7 @@ def run_faults(
         robot: Its name.
         faults: Which.
         progress: Called with the number of faults that are done, each launcher and time counted.
-        launcher: As of `times_of`.
+        launcher: As in `times_of`.
         times: Same.
 
     Raises:

@@ -59,7 +59,7 @@ class StarCamera:
 
         Args:
             stars: Of the catalogue.
-            axes: As of `axes_in_world`.
+            axes: As in `axes_in_world`.
             spare_deg: How far beyond the corners [deg].
         """
         seen = stars.brighter_than(self.faintest)
