@@ -39,7 +39,6 @@ class Aircraft(FreeBody):
     def add(self, spec: mujoco.MjSpec) -> mujoco.MjsBody:
         """Add the body; see `RobotModel.add`."""
         robot = self._robot
-        spec.option.gravity = [0.0, 0.0, -GRAVITY]
         body = spec.worldbody.add_body(name=BODY)
         body.add_freejoint(name="free")
         body.explicitinertial = True

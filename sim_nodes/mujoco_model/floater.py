@@ -10,7 +10,6 @@ import numpy as np
 from fulmar_core.robots.actuators.pushing import Push, Pushing
 from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.urdf import PART_COLOUR
-from fulmar_core.states.gravity import GRAVITY
 from sim_nodes.mujoco_model.scenery import BODY, add_hull
 from sim_nodes.mujoco_model.water import Water
 
@@ -55,7 +54,6 @@ class Floater:
     def add(self, spec: mujoco.MjSpec) -> mujoco.MjsBody:
         """Add the body; see `RobotModel.add`."""
         robot = self._robot
-        spec.option.gravity = [0.0, 0.0, -GRAVITY if self._planar or self._swims else 0.0]
         body = spec.worldbody.add_body(name=BODY, pos=[0.0, 0.0, self.rest_height])
         if self._planar:
             body.add_joint(name="x", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[1, 0, 0])

@@ -41,7 +41,6 @@ class Satellite(FreeBody):
     def add(self, spec: mujoco.MjSpec) -> mujoco.MjsBody:
         """Add the body and its wheels; see `RobotModel.add`."""
         robot, wheels = self._robot, self._wheels
-        spec.option.gravity = [0.0, 0.0, 0.0]
         body = spec.worldbody.add_body(name=BODY)
         body.add_freejoint(name="free")
         body.explicitinertial = True

@@ -12,6 +12,7 @@ from fulmar_core.config.errors import ConfigError
 from fulmar_core.dynamics.things import Thing
 from fulmar_core.robots.robot import Robot
 from fulmar_core.simulation.episode import Episode
+from fulmar_core.states.gravity import GRAVITY
 from sim_nodes.mujoco_model.aircraft import Aircraft
 from sim_nodes.mujoco_model.car import Car
 from sim_nodes.mujoco_model.differential_base import DifferentialBase
@@ -106,6 +107,7 @@ def _spec(
     spec = mujoco.MjSpec()
     spec.modelname = robot.name
     spec.option.timestep = robot.timing.physics_dt / robot_model.steps_per_tick
+    spec.option.gravity = [0.0, 0.0, -GRAVITY if robot.kind.weighs else 0.0]
     in_space = robot_model.in_space
     # Euler's method as in the core's plane; a free body tumbles, and would gain energy by it.
     kinds = mujoco.mjtIntegrator

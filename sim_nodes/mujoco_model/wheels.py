@@ -14,7 +14,6 @@ from fulmar_core.robots.actuators.response import Response
 from fulmar_core.robots.actuators.rolling import CASTER_RADIUS, SERVO_S, WHEEL_WIDTH, Rolling
 from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.urdf import WHEEL_COLOUR
-from fulmar_core.states.gravity import GRAVITY
 from fulmar_core.states.planar import PlanarState, PlanarWrench
 from fulmar_core.worlds.world import World
 from sim_nodes.mujoco_model.scenery import BODY, FLOOR_BIT, add_hull
@@ -56,7 +55,6 @@ class Chassis:
 
     def add(self, spec: mujoco.MjSpec) -> mujoco.MjsBody:
         """Add the body and its outline, and set what contact with the floor needs."""
-        spec.option.gravity = [0.0, 0.0, -GRAVITY]
         spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
         spec.option.impratio = 10.0  # friction holds as firmly as the floor carries
         body = spec.worldbody.add_body(name=BODY, pos=[0.0, 0.0, self.radius])

@@ -15,6 +15,7 @@ FREE_FLYER = Kind(
     usual_estimator="mocap_imu_3d",
     far_goal=(4.0, 4.0, 2.0, 20.0, -30.0, 90.0),
     recipe="free_flyer",
+    weighs=False,
     drifts=True,
     calibrated=(*PLANAR.calibrated, "roll_inertia", "pitch_inertia", "center_of_mass_z"),
 )

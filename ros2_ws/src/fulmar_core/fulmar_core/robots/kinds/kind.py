@@ -29,6 +29,7 @@ class Kind:
     usual_scenario: str = "randomised"  # that it is trained in
     always_estimated: bool = False  # no simulator or driver says where it is: an estimator has to
     goes_anywhere: bool = True  # it has places to go to, and may leave an area
+    weighs: bool = True  # gravity pulls it
     drifts: bool = False  # at rest its actuators let it go on; water slows it all the same
     calibrated: tuple[str, ...] = ()  # quantities of its body that identification measures, of `Calibration`
     stops: bool = True  # it can stay where it is; else its safe state is a flight

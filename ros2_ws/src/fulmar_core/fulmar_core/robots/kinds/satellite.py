@@ -18,6 +18,7 @@ SATELLITE = Kind(
     recipe="free_flyer",
     always_estimated=True,
     goes_anywhere=False,
+    weighs=False,
     drifts=True,
     axes=(3, 4, 5),
 )
