@@ -10,7 +10,8 @@ from fulmar_core.dynamics.batch_dynamics import PlanarDynamics, RollingDynamics,
 from fulmar_core.dynamics.by_kind import actuation_of
 from fulmar_core.dynamics.linear_model import linearise, linearise_wrench
 from fulmar_core.loop.teleop import Wish, hand_mapping
-from fulmar_core.robots.actuators.families import FAMILIES
+from fulmar_core.robots.actuators.families import FAMILIES, row_of
+from fulmar_core.robots.actuators.fans import Fans
 from fulmar_core.robots.actuators.pushing import PLANAR, Pushing
 from fulmar_core.robots.actuators.refuge import slowdown
 from fulmar_core.robots.actuators.rolling import Rolling
@@ -43,6 +44,15 @@ LATER_S = (0.0, 0.1, 0.5, 2.0, 20.0)
 def test_every_family_is_under_this_contract_by_its_own_name():
     kinds = {robot.actuators.kind: type(robot.actuators) for robot in ROBOTS.values()}
     assert kinds == FAMILIES
+
+
+def test_a_family_without_a_row_of_its_own_has_that_of_its_nearest_base():
+    class Blowers(Fans):
+        """No row is for these."""
+
+    assert row_of({"pushing": 1, "fans": 2, "one_way": 3}, Blowers) == 2
+    assert row_of({"pushing": 1, "one_way": 3}, Blowers) == 3
+    assert row_of({"rolling": 4}, Blowers) is None
 
 
 def some_commands(robot, count=40):

@@ -47,6 +47,7 @@ from fulmar_core.controllers.pure_pursuit import PurePursuit, PurePursuitGains
 from fulmar_core.controllers.space_gains import space_lqr_weights, space_pd_gains
 from fulmar_core.controllers.space_lqr import SpaceLqr, SpaceLqrWeights
 from fulmar_core.controllers.space_pd import SpacePd, SpacePdGains
+from fulmar_core.robots.actuators.families import FAMILIES, row_of
 from fulmar_core.robots.actuators.pushing import WRENCH, Pushing
 from fulmar_core.robots.kinds import KINDS
 from fulmar_core.robots.robot import Robot
@@ -91,7 +92,8 @@ _PUSHED = {
     "lqr": Entry(SpaceLqr, SpaceLqrWeights, IN_SPACE, space_lqr_weights, check=_one_way),
     "pd": Entry(SpacePd, SpacePdGains, IN_SPACE, space_pd_gains, check=_one_way),
 }
-# By kind of robot and family of its actuators, each by the name that it is chosen by; the first one is the usual.
+# By kind of robot and family of its actuators, or a base of some, each by the name that it is chosen by; the first one
+# is the usual.
 LAWS: dict[str, dict[str, dict[str, Entry]]] = {
     "planar": {
         "thrusters": {
@@ -99,7 +101,7 @@ LAWS: dict[str, dict[str, dict[str, Entry]]] = {
             "mpc": Entry(Mpc, MpcGains, ("go_to_pose",)),
             "lqr_drift": Entry(LqrDrift, DriftWeights, ("go_to_pose",)),
         },
-        "fans": {"lqr": _LQR},
+        "one_way": {"lqr": _LQR},
         "propellers": {"line_of_sight": Entry(LineOfSight, LineOfSightGains, IN_PLANE, line_of_sight_gains)},
     },
     "rolling": {
@@ -111,7 +113,7 @@ LAWS: dict[str, dict[str, dict[str, Entry]]] = {
             )
         },
     },
-    "free_flyer": {"thrusters": _PUSHED, "fans": _PUSHED},
+    "free_flyer": {"one_way": _PUSHED},
     "satellite": {
         "reaction_wheels": {
             "lqr": Entry(AttitudeLqr, AttitudeLqrWeights, ("point",), attitude_lqr_weights),
@@ -151,21 +153,25 @@ def laws_of(robot: Robot) -> dict[str, Entry]:
     Raises:
         ConfigError: No law is for actuators of this kind.
     """
-    families = LAWS[robot.kind.name]
-    if robot.actuators.kind not in families:
+    laws = row_of(LAWS[robot.kind.name], type(robot.actuators))
+    if laws is None:
         raise ConfigError(
             f"no classical law is for '{robot.name}' ({robot.actuators.kind}); of {robot.kind.plural} there is one "
-            f"for: {', '.join(families)}. "
+            f"for: {', '.join(_laws_by_family(robot.kind.name))}. "
             "Use --controller policy, or your own: --controller mypackage.mymodule:MyController."
         )
-    return families[robot.actuators.kind]
+    return laws
+
+
+def _laws_by_family(kind: str) -> dict[str, dict[str, Entry]]:
+    """Laws of a kind, by every family that has some."""
+    rows = ((name, row_of(LAWS[kind], family)) for name, family in FAMILIES.items())
+    return {name: laws for name, laws in rows if laws is not None}
 
 
 def driven_by(law: str) -> str:
     """Robots that a law is for, in words."""
-    kinds = {
-        kind: [family for family, laws in families.items() if law in laws] for kind, families in LAWS.items()
-    }
+    kinds = {kind: [family for family, laws in _laws_by_family(kind).items() if law in laws] for kind in LAWS}
     return ", ".join(
         f"{KINDS[kind].plural} with {' or '.join(families)}" for kind, families in kinds.items() if families
     )

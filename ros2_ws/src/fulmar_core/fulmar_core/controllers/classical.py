@@ -12,6 +12,7 @@ from fulmar_core.config.strict_yaml import load_config
 from fulmar_core.controllers.by_kind import EVERY, LAWS, Entry, driven_by, laws_of
 from fulmar_core.controllers.default_gains import rounded
 from fulmar_core.controllers.law import Law
+from fulmar_core.robots.actuators.families import row_of
 from fulmar_core.robots.robot import Robot
 from fulmar_core.tasks import Task
 
@@ -54,7 +55,7 @@ def check_pair(robot: Robot, task: Task, *, law: str | None = None) -> None:
 
 def has_law(robot: Robot, task: Task) -> bool:
     """Whether there is a classical law for a pair."""
-    laws = LAWS[robot.kind.name].get(robot.actuators.kind, {})
+    laws = row_of(LAWS[robot.kind.name], type(robot.actuators)) or {}
     return any(task.kind in entry.tasks for entry in list(laws.values())[:1])
 
 

@@ -1,11 +1,9 @@
-"""The tables of dynamics by kind of robot: how it moves, is disturbed and measured, and what its actuators do."""
+"""The tables of dynamics: how robots of each kind move, are disturbed and measured, and what families remember."""
 
 from __future__ import annotations
 
 import math
-from collections import defaultdict
 from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 from fulmar_core.dynamics.actuators.actuation import ActuationState
@@ -20,6 +18,8 @@ from fulmar_core.dynamics.batch_dynamics import (
     SpatialDynamics,
 )
 from fulmar_core.dynamics.flight_dynamics import FlightDynamics
+from fulmar_core.robots.actuators.families import row_of
+from fulmar_core.robots.actuators.family import Actuators
 from fulmar_core.robots.robot import Robot
 from fulmar_core.states.rotation import Array
 from fulmar_core.worlds.scenario import Scenario
@@ -55,9 +55,23 @@ DYNAMICS: dict[str, Made] = {
     "satellite": _satellite,
     "aircraft": _aircraft,
 }
-ACTUATIONS: dict[str, Callable[..., ActuationState]] = defaultdict(
-    lambda: ActuationState, satellite=WheelActuation, aircraft=FlightActuation
-)
+
+
+def _thrusters(
+    actuators: Actuators, safe: Array, *, world: World | None = None, **others: Any
+) -> ActuationState:
+    """Valves, with a tank where there is one that empties."""
+    if world is None or actuators.tank is None:
+        return ActuationState(actuators, safe, **others)
+    return TankActuation(actuators, safe, world=world, **others)
+
+
+# By family of actuators, or a base of some, what they remember beside delays, slew and lag.
+ACTUATIONS: dict[str, Callable[..., ActuationState]] = {
+    "thrusters": _thrusters,
+    "reaction_wheels": WheelActuation,
+    "control_surfaces": FlightActuation,
+}
 
 
 def dynamics_of(robot: Robot, scenario: Scenario | None = None) -> Dynamics[Any, Any]:
@@ -92,13 +106,12 @@ def actuation_of(
         world: Says how full tanks are; None: they never empty, which costs less.
     """
     outlasts_step = latest_s > step_s + 1e-9 and not opens_late
-    make = ACTUATIONS[robot.kind.name]
-    if world is not None and robot.actuators.tank is not None:
-        make = partial(TankActuation, world=world)
+    make = row_of(ACTUATIONS, type(robot.actuators)) or ActuationState
     return make(
         robot.actuators,
         safe,
         opens_late=opens_late,
         delay_ticks=math.ceil(latest_s / robot.timing.physics_dt - 1e-9) if outlasts_step else 0,
         parts=robot.actuators.parts if changes else None,
+        world=world,
     )

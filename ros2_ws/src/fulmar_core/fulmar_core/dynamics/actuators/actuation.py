@@ -39,6 +39,7 @@ class ActuationState(MutableState):
         opens_late: bool = True,
         delay_ticks: int = 0,
         parts: MovingParts | None = None,
+        world: World | None = None,
     ) -> None:
         """Begin in the safe state.
 
@@ -50,6 +51,7 @@ class ActuationState(MutableState):
                 meanwhile; 0 otherwise, which costs less. Valves that open late need 0.
             parts: What may stick within an episode, in worlds whose supply may fall; None saves the work where
                 nothing changes.
+            world: For memories that begin as it says; None saves the work of those that may be left out.
         """
         self._response, self._binary, self._opens_late = actuators.own_response, actuators.binary, opens_late
         self._scale = array_namespace(safe).asarray(actuators.scale, dtype=safe.dtype, device=device(safe))[

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from fulmar_core.config.plausible_ranges import Plausible
-from fulmar_core.robots.actuators.pushing import Mount, Push, Pushing
+from fulmar_core.robots.actuators.pushing import Mount, OneWay, Push
 from fulmar_core.robots.actuators.response import Response
 from fulmar_core.states.arrays import clip
 from fulmar_core.states.rotation import Array
@@ -20,7 +20,7 @@ class Fan(Mount):
 
 
 @dataclass(frozen=True)
-class Fans(Pushing):
+class Fans(OneWay):
     """A command is the share of full thrust, 0 to 1, for each fan; fans have nothing in common that they share.
 
     Int-Ball2 (`jaxa/int-ball2_simulator`, `ib2_gazebo/sim/sim.yaml`) has eight of 0.06 N with a lag of 0.01 s. A driver
@@ -32,7 +32,6 @@ class Fans(Pushing):
     fans: tuple[Fan, ...]
     response: Response = Response()
 
-    one_way = True
     shared_pressure = False
     plausible = (
         Plausible(

@@ -178,6 +178,12 @@ class Pushing(Actuators):
         return same.astype(float) if (same.sum(axis=1) == 1).all() else None
 
 
+class OneWay(Pushing):
+    """A family of which each actuator pushes one way, from nothing to its full thrust."""
+
+    one_way = True
+
+
 def wrench_columns(count: int) -> list[int]:
     """Which of the six numbers of a wrench count where wrenches have so many: 3 of robots in the plane, or all 6.
 

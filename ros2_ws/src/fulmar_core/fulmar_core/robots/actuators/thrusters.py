@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from fulmar_core.robots.actuators.pushing import Mount, Push, Pushing
+from fulmar_core.robots.actuators.pushing import Mount, OneWay, Push
 from fulmar_core.robots.actuators.response import Response
 from fulmar_core.robots.actuators.tank import Tank
 from fulmar_core.states.arrays import array_namespace, clip
@@ -25,7 +25,7 @@ class Nozzle(Mount):
 
 
 @dataclass(frozen=True)
-class Thrusters(Pushing):
+class Thrusters(OneWay):
     """A bank of valves; a command is 0 (closed) to 1 (open) for each, and nothing between for on/off valves.
 
     With a shared pressure line, n open valves give 1/n of the full thrust each (thesis §3.5.1;
@@ -41,7 +41,6 @@ class Thrusters(Pushing):
     response: Response = Response()
     tank: Tank | None = None  # that feeds them; None: the supply never falls by itself
 
-    one_way = True
     opens_late = True
     calibrated = ("thrust", "opening_delay")
 
