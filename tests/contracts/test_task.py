@@ -75,7 +75,7 @@ def test_what_is_drawn_is_finite_at_rest_and_within_the_geofence(task, robot, tr
     assert {pose.shape for pose in goal.things.values()} <= {(300, numbers)}
     assert {thing.name for thing in task.things} <= set(goal.things)
     still = zip(start.columns(), start.stopped().columns(), strict=True)
-    assert not robot.kind.stops or all(np.array_equal(*pair) for pair in still)
+    assert not robot.kind.stays or all(np.array_equal(*pair) for pair in still)
     errors = task.errors(start, goal)
     if errors.position is not None:
         assert errors.position.max() < robot.limits.geofence
@@ -202,7 +202,7 @@ def carried_in_space(state, goal, *, twists):
 @EACH_PAIR
 def test_moving_and_turning_the_whole_world_changes_nothing_that_is_seen(task, robot):
     _, state, goal = on_the_way(task, robot)
-    if not robot.kind.stops:  # its paths lead along the world's x, and how far does not count
+    if not robot.kind.stays:  # its paths lead along the world's x, and how far does not count
         further = task.observe(replace(state, x=state.x + 3.0), goal)
         assert all(np.array_equal(*pair) for pair in zip(task.observe(state, goal), further, strict=True))
         return

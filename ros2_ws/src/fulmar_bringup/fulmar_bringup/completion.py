@@ -88,7 +88,7 @@ def _check_asked(plan: RunPlan, robot: Robot) -> None:
     if plan.goals and plan.goal is not None:
         raise ConfigError("--goals brings its own goals; it takes no --goal.")
     # References of aircraft begin where the craft is, and no single goal holds one.
-    if plan.is_real and plan.goal is None and robot.kind.stops and not (plan.goals or plan.standing):
+    if plan.is_real and plan.goal is None and robot.kind.stays and not (plan.goals or plan.standing):
         raise ConfigError("a real robot goes nowhere by chance: say where with --goal or --goals.")
 
 

@@ -36,7 +36,7 @@ def plant_spec(plan: RunPlan, *, port: str = "") -> NodeSpec:
         plan: What to run.
         port: Where the device is, in the place of what the hardware file says.
     """
-    lands_s = LANDS_S + STOPS_S if not load_robot(plan.robot).kind.stops and not plan.lockstep else 0.0
+    lands_s = LANDS_S + STOPS_S if not load_robot(plan.robot).kind.rests and not plan.lockstep else 0.0
     parameters: dict[str, Parameter] = {
         "robot": plan.robot,
         "task": plan.task,

@@ -221,7 +221,7 @@ def _wait_for_end(
     began = time.monotonic()
     plant_limit_s, controller_limit_s = silence_limits_s(plan)
     limit_s = 30.0 + 1.5 * plan.duration_s / plan.rate + (plan.duration_s if plan.lockstep else 0.0)
-    limit_s += LANDS_S if plan.hardware and not load_robot(plan.robot).kind.stops else 0.0
+    limit_s += LANDS_S if plan.hardware and not load_robot(plan.robot).kind.rests else 0.0
 
     def failed() -> bool:
         message = overseer.plant.message

@@ -92,9 +92,9 @@ class PlantNode(LifecycleNode):
         timeout_s = self.settings.timeout_s(self.robot)
         if timeout_s == 0.0:
             until = (
-                "the safe controller flies, and no trip is reported"
-                if self.robot.flies
-                else "actuators stay as they are"
+                "actuators stay as they are"
+                if self.robot.kind.rests
+                else "the safe controller flies, and no trip is reported"
             )
             off = f"THE COMMAND WATCHDOG IS OFF: {until} when a controller dies."
             self.get_logger().warning(off)
@@ -197,7 +197,7 @@ class PlantNode(LifecycleNode):
         Args:
             cut_short: Whether the process has been asked once more to end.
         """
-        if not self.robot.flies or self.settings.lockstep or self.health.mode != "running":
+        if self.robot.kind.rests or self.settings.lockstep or self.health.mode != "running":
             return
         self.get_logger().warning(
             f"asked to end in flight: the safe controller flies down, within {LANDS_S:g} s; asked again, the plant ends"
@@ -319,7 +319,7 @@ class PlantNode(LifecycleNode):
                 self._lockstep.run(sample, steps, self._stop)
             else:
                 # What ends in the air falls; a simulated one is put back at its next start.
-                lands = self.robot.flies and not self._simulated
+                lands = not self.robot.kind.rests and not self._simulated
                 ticks = self._count(self.robot.timing.physics_dt)
                 self._realtime.run(sample, ticks, self._stop, lands=lands)
             self.health.mode = "stopping"

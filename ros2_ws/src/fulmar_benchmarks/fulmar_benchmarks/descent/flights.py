@@ -51,7 +51,7 @@ class Flights:
             ConfigError: The robot is none.
         """
         robot = load_robot(self.robot)
-        if robot.kind.stops:
+        if robot.kind.rests:
             raise ConfigError(f"'{self.robot}' does not fly: what stops at once needs no descent.")
         return robot
 

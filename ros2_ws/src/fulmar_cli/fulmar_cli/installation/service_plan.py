@@ -137,7 +137,7 @@ def plan_service(wanted: Wanted, root: Path, *, dry_run: bool) -> PlannedService
         user,
         known,
         whole_paths(os.environ) | module_path(own, os.environ),
-        lands=not load_robot(plan.robot).kind.stops,
+        lands=not load_robot(plan.robot).kind.rests,
     )
     files = Files(root, service.name)
     return PlannedService(files, texts_of(files, unit_text(service, os.environ), rules))

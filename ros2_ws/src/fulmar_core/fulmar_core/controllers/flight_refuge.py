@@ -160,4 +160,4 @@ def descent_weights(robot: Robot) -> FlightWeights:
 
 def refuge_of(robot: Robot, hz: float) -> Refuge:
     """Safe controller of a robot, asked so often [Hz]: that of its actuators, or, of an aircraft, one that flies."""
-    return robot.actuators.refuge if robot.kind.stops else LevelDescent(robot, hz)
+    return robot.actuators.refuge if robot.kind.rests else LevelDescent(robot, hz)

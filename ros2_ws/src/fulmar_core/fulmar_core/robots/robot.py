@@ -352,7 +352,7 @@ def _check_pushed(robot: Robot) -> None:
         raise ValueError(
             "force, top_speed, speed, turning_acceleration of 'performance' must be greater than 0."
         )
-    if (robot.airframe is None) is not robot.kind.stops:
+    if (robot.airframe is None) is not robot.kind.stays:
         raise ValueError(_WINGS)
 
 

@@ -143,7 +143,7 @@ class FaultEnvironment:
 
     def why_not(self, robot: Robot) -> str:
         """Why a robot cannot be in such a system; empty if it can."""
-        turns, flies = not robot.kind.goes_anywhere, not robot.kind.stops
+        turns, flies = not robot.kind.goes_anywhere, not robot.kind.stays
         if not robot.kind.goal_task:
             return ""
         reasons = {
@@ -182,7 +182,7 @@ def goal_of(robot: Robot) -> tuple[float, ...]:
 def area_of(robot: Robot) -> tuple[float, ...]:
     """The surroundings of start and goal: two sides for each axis [m]."""
     goal = goal_of(robot)[: robot.state_type.AXES]
-    if not robot.kind.stops:
+    if not robot.kind.stays:
         return (-ROOM_M, robot.limits.geofence, -AISLE_M, AISLE_M, -ROOM_M, goal[2] + ROOM_M)
     return tuple(side for far in goal for side in (-ROOM_M, far + ROOM_M))
 
@@ -205,7 +205,7 @@ def plan_of(name: str, record: Path, about: FaultEnvironment = USUAL) -> RunPlan
         task.name,
         _controller_of(robot),
         "hardware" if about.emulated else "mujoco",
-        goal=None if about.by_goal_node or about.nadir or not robot.kind.stops else goal_of(robot),
+        goal=None if about.by_goal_node or about.nadir or not robot.kind.stays else goal_of(robot),
         start=_start_of(robot, about),
         scenario=about.scenario,
         goals=_goals_file(record.parent, robot, task) if about.by_goal_node else "",

@@ -90,7 +90,7 @@ class LiveSystem:
         self.left_over: list[str] = []
         robot = load_robot(self.plan.robot)
         self.robot = robot
-        self.flight = flight = FlightWatch(bystander, self.plan.frames) if not robot.kind.stops else None
+        self.flight = flight = FlightWatch(bystander, self.plan.frames) if not robot.kind.rests else None
         applied = DEVICE_STATE if about.emulated else ACTUATORS_STATE
         downs = {} if flight is None else {"is_down": flight.is_down}
         self.observer = RunObserver(bystander, robot, applied, **downs)

@@ -67,7 +67,7 @@ class RunObserver:
         # Received [s], stamp [ns], command; None of what has come down.
         self._applied: list[tuple[float, int, tuple[float, ...] | None]] = []
         # Of what cannot stop: every command of its controller; anything else is the safe controller's.
-        self._commanded: set[tuple[float, ...]] | None = None if robot.kind.stops else set()
+        self._commanded: set[tuple[float, ...]] | None = None if robot.kind.rests else set()
         self._statuses: list[HealthStatus] = []
         listen = node.create_subscription
         listen(JointState, wire.name, self._on_applied, subscriber_qos(wire, reliable=True, depth=DEPTH))

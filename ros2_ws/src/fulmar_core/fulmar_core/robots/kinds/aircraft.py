@@ -18,6 +18,7 @@ AIRCRAFT = Kind(
     recipe="aircraft",
     # The delays of `randomised` are longer than the control step of an aircraft.
     usual_scenario="nominal",
-    stops=False,
+    stays=False,
+    rests=False,
     outdoors=True,
 )

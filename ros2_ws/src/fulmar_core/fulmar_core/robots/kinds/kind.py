@@ -32,6 +32,14 @@ class Kind:
     weighs: bool = True  # gravity pulls it
     drifts: bool = False  # at rest its actuators let it go on; water slows it all the same
     calibrated: tuple[str, ...] = ()  # quantities of its body that identification measures, of `Calibration`
-    stops: bool = True  # it can stay where it is; else its safe state is a flight
+    stays: bool = True  # it can stay where it is; else it flies on for ever
+    rests: bool = True  # it comes to no harm at its safe command; else its safe state is a flight down
+    tilt_deg: float = 180.0  # largest of the attitudes that it can hold, which tasks draw and ask for [deg]
     outdoors: bool = False  # satellite navigation is in its loop
-    axes: tuple[int, ...] = (0, 1, 2, 3, 4, 5)  # of a wrench's six, those along and about which it moves
+    # Of a wrench's six, those along and about which its actuators move it.
+    axes: tuple[int, ...] = (0, 1, 2, 3, 4, 5)
+
+    @property
+    def lifted(self) -> bool:
+        """Whether nothing but what moves it carries its weight."""
+        return self.weighs and 2 in self.axes
