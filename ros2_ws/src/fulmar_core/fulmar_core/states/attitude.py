@@ -200,13 +200,19 @@ def euler_of(q: Quaternion) -> Vector:
     return roll, xp.asin(sine), yaw
 
 
-def uniform_attitude(first: Array, second: Array, third: Array) -> Quaternion:
-    """Attitude that is uniform over all rotations, from three numbers that are uniform in [0, 1).
+def uniform_attitude(first: Array, second: Array, third: Array, *, tilt_deg: float = 180.0) -> Quaternion:
+    """Attitude from three numbers that are uniform in [0, 1): uniform over all rotations that tilt no further [deg].
 
     Shoemake, "Uniform random rotations", Graphics Gems III, 1992. Euler angles that are each uniform would crowd at the
     poles, as the starts of RANS do (thesis §3.3.6).
     """
     xp = array_namespace(first)
+    if tilt_deg < 180.0:
+        # The body's z axis is uniform over a cap of the sphere, which the heading turns under.
+        tilt = xp.acos(1.0 - (1.0 - math.cos(math.radians(tilt_deg))) * first)
+        towards, zero = 2.0 * math.pi * second, 0.0 * first
+        leaning = exponential((tilt * xp.cos(towards), tilt * xp.sin(towards), zero))
+        return product(leaning, from_euler(zero, zero, 2.0 * math.pi * third))
     low, high = xp.sqrt(1.0 - first), xp.sqrt(first)
     a, b = 2.0 * math.pi * second, 2.0 * math.pi * third
     return low * xp.sin(a), low * xp.cos(a), high * xp.sin(b), high * xp.cos(b)

@@ -41,7 +41,7 @@ class GoToPosition3d(FileTask[SpatialState]):
 
     def draw(self, draws: Draws, robot: Robot, *, training: bool) -> tuple[SpatialState, Goal]:
         """Draw starts and goals; see `Task.draw`."""
-        start, target = self.start.draw_in_space(draws, training=training)
+        start, target = self.start.draw_in_space(draws, training=training, tilt_deg=robot.kind.tilt_deg)
         return start, goals_at(target)
 
     def observe(self, state: SpatialState, goal: Goal) -> tuple[Array, ...]:

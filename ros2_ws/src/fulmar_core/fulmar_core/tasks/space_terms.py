@@ -37,17 +37,21 @@ MOTION_TERMS = (*(f"velocity_{axis}_in_body" for axis in AXES), *(f"turn_rate_{a
 class SpaceStart(Start):
     """Where episodes begin, relative to the goal: directions and attitudes are uniform over the sphere and over SO(3).
 
+    Of kinds that cannot hold every attitude, over those that they can.
+
     RANS draws the polar angle uniformly, which crowds starts at the poles (thesis §3.3.6).
     """
 
-    def draw_in_space(self, draws: Draws, *, training: bool) -> tuple[SpatialState, Array]:
-        """Draw starts at rest, shapes (worlds,), and goal poses, shape (worlds, 7)."""
+    def draw_in_space(
+        self, draws: Draws, *, training: bool, tilt_deg: float = 180.0
+    ) -> tuple[SpatialState, Array]:
+        """Draw starts at rest, shapes (worlds,), and goal poses, shape (worlds, 7), that tilt no further [deg]."""
         low, high = self.training_distance if training else self.distance
         place = draws.uniform(-0.5 * self.goal_area, 0.5 * self.goal_area, 3)
         numbers = draws.uniform(0.0, 1.0, 8)
         distance = draws.uniform(low, high)
-        goal_quat = uniform_attitude(*(numbers[:, i] for i in range(3)))
-        quat = uniform_attitude(*(numbers[:, i] for i in range(3, 6)))
+        goal_quat = uniform_attitude(*(numbers[:, i] for i in range(3)), tilt_deg=tilt_deg)
+        quat = uniform_attitude(*(numbers[:, i] for i in range(3, 6)), tilt_deg=tilt_deg)
         aside = uniform_direction(numbers[:, 6], numbers[:, 7])
         x, y, z = (place[:, i] + distance * aside[i] for i in range(3))
         xp = array_namespace(place)

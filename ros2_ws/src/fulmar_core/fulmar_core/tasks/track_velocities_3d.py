@@ -59,7 +59,7 @@ class TrackVelocities3d(FileTask[SpatialState]):
         rate = xp.minimum(rate, can.turning_acceleration / clip(speed, 1e-6, None))
         targets = xp.stack((*scaled(speed, towards), *scaled(rate, about)), axis=-1)
         zero = xp.zeros_like(numbers[:, 0])
-        quat = uniform_attitude(*(numbers[:, i] for i in range(3)))
+        quat = uniform_attitude(*(numbers[:, i] for i in range(3)), tilt_deg=robot.kind.tilt_deg)
         return SpatialState.at_rest((zero, zero, zero), quat), Goal(targets, zero, no_obstacles(draws.worlds))
 
     def _errors(self, state: SpatialState, goal: Goal) -> tuple[Vector, Vector]:

@@ -47,8 +47,8 @@ class SpaceWaypoints:
                 "'count' must be at least 2, 'spacing' [low, high] with 0 < low <= high <= area / 2."
             )
 
-    def draw(self, draws: Draws) -> np.ndarray:
-        """Draw poses, shape (worlds, count, 7)."""
+    def draw(self, draws: Draws, *, tilt_deg: float) -> np.ndarray:
+        """Draw poses that tilt no further [deg], shape (worlds, count, 7)."""
         half, worlds = 0.5 * self.area, np.arange(draws.worlds)
         places = [np.asarray(draws.uniform(-half, half, 3))]
         for _ in range(1, self.count):
@@ -63,7 +63,7 @@ class SpaceWaypoints:
             fits = np.all(np.abs(candidates) <= half, axis=-1)
             places.append(candidates[worlds, np.argmax(fits, axis=1)])
         numbers = draws.uniform(0.0, 1.0, self.count, 3)
-        quat = uniform_attitude(*(numbers[..., i] for i in range(3)))
+        quat = uniform_attitude(*(numbers[..., i] for i in range(3)), tilt_deg=tilt_deg)
         return np.concatenate((np.stack(places, axis=1), np.stack(quat, axis=-1)), axis=-1)
 
 
@@ -115,11 +115,12 @@ class SpaceWaypointTask(FileTask[SpatialState]):
 
     def draw(self, draws: Draws, robot: Robot, *, training: bool) -> tuple[SpatialState, Goal]:
         """Draw a start at rest and closed waypoints."""
-        targets = self.course.draw(draws)
+        tilt_deg = robot.kind.tilt_deg
+        targets = self.course.draw(draws, tilt_deg=tilt_deg)
         distance, numbers = draws.uniform(*self.start_distance), draws.uniform(0.0, 1.0, 5)
         aside = uniform_direction(numbers[:, 0], numbers[:, 1])
         x, y, z = (targets[:, 0, i] + distance * aside[i] for i in range(3))
-        quat = uniform_attitude(*(numbers[:, i] for i in range(2, 5)))
+        quat = uniform_attitude(*(numbers[:, i] for i in range(2, 5)), tilt_deg=tilt_deg)
         worlds = draws.worlds
         return SpatialState.at_rest((x, y, z), quat), Goal(targets, np.zeros(worlds), no_obstacles(worlds))
 
