@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -100,7 +101,7 @@ def _planar_motion(settings: PlanarMotionSettings, robot: Robot) -> Estimator:
 def _spatial_motion(settings: SpatialMotionSettings, robot: Robot) -> Estimator:
     from fulmar_core.estimators.motion.spatial_motion import SpatialMotionEstimator
 
-    return _motion(SpatialMotionEstimator, settings, robot)
+    return _motion(partial(SpatialMotionEstimator, weighs=robot.kind.weighs), settings, robot)
 
 
 def _attitude(settings: AttitudeSettings, robot: Robot) -> Estimator:

@@ -19,6 +19,7 @@ from fulmar_core.estimators.motion.filter import Filter, Placed
 from fulmar_core.estimators.motion.settings import SpatialMotionSettings
 from fulmar_core.robots.sensors.imu import ImuSample
 from fulmar_core.states.attitude import exponential, normalised, product, rotation_error
+from fulmar_core.states.gravity import GRAVITY
 from fulmar_core.states.rotation import rotate
 
 ERRORS = 15
@@ -54,10 +55,10 @@ class SpatialFilter(ExtendedKalmanFilter, Filter):  # type: ignore[misc]
     (3, 3) [rad²].
     """
 
-    def __init__(self, settings: SpatialMotionSettings, pose: np.ndarray) -> None:
-        """Begin at rest at a pose, knowing little else."""
+    def __init__(self, settings: SpatialMotionSettings, pose: np.ndarray, *, weighs: bool) -> None:
+        """Begin at rest at a pose, knowing little else; `weighs`: gravity pulls the body, which no sensor feels."""
         super().__init__(dim_x=ERRORS, dim_z=6)
-        self._settings = settings
+        self._settings, self._weighs = settings, weighs
         zero = np.zeros(3)
         self.belief = Belief(pose[:3], zero, _unit(pose[3:]), zero, zero, zero, measured=False)
         self.x = np.zeros(ERRORS)
@@ -82,6 +83,8 @@ class SpatialFilter(ExtendedKalmanFilter, Filter):  # type: ignore[misc]
             force, noise = inertial.specific_force - now.force_bias, s.acceleration_noise
         axes = rotate(now.quat_xyzw, np.eye(3)).T  # body to world
         push = axes @ force
+        if self._weighs and has_force:
+            push = push - np.array([0.0, 0.0, GRAVITY])
         turned = exponential(tuple(t * rate))
         F = np.eye(ERRORS)
         F[PLACE, VELOCITY] = t * np.eye(3)

@@ -1,13 +1,15 @@
 """Motion in space, from poses, inertial readings and star tracker attitudes in any order of arrival.
 
 Readings: `mocap` is a pose in the world, shape (7,): position [m], quaternion x, y, z, w. `imu` is an `ImuSample` in
-the body's frame, without gravity. `star_tracker` is the attitude of the body in the world, a quaternion x, y, z, w; its
+the body's frame. `star_tracker` is the attitude of the body in the world, a quaternion x, y, z, w; its
 covariance is about the body's axes, shape (3, 3) [rad²]. The estimate is a `RigidBodyState`; its covariance, shape
 (12, 12), is about position and rotation in the world [m, rad], then velocity in the world [m/s] and turn rate in the
 body [rad/s].
 """
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 
@@ -25,6 +27,17 @@ class SpatialMotionEstimator(HistoryEstimator[SpatialMotionSettings]):
     """Multiplicative extended Kalman filter with a history; see `Estimator`."""
 
     _filter: SpatialFilter | None
+
+    def __init__(self, *settings: Any, weighs: bool, **others: Any) -> None:
+        """Begin without an estimate.
+
+        Args:
+            settings: As in `HistoryEstimator`, as the rest.
+            weighs: Whether gravity pulls the body.
+            others: As in `HistoryEstimator`.
+        """
+        self._weighs = weighs
+        super().__init__(*settings, **others)
 
     def _pose(self, reading: Reading) -> np.ndarray:
         return np.array(reading.value, dtype=float)
@@ -44,7 +57,7 @@ class SpatialMotionEstimator(HistoryEstimator[SpatialMotionSettings]):
         return float(np.linalg.norm(reading.value.angular_velocity))
 
     def _new_filter(self, pose: np.ndarray) -> SpatialFilter:
-        return SpatialFilter(self._settings, pose)
+        return SpatialFilter(self._settings, pose, weighs=self._weighs)
 
     def _placed(self, pose: np.ndarray) -> Placed:
         return pose[:3], pose[3:] / np.linalg.norm(pose[3:])
