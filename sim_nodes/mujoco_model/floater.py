@@ -21,8 +21,8 @@ class Floater:
     """One body under forces at fixed places.
 
     A planar robot gets two slides and a hinge and stands on a floor under gravity, which holds it up but pushes
-    nowhere. A robot with hydrodynamics swims. Any other robot floats free without gravity. Each
-    actuator pushes at its place along its direction, and takes newtons.
+    nowhere. A robot with hydrodynamics swims. Any other robot moves freely. Each actuator pushes at its place along its
+    direction, turns the body about that by its couple, and takes newtons.
 
     Attributes:
         water: That a robot with hydrodynamics swims in; None for any other.
@@ -121,7 +121,8 @@ class Floater:
 
 def _add_push(spec: mujoco.MjSpec, body: mujoco.MjsBody, push: Push) -> None:
     body.add_site(name=push.name, pos=list(push.position), size=[0.02, 0.02, 0.02], rgba=list(PART_COLOUR))
-    add_actuator(spec, push.name, push.name, [*push.direction, 0.0, 0.0, 0.0])
+    couple = [push.couple * part + 0.0 for part in push.direction]
+    add_actuator(spec, push.name, push.name, [*push.direction, *couple])
 
 
 def add_actuator(spec: mujoco.MjSpec, name: str, site: str, gear: list[float]) -> None:

@@ -55,11 +55,6 @@ class Propellers(Pushing):
         """Place of each propeller; all push ahead."""
         return tuple(Push(each.name, each.position, (1.0, 0.0, 0.0)) for each in self.propellers)
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the propellers, in the order of every command vector."""
-        return tuple(propeller.name for propeller in self.propellers)
-
     @functools.cached_property
     def lever_arms(self) -> np.ndarray:
         """Yaw moment of 1 N ahead at each propeller, shape (n,) [m]."""

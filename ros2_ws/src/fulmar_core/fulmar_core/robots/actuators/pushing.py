@@ -29,6 +29,7 @@ class Push:
     name: str
     position: Vector3  # where the force acts [m]
     direction: Vector3  # of the force on the body for a positive command, a unit vector [-]
+    couple: float = 0.0  # torque about `direction` that comes with each newton, as of a rotor that spins [m]
 
 
 @dataclass(frozen=True)
@@ -102,7 +103,8 @@ class Pushing(Actuators):
         """Force and torque in the body frame of 1 N by each actuator, shape (n, 6) [N, N·m]."""
         positions = np.array([push.position for push in self.pushes])
         directions = np.array([push.direction for push in self.pushes])
-        return np.concatenate((directions, np.cross(positions, directions)), axis=1)
+        couples = np.array([push.couple for push in self.pushes])[:, None]
+        return np.concatenate((directions, np.cross(positions, directions) + couples * directions), axis=1)
 
     @property
     def full_wrenches(self) -> tuple[np.ndarray, np.ndarray, bool]:

@@ -63,19 +63,6 @@ class Thrusters(OneWay):
         """Place and direction of each nozzle."""
         return tuple(nozzle.push for nozzle in self.nozzles)
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the valves, in the order of every command vector."""
-        return tuple(nozzle.name for nozzle in self.nozzles)
-
-    @functools.cached_property
-    def wrench_per_newton(self) -> np.ndarray:
-        """Force and torque in the body frame of 1 N at each nozzle, shape (n, 6) [N, N·m]."""
-        positions = np.array([nozzle.position for nozzle in self.nozzles])
-        directions = np.array([nozzle.direction for nozzle in self.nozzles])
-        directions = directions / np.linalg.norm(directions, axis=1, keepdims=True)
-        return np.concatenate((directions, np.cross(positions, directions)), axis=1)
-
     def limited(self, command: Array) -> Array:
         """Nearest command that the hardware can carry out.
 
