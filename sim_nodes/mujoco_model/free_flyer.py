@@ -1,4 +1,4 @@
-"""Robots that float free in space in MuJoCo."""
+"""Robots that actuators push in space in MuJoCo."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ TORQUE_SITE = "torque"  # where the torque of the surroundings acts
 
 
 class FreeFlyer(FreeBody, Floater):
-    """One body on a free joint, without gravity, under forces at fixed places and a push of the surroundings.
+    """One body on a free joint, under forces at fixed places, a push of the surroundings and its weight, if any.
 
     Three more actuators apply the torque of an episode about the body's axes: a constant one, and that of an orbit.
     """

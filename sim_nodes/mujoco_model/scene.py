@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable
 from typing import Any, Protocol
 
@@ -28,14 +29,22 @@ from sim_nodes.mujoco_model.objects import (
 from sim_nodes.mujoco_model.satellite import Satellite
 from sim_nodes.mujoco_model.scenery import add_scenery, add_sensors
 
-BY_KIND: dict[str, Callable[[Robot], RobotModel]] = {
-    "planar": Floater,
-    "free_flyer": FreeFlyer,
-    "satellite": Satellite,
-    "aircraft": Aircraft,
-}
-# Families on wheels each have a chassis of their own.
+
+def _rolling(robot: Robot) -> RobotModel:
+    """Families on wheels each have a chassis of their own."""
+    kind = robot.actuators.kind
+    if kind not in WHEELED:
+        raise ConfigError(
+            f"there is no MuJoCo model of robots with {kind} such as '{robot.name}'; there is one for what pushes, "
+            f"and for {', '.join(WHEELED)}. Use --backend mock."
+        )
+    return WHEELED[kind](robot)
+
+
 WHEELED: dict[str, Callable[[Robot], RobotModel]] = {"differential_drive": DifferentialBase, "ackermann": Car}
+BY_KIND: dict[str, Callable[[Robot], RobotModel]] = defaultdict(
+    lambda: FreeFlyer, planar=Floater, rolling=_rolling, satellite=Satellite, aircraft=Aircraft
+)
 PALE, WATER = [0.85, 0.87, 0.9, 1.0], [0.55, 0.75, 0.85, 1.0]
 
 
@@ -191,12 +200,4 @@ def robot_model_of(robot: Robot) -> RobotModel:
     Raises:
         ConfigError: The family has none.
     """
-    if robot.kind.name in BY_KIND:
-        return BY_KIND[robot.kind.name](robot)
-    kind = robot.actuators.kind
-    if kind not in WHEELED:
-        raise ConfigError(
-            f"there is no MuJoCo model of robots with {kind} such as '{robot.name}'; there is one for what pushes, "
-            f"and for {', '.join(WHEELED)}. Use --backend mock."
-        )
-    return WHEELED[kind](robot)
+    return BY_KIND[robot.kind.name](robot)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable
 
 from fulmar_evaluation.aircraft_check import AircraftCheck, check_aircraft
@@ -10,10 +11,10 @@ from fulmar_evaluation.wrench_check import FreeFlyerCheck, SpaceCheck, WheelChec
 Findings = WrenchCheck | AircraftCheck
 
 # From a robot, and the speed, altitude and height that a trim was asked for at; each None if none was.
-CHECKS: dict[str, Callable[..., Findings]] = {
-    "planar": WrenchCheck.of,
-    "rolling": WheelCheck.of,
-    "free_flyer": FreeFlyerCheck.of,
-    "satellite": SpaceCheck.of,
-    "aircraft": check_aircraft,
-}
+CHECKS: dict[str, Callable[..., Findings]] = defaultdict(
+    lambda: SpaceCheck.of,
+    planar=WrenchCheck.of,
+    rolling=WheelCheck.of,
+    free_flyer=FreeFlyerCheck.of,
+    aircraft=check_aircraft,
+)

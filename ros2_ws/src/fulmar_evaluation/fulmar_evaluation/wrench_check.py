@@ -13,6 +13,7 @@ import numpy as np
 from fulmar_core.config.errors import ConfigError
 from fulmar_core.config.plausibility import logger as plausibility
 from fulmar_core.controllers.allocation import check_allocation
+from fulmar_core.dynamics.hover import hover_command, level_state
 from fulmar_core.dynamics.linear_model import LinearModel, linearise
 from fulmar_core.robots.actuators.pushing import WRENCH, Pushing
 from fulmar_core.robots.robot import Robot
@@ -260,7 +261,11 @@ class SpaceCheck(WrenchCheck):
     sideways = True
 
     def _model(self) -> tuple[np.ndarray, np.ndarray, int]:
-        """Of a double integrator."""
+        """Of a double integrator; of what its actuators carry about the hover, from where it goes aside by tilting."""
+        if self.robot.kind.lifted:
+            hover, scale = hover_command(self.robot), self.robot.actuators.scale
+            model = linearise(self.robot, level_state(), hover, self.robot.timing.control_s)
+            return model.a, model.b * scale, len(model.a)
         count = len(self.wrenches.axes)
         a = np.block([[np.zeros((count, count)), np.eye(count)], [np.zeros((count, 2 * count))]])
         b = np.vstack((0.0 * self.wrenches.columns, self.wrenches.columns / self.wrenches.scale[:, None]))

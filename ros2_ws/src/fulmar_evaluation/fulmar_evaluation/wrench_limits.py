@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fulmar_core.config.errors import ConfigError
+from fulmar_core.dynamics.hover import hover_command
 from fulmar_core.robots.robot import Robot
 
 AXES = ("force_x", "force_y", "force_z", "torque_x", "torque_y", "torque_z")
@@ -178,8 +179,10 @@ class WrenchSet:
 def wrench_set_of(robot: Robot) -> WrenchSet:
     """Wrenches of a robot's actuators about its origin, along the axes in which it moves.
 
+    Of one that they carry those beyond what does, with commands as shares of what that leaves.
+
     Raises:
-        ConfigError: The forces of its family are not those of single actuators.
+        ConfigError: The forces of its family are not those of single actuators, or do not carry it.
     """
     actuators, axes = robot.actuators, list(robot.kind.axes)
     if actuators.full_wrenches is None:
@@ -187,6 +190,9 @@ def wrench_set_of(robot: Robot) -> WrenchSet:
             f"'{robot.name}' has {actuators.kind}, whose forces are not those of single actuators."
         )
     wrenches, least, shared = actuators.full_wrenches
+    if robot.kind.lifted:
+        hover = hover_command(robot) / actuators.scale
+        wrenches, least = wrenches * (1.0 - hover)[:, None], (least - hover) / (1.0 - hover)
     return WrenchSet(tuple(AXES[i] for i in axes), wrenches[:, axes].T, least, shared)
 
 

@@ -29,6 +29,7 @@ from fulmar_core.robots.sensors.spatial_odometer import SpatialOdometer
 from fulmar_core.states.arrays import array_namespace
 from fulmar_core.states.attitude import Vector, cross, minus, plus, scaled, turn_back
 from fulmar_core.states.counter_rng import Draws
+from fulmar_core.states.gravity import GRAVITY
 from fulmar_core.states.planar import PlanarState
 from fulmar_core.states.rotation import Array, from_yaw, multiply
 from fulmar_core.states.spatial import SpatialState
@@ -240,7 +241,7 @@ class RollingDynamics(PlanarDynamics):
 
 
 class SpatialDynamics(Dynamics[SpatialWorld, SpatialState]):
-    """Rigid bodies that float free."""
+    """Rigid bodies that float free, or under their weight where their kind has any."""
 
     state_type = SpatialState
     odometer = SpatialOdometer
@@ -285,6 +286,8 @@ class SpatialDynamics(Dynamics[SpatialWorld, SpatialState]):
         if steps.off_centre:
             state = shifted(state, com)
         push: Vector = (outside[0], outside[1], outside[2])
+        if self.robot.kind.weighs:
+            push = push[0], push[1], push[2] - GRAVITY * world.mass
         steady: Vector = (world.torque[0], world.torque[1], world.torque[2])
         if len(outside) > 3:
             steady = plus(steady, (outside[3], outside[4], outside[5]))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Callable
 from typing import Any
 
@@ -28,33 +29,21 @@ from fulmar_core.worlds.world import World
 Made = Callable[[Robot, Scenario | None], Dynamics[Any, Any]]
 
 
-def _planar(robot: Robot, _scenario: Scenario | None) -> Dynamics[Any, Any]:
-    return PlanarDynamics(robot)
-
-
-def _rolling(robot: Robot, _scenario: Scenario | None) -> Dynamics[Any, Any]:
-    return RollingDynamics(robot)
-
-
-def _free_flyer(robot: Robot, scenario: Scenario | None) -> Dynamics[Any, Any]:
+def _in_space(robot: Robot, scenario: Scenario | None) -> Dynamics[Any, Any]:
     return SpatialDynamics(robot, orbits=scenario is None or scenario.orbit_rate > 0.0)
-
-
-def _satellite(robot: Robot, _scenario: Scenario | None) -> Dynamics[Any, Any]:
-    return GyrostatDynamics(robot)
 
 
 def _aircraft(robot: Robot, scenario: Scenario | None) -> Dynamics[Any, Any]:
     return FlightDynamics(robot, turbulent=scenario is None or scenario.air.turbulence > 0.0)
 
 
-DYNAMICS: dict[str, Made] = {
-    "planar": _planar,
-    "rolling": _rolling,
-    "free_flyer": _free_flyer,
-    "satellite": _satellite,
-    "aircraft": _aircraft,
-}
+DYNAMICS: dict[str, Made] = defaultdict(
+    lambda: _in_space,
+    planar=lambda robot, _: PlanarDynamics(robot),
+    rolling=lambda robot, _: RollingDynamics(robot),
+    satellite=lambda robot, _: GyrostatDynamics(robot),
+    aircraft=_aircraft,
+)
 
 
 def _thrusters(
