@@ -9,6 +9,7 @@ from fulmar_core.estimators.kinds import make_estimator
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.robots.sensors.imu import ImuSample
 from fulmar_core.states.attitude import exponential, product, rotation_error
+from fulmar_core.states.gravity import GRAVITY
 from fulmar_core.states.rotation import rotate, rotate_inverse
 from fulmar_core.states.state import RigidBodyState
 from fulmar_core.wires.reading import Reading
@@ -18,6 +19,21 @@ ROBOT = load_robot("spacecraft_16")
 DT = 0.005
 BEGIN_NS = 1_000_000_000
 PLACE_STD, TURN_STD, GYRO_STD, FORCE_STD = 0.001, 0.002, 0.0012, 0.0086
+
+
+def test_a_craft_in_the_air_is_not_taken_to_climb_by_what_its_accelerometer_feels():
+    estimator = make_estimator("mocap_imu_3d", load_robot("airship_v7"), exact_sensors=True)
+    level, still = np.array([0.0, 0.0, 30.0, 0.0, 0.0, 0.0, 1.0]), np.zeros(3)
+    for number in range(200):
+        stamp_ns = BEGIN_NS + round(1e9 * DT * number)
+        feels = ImuSample(np.array([0.0, 0.0, GRAVITY]), still)
+        assert estimator.take("imu", Reading(feels, stamp_ns)) is None
+        if number % 8 == 0 and number < 180:  # from there on by inertial readings alone
+            assert estimator.take("mocap", Reading(level, stamp_ns)) is None
+    found = estimator.estimate(stamp_ns)
+    assert found is not None, estimator.problem
+    np.testing.assert_allclose(found.value.velocity_in_world, 0.0, atol=1e-9)
+    np.testing.assert_allclose(found.value.position_in_world, level[:3], atol=1e-9)
 
 
 class Tumble:

@@ -101,6 +101,21 @@ def test_drawn_attitudes_are_uniform_over_all_rotations():
     np.testing.assert_allclose((turned**2).mean(axis=1), 1.0 / 3.0, atol=0.01)
 
 
+def test_drawn_attitudes_tilt_no_further_than_they_may_and_head_anywhere():
+    numbers = np.random.default_rng(3).uniform(size=(3, 20_000))
+    q = attitude.uniform_attitude(*numbers, tilt_deg=30.0)
+    np.testing.assert_allclose(np.linalg.norm(q, axis=0), 1.0, atol=1e-12)
+    x, y, up = attitude.turn(q, (np.zeros(20_000), np.zeros(20_000), np.ones(20_000)))
+    # Of a cap of a sphere the height is uniform.
+    least = np.cos(np.radians(30.0))
+    assert up.min() >= least - 1e-12
+    assert up.mean() == pytest.approx(0.5 * (1.0 + least), abs=1e-3)
+    np.testing.assert_allclose((x.mean(), y.mean()), 0.0, atol=0.01)
+    heading = attitude.euler_of(q)[2]
+    assert heading.mean() == pytest.approx(0.0, abs=0.05)
+    assert heading.std() == pytest.approx(np.pi / np.sqrt(3.0), abs=0.02)
+
+
 def test_drawn_directions_are_uniform_over_the_sphere():
     rng = np.random.default_rng(7)
     direction = np.array(attitude.uniform_direction(*rng.uniform(size=(2, 20_000))))
