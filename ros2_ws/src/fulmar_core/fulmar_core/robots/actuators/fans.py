@@ -43,11 +43,7 @@ class Fans(OneWay):
     def __post_init__(self) -> None:
         if self.thrust <= 0.0:
             raise ValueError("'thrust' must be greater than 0.")
-        if not self.fans or len(set(self.names)) != len(self.fans):
-            raise ValueError("'fans' must not be empty, and each needs a name of its own.")
-        if self.response.slew and len(self.response.slew) != len(self.fans):
-            raise ValueError(f"'slew' needs {len(self.fans)} values, one for each fan.")
-        self.response.refuse_lag_beside_slew()
+        self.check_parts("fans")
 
     @functools.cached_property
     def pushes(self) -> tuple[Push, ...]:

@@ -40,13 +40,9 @@ class Propellers(Pushing):
     shared_pressure = False
 
     def __post_init__(self) -> None:
-        if not self.propellers or len(set(self.names)) != len(self.propellers):
-            raise ValueError("'propellers' must not be empty, and each needs a name of its own.")
+        self.check_parts("propellers")
         if len(self.curve) < 2 or list(self.curve) != sorted(self.curve):
             raise ValueError("'curve' needs at least two thrusts, none less than the one before.")
-        if self.response.slew and len(self.response.slew) != len(self.propellers):
-            raise ValueError(f"'slew' needs {len(self.propellers)} values, one for each propeller.")
-        self.response.refuse_lag_beside_slew()
         if self.thrust(self.safe_command).any():
             raise ValueError("'curve' must be 0 in its middle: a command of 0 stops a propeller.")
 

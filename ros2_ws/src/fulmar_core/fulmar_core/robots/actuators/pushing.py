@@ -78,6 +78,19 @@ class Pushing(Actuators):
             Shape (..., n) [N].
         """
 
+    def check_parts(self, key: str) -> None:
+        """Refuse what families of all actuators alike refuse, `key` naming their list.
+
+        Raises:
+            ValueError: There are none, two have one name, or `response` does not fit them.
+        """
+        count, one = len(self.names), key.removesuffix("s")
+        if not count or len(set(self.names)) != count:
+            raise ValueError(f"'{key}' must not be empty, and each needs a name of its own.")
+        if self.response.slew and len(self.response.slew) != count:
+            raise ValueError(f"'slew' needs {count} values, one for each {one}.")
+        self.response.refuse_lag_beside_slew()
+
     @property
     def fixtures(self) -> tuple[Fixture, ...]:
         """Each with its x axis along the force of a positive command; see `Actuators.fixtures`."""

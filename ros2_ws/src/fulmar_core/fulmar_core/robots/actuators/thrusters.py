@@ -47,11 +47,7 @@ class Thrusters(OneWay):
     def __post_init__(self) -> None:
         if self.thrust <= 0.0:
             raise ValueError("'thrust' must be greater than 0.")
-        if not self.nozzles or len(set(self.names)) != len(self.nozzles):
-            raise ValueError("'nozzles' must not be empty, and each needs a name of its own.")
-        if self.response.slew and len(self.response.slew) != len(self.nozzles):
-            raise ValueError(f"'slew' needs {len(self.nozzles)} values, one for each nozzle.")
-        self.response.refuse_lag_beside_slew()
+        self.check_parts("nozzles")
 
     @property
     def binary(self) -> bool:
