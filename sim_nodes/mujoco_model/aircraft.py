@@ -16,7 +16,7 @@ from fulmar_core.states.spatial import SpatialState
 from fulmar_core.worlds.turbulence import Gust
 from sim_nodes.mujoco_model.floater import OFF_CENTRE
 from sim_nodes.mujoco_model.free_body import FreeBody, tensor_of
-from sim_nodes.mujoco_model.scenery import BODY, add_hull
+from sim_nodes.mujoco_model.scenery import BODY, add_body
 
 STEPS = 2  # of MuJoCo in a physics tick, each with the forces of where the craft is by then
 
@@ -39,14 +39,10 @@ class Aircraft(FreeBody):
     def add(self, spec: mujoco.MjSpec) -> mujoco.MjsBody:
         """Add the body; see `RobotModel.add`."""
         robot = self._robot
-        body = spec.worldbody.add_body(name=BODY)
-        body.add_freejoint(name="free")
-        body.explicitinertial = True
-        body.ipos, body.iquat = [OFF_CENTRE, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]
-        body.mass = robot.body.mass
-        its = robot.body.inertia[:3]  # the world of an episode brings the rest of the tensor
-        body.inertia = [max(its)] * 3 if robot.body.as_printed else list(its)
-        add_hull(body, robot)
+        body = add_body(spec, robot)
+        body.ipos = [OFF_CENTRE, 0.0, 0.0]
+        if robot.body.as_printed:
+            body.inertia = [max(robot.body.inertia[:3])] * 3
         return body
 
     def bind(self, model: mujoco.MjModel) -> None:

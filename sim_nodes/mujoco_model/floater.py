@@ -10,7 +10,7 @@ import numpy as np
 from fulmar_core.robots.actuators.pushing import Push, Pushing
 from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.urdf import PART_COLOUR
-from sim_nodes.mujoco_model.scenery import BODY, add_hull
+from sim_nodes.mujoco_model.scenery import BODY, add_body
 from sim_nodes.mujoco_model.water import Water
 
 # MuJoCo compiles a body whose centre of mass is its origin in a way that keeps it there [m].
@@ -53,19 +53,12 @@ class Floater:
 
     def add(self, spec: mujoco.MjSpec) -> mujoco.MjsBody:
         """Add the body; see `RobotModel.add`."""
-        robot = self._robot
-        body = spec.worldbody.add_body(name=BODY, pos=[0.0, 0.0, self.rest_height])
+        body = add_body(spec, self._robot, self.rest_height, floats=not self._planar)
         if self._planar:
             body.add_joint(name="x", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[1, 0, 0])
             body.add_joint(name="y", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[0, 1, 0])
             body.add_joint(name="yaw", type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0, 0, 1])
-        else:
-            body.add_freejoint(name="free")
-        body.explicitinertial = True
-        body.ipos, body.iquat = [OFF_CENTRE, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]
-        # The world of an episode brings the rest of the tensor, and where the centre of mass is.
-        body.mass, body.inertia = robot.body.mass, list(robot.body.inertia[:3])
-        add_hull(body, robot)
+        body.ipos = [OFF_CENTRE, 0.0, 0.0]
         for push in self._actuators.pushes:
             _add_push(spec, body, push)
         return body

@@ -18,7 +18,7 @@ from fulmar_core.robots.sensors.wheels import WheelSpeeds
 from fulmar_core.states.attitude import turn_back
 from fulmar_core.worlds.spatial_world import SpatialWorld
 from sim_nodes.mujoco_model.free_body import FreeBody, tensor_of
-from sim_nodes.mujoco_model.scenery import BODY, add_hull
+from sim_nodes.mujoco_model.scenery import BODY, add_body
 
 WHEEL_MASS = 1e-3  # of the body, each; they sit in its middle, where their mass turns nothing [-]
 
@@ -41,13 +41,9 @@ class Satellite(FreeBody):
     def add(self, spec: mujoco.MjSpec) -> mujoco.MjsBody:
         """Add the body and its wheels; see `RobotModel.add`."""
         robot, wheels = self._robot, self._wheels
-        body = spec.worldbody.add_body(name=BODY)
-        body.add_freejoint(name="free")
-        body.explicitinertial = True
-        body.ipos, body.iquat = [0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]
+        body = add_body(spec, robot)
         body.mass = robot.body.mass * (1.0 - WHEEL_MASS * wheels.count)
         body.inertia = (np.array(robot.body.inertia[:3]) - wheels.count * wheels.spin_inertia).tolist()
-        add_hull(body, robot)
         for wheel in wheels.wheels:
             part = body.add_body(name=wheel.name)
             part.add_joint(name=wheel.name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=wheel.direction.tolist())

@@ -44,7 +44,28 @@ def add_sensors(spec: mujoco.MjSpec, body: mujoco.MjsBody) -> None:
     spec.add_sensor(name="accelerometer", type=mujoco.mjtSensor.mjSENS_ACCELEROMETER, **on_site)
 
 
-def add_hull(body: mujoco.MjsBody, robot: Robot) -> None:
+def add_body(
+    spec: mujoco.MjSpec, robot: Robot, height: float = 0.0, *, floats: bool = True
+) -> mujoco.MjsBody:
+    """Add the robot's body with its hull; the world of an episode brings the rest of the tensor.
+
+    Args:
+        spec: Model under construction.
+        robot: The robot.
+        height: Of its origin [m].
+        floats: Whether it moves freely; else joints are to be added.
+    """
+    body = spec.worldbody.add_body(name=BODY, pos=[0.0, 0.0, height])
+    if floats:
+        body.add_freejoint(name="free")
+    body.explicitinertial = True
+    body.ipos, body.iquat = [0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]
+    body.mass, body.inertia = robot.body.mass, list(robot.body.inertia[:3])
+    _add_hull(body, robot)
+    return body
+
+
+def _add_hull(body: mujoco.MjsBody, robot: Robot) -> None:
     """Add the outline that touches obstacles and blocks; it weighs nothing and never touches the floor."""
     (low, high), outline = robot.hull_span, robot.body
     half = 0.5 * (high - low)

@@ -16,7 +16,7 @@ from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.urdf import WHEEL_COLOUR
 from fulmar_core.states.planar import PlanarState, PlanarWrench
 from fulmar_core.worlds.world import World
-from sim_nodes.mujoco_model.scenery import BODY, FLOOR_BIT, add_hull
+from sim_nodes.mujoco_model.scenery import BODY, FLOOR_BIT, add_body
 
 STEP_S = 0.004  # contacts and wheel servos need finer steps than the robots' physics ticks [s]
 # Our values: no YAML says how heavy a wheel is or how high the weight lies.
@@ -57,14 +57,10 @@ class Chassis:
         """Add the body and its outline, and set what contact with the floor needs."""
         spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
         spec.option.impratio = 10.0  # friction holds as firmly as the floor carries
-        body = spec.worldbody.add_body(name=BODY, pos=[0.0, 0.0, self.radius])
-        body.add_freejoint(name="free")
-        body.explicitinertial = True
-        body.iquat = [1.0, 0.0, 0.0, 0.0]
+        body = add_body(spec, self.robot, self.radius)
         outline = self.robot.body
         mass, place, inertia = self._chassis(outline.mass, outline.inertia[2], self._weight)
         body.mass, body.ipos, body.inertia = mass, list(place), list(inertia)
-        add_hull(body, self.robot)
         return body
 
     def add_wheel(self, carrier: mujoco.MjsBody, name: str, place: tuple[float, float, float]) -> None:
