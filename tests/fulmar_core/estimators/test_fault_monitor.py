@@ -108,6 +108,13 @@ def test_robots_with_valves_or_fans_are_watched(name):
     assert can_monitor(load_robot(name))
 
 
+def test_bodies_that_their_actuators_carry_are_not_as_their_weight_would_be_a_push():
+    robot = load_robot("int_ball2")
+    assert can_monitor(robot)
+    robot.__dict__["kind"] = replace(robot.kind, weighs=True)
+    assert not can_monitor(robot)
+
+
 @pytest.mark.parametrize("name", ["kingfisher", "turtlebot2", "cubesat_wheels", "airship_v7"])
 def test_robots_that_swim_or_push_both_ways_are_not(name):
     assert not can_monitor(load_robot(name))

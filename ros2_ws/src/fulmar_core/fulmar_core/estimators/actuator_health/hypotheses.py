@@ -45,8 +45,8 @@ class Hypothesis:
 
 
 def can_monitor(robot: Robot) -> bool:
-    """Whether faults of a robot's actuators show in its motion: valves or fans of a body that floats."""
-    return robot.actuators.one_way and robot.hydrodynamics is None
+    """Whether faults of a robot's actuators show in its motion: valves or fans of what floats and does not fall."""
+    return robot.actuators.one_way and robot.hydrodynamics is None and not robot.kind.lifted
 
 
 class Hypotheses:
