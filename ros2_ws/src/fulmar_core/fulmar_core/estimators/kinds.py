@@ -101,7 +101,7 @@ def _planar_motion(settings: PlanarMotionSettings, robot: Robot) -> Estimator:
 def _spatial_motion(settings: SpatialMotionSettings, robot: Robot) -> Estimator:
     from fulmar_core.estimators.motion.spatial_motion import SpatialMotionEstimator
 
-    return _motion(partial(SpatialMotionEstimator, weighs=robot.kind.weighs), settings, robot)
+    return _motion(partial(SpatialMotionEstimator, kind=robot.kind), settings, robot)
 
 
 def _attitude(settings: AttitudeSettings, robot: Robot) -> Estimator:

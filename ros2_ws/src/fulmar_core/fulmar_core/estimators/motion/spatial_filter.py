@@ -55,8 +55,17 @@ class SpatialFilter(ExtendedKalmanFilter, Filter):  # type: ignore[misc]
     (3, 3) [rad²].
     """
 
-    def __init__(self, settings: SpatialMotionSettings, pose: np.ndarray, *, weighs: bool) -> None:
-        """Begin at rest at a pose, knowing little else; `weighs`: gravity pulls the body, which no sensor feels."""
+    def __init__(
+        self, settings: SpatialMotionSettings, pose: np.ndarray, *, weighs: bool, speed: float
+    ) -> None:
+        """Begin at a pose, knowing little else.
+
+        Args:
+            settings: What to believe of the sensors.
+            pose: Shape (7,).
+            weighs: Whether gravity pulls the body, which no sensor feels.
+            speed: With which it may begin, 0 where it begins at rest [m/s].
+        """
         super().__init__(dim_x=ERRORS, dim_z=6)
         self._settings, self._weighs = settings, weighs
         zero = np.zeros(3)
@@ -64,6 +73,7 @@ class SpatialFilter(ExtendedKalmanFilter, Filter):  # type: ignore[misc]
         self.x = np.zeros(ERRORS)
         spread = np.repeat(SPREAD_AT_START, 3)
         spread[PLACE], spread[TURN] = settings.position_std, settings.attitude_std
+        spread[VELOCITY] = max(SPREAD_AT_START[1], speed)
         self.P = np.diag(spread**2)
         self._pose_noise = np.diag(np.repeat((settings.position_std**2, settings.attitude_std**2), 3))
 

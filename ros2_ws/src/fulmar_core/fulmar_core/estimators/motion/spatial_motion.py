@@ -17,6 +17,8 @@ from fulmar_core.estimators.motion.filter import Placed
 from fulmar_core.estimators.motion.history import HistoryEstimator
 from fulmar_core.estimators.motion.settings import SpatialMotionSettings
 from fulmar_core.estimators.motion.spatial_filter import PLACE, RATE_BIAS, TURN, VELOCITY, SpatialFilter
+from fulmar_core.robots.kinds.kind import Kind
+from fulmar_core.robots.robot import Limits
 from fulmar_core.robots.sensors.imu import ImuSample
 from fulmar_core.states.rotation import rotate
 from fulmar_core.states.state import RigidBodyState
@@ -28,16 +30,10 @@ class SpatialMotionEstimator(HistoryEstimator[SpatialMotionSettings]):
 
     _filter: SpatialFilter | None
 
-    def __init__(self, *settings: Any, weighs: bool, **others: Any) -> None:
-        """Begin without an estimate.
-
-        Args:
-            settings: As in `HistoryEstimator`, as the rest.
-            weighs: Whether gravity pulls the body.
-            others: As in `HistoryEstimator`.
-        """
-        self._weighs = weighs
-        super().__init__(*settings, **others)
+    def __init__(self, settings: SpatialMotionSettings, limits: Limits, *, kind: Kind, **others: Any) -> None:
+        """Begin without an estimate; `kind` is the robot's, the rest as in `HistoryEstimator`."""
+        self._kind = kind
+        super().__init__(settings, limits, **others)
 
     def _pose(self, reading: Reading) -> np.ndarray:
         return np.array(reading.value, dtype=float)
@@ -57,7 +53,8 @@ class SpatialMotionEstimator(HistoryEstimator[SpatialMotionSettings]):
         return float(np.linalg.norm(reading.value.angular_velocity))
 
     def _new_filter(self, pose: np.ndarray) -> SpatialFilter:
-        return SpatialFilter(self._settings, pose, weighs=self._weighs)
+        speed = 0.0 if self._kind.stays else self._limits.speed
+        return SpatialFilter(self._settings, pose, weighs=self._kind.weighs, speed=speed)
 
     def _placed(self, pose: np.ndarray) -> Placed:
         return pose[:3], pose[3:] / np.linalg.norm(pose[3:])
