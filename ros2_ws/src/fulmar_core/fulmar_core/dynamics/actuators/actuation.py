@@ -17,8 +17,13 @@ from fulmar_core.worlds.world import World
 
 
 class ActuationState(MutableState):
-    """What the actuators of a batch of worlds do now; actuators first, worlds last."""
+    """What the actuators of a batch of worlds do now; actuators first, worlds last.
 
+    Attributes:
+        FROM_ZERO: Names of arrays that are 0 when an episode begins, worlds last; all are in `MUTABLE`.
+    """
+
+    FROM_ZERO: ClassVar[tuple[str, ...]] = ("_time_s",)
     MUTABLE: ClassVar[tuple[str, ...]] = (
         "_before",
         "_wanted",
@@ -90,13 +95,10 @@ class ActuationState(MutableState):
             which: Their numbers.
             safe: Safe command, shape (n, 1).
         """
-        for name in ("_before", "_wanted", "applied", "_line"):
+        for name in ("_before", "_wanted", "applied", "_line", *self.FROM_ZERO):
             values = array_namespace(safe).asarray(getattr(self, name), copy=True)
-            values[..., which] = safe
+            values[..., which] = 0 if name in self.FROM_ZERO else safe
             setattr(self, name, values)
-        if self._sticking is not None:
-            self._time_s = array_namespace(safe).asarray(self._time_s, copy=True)
-            self._time_s[which] = 0.0
 
     def hold(self, command: Array) -> None:
         """Let every actuator apply a command, as if it had been held for long.

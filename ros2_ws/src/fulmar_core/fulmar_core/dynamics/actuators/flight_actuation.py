@@ -27,6 +27,7 @@ class FlightActuation(ActuationState):
         gust_steps: Steps that the turbulence of each world has made, shape (worlds,).
     """
 
+    FROM_ZERO = (*ActuationState.FROM_ZERO, "servo_rates", "gust_steps")
     MUTABLE = (*ActuationState.MUTABLE, "servo_rates", "gusts", "gust_steps")
 
     def __init__(self, actuators: ControlSurfaces, safe: Array, **kwargs: Any) -> None:
@@ -42,15 +43,6 @@ class FlightActuation(ActuationState):
         fastest = np.where(np.isfinite(actuators.rates), actuators.rates, 1e6)
         self._fastest = xp.asarray(fastest[:, None], **self._kwargs)
         self._servo: dict[float, np.ndarray] = {}
-
-    def reset(self, which: Array, safe: Array) -> None:
-        """Bring some worlds back to the safe state; arguments as in `ActuationState.reset`."""
-        super().reset(which, safe)
-        xp = array_namespace(safe)
-        for name in ("servo_rates", "gust_steps"):
-            values = xp.asarray(getattr(self, name), copy=True)
-            values[..., which] = 0
-            setattr(self, name, values)
 
     def truths(self) -> dict[str, Any]:
         """Where surfaces and throttles are; see `ActuationState.truths`."""

@@ -17,6 +17,7 @@ from fulmar_core.worlds.world import World
 class TankActuation(ActuationState):
     """What the valves of a batch of worlds do now; thrust follows the pressure at the beginning of a control step."""
 
+    FROM_ZERO = (*ActuationState.FROM_ZERO, "_fallen")
     MUTABLE = (*ActuationState.MUTABLE, "_filled", "_fallen", "_share")
 
     def __init__(self, actuators: Actuators, safe: Array, *, world: World, **kwargs: Any) -> None:
@@ -43,13 +44,6 @@ class TankActuation(ActuationState):
     def truths(self) -> dict[str, Any]:
         """Pressure of the tank; see `ActuationState.truths`."""
         return {NAME: float(self.pressure[0])}
-
-    def reset(self, which: Array, safe: Array) -> None:
-        """Bring some worlds back to the safe state, with fresh tanks; arguments as in `ActuationState.reset`."""
-        super().reset(which, safe)
-        fallen = array_namespace(safe).asarray(self._fallen, copy=True)
-        fallen[which] = 0.0
-        self._fallen = fallen
 
     def begin(self, command: Array, world: World, noise: Array | None) -> None:
         """Take a new command; see `ActuationState.begin`."""

@@ -9,7 +9,6 @@ import numpy as np
 from fulmar_core.dynamics.actuators.actuation import ActuationState
 from fulmar_core.robots.actuators.reaction_wheels import ReactionWheels
 from fulmar_core.robots.sensors.wheels import NAME, WheelSpeeds
-from fulmar_core.states.arrays import array_namespace
 from fulmar_core.states.rotation import Array
 
 
@@ -20,6 +19,7 @@ class WheelActuation(ActuationState):
         speeds: Of each wheel relative to the body, shape (count, worlds) [rad/s].
     """
 
+    FROM_ZERO = (*ActuationState.FROM_ZERO, "speeds")
     MUTABLE = (*ActuationState.MUTABLE, "speeds")
 
     def __init__(self, actuators: ReactionWheels, safe: Array, **kwargs: Any) -> None:
@@ -36,10 +36,3 @@ class WheelActuation(ActuationState):
     def truths(self) -> dict[str, Any]:
         """Speeds of the wheels; see `ActuationState.truths`."""
         return {NAME: WheelSpeeds(self._names, self.readings[NAME][0])}
-
-    def reset(self, which: Array, safe: Array) -> None:
-        """Bring some worlds back to the safe state, wheels at rest; arguments as in `ActuationState.reset`."""
-        super().reset(which, safe)
-        speeds = array_namespace(safe).asarray(self.speeds, copy=True)
-        speeds[:, which] = 0.0
-        self.speeds = speeds
