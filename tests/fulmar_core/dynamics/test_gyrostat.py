@@ -7,10 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fulmar_core.dynamics.gyrostat import Flywheels, gyrostat_step, momentum_in_world
+from fulmar_core.dynamics.gyrostat import Flywheels, gyrostat_step
 from fulmar_core.dynamics.rigid_body import inertia_of, rigid_body_step
 from fulmar_core.robots.actuators.reaction_wheels import ReactionWheels, Unloading, Wheel
 from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.states.attitude import plus, times, turn
 from fulmar_core.states.spatial import SpatialState
 
 MICROSAT = load_robot("microsat")
@@ -23,6 +24,11 @@ SKEWED = np.array([[1.0, 0.0, 0.0], [0.0, 0.6, 0.8], [0.0, -0.8, 0.6], [0.57735,
 def turning(*rate):
     zero = np.zeros(1)
     return SpatialState(*((zero,) * 6), np.ones(1), *((zero,) * 3), *(np.array([part]) for part in rate))
+
+
+def momentum_in_world(state, speeds, wheels, tensor):
+    """Of body and wheels about the centre of mass [N·m·s]."""
+    return turn(state.quat, plus(times(tensor, state.rate), wheels.momentum(speeds)))
 
 
 def driven(dt, *, seconds=30.0, axes=WHEELS.axes):

@@ -19,7 +19,7 @@ import numpy as np
 
 from fulmar_core.dynamics.rigid_body import Inertia, inertia_of, turned
 from fulmar_core.states.arrays import sum_of
-from fulmar_core.states.attitude import Tensor, Vector, cross, minus, plus, times, turn
+from fulmar_core.states.attitude import Tensor, Vector, cross, minus, plus, times
 from fulmar_core.states.rotation import Array
 from fulmar_core.states.spatial import SpatialState
 
@@ -112,11 +112,6 @@ def gyrostat_step(
     )
     end, _ = slopes(after, spun)
     return turned(state, after, k1, end, None, force_in_world, mass, dt), spun
-
-
-def momentum_in_world(state: SpatialState, speeds: Speeds, wheels: Flywheels, tensor: Tensor) -> Vector:
-    """Angular momentum of body and wheels about the centre of mass [N·m·s]."""
-    return turn(state.quat, plus(times(tensor, state.rate), wheels.momentum(speeds)))
 
 
 def _moved(values: Speeds, seconds: float, slopes: Speeds) -> Speeds:
