@@ -140,9 +140,8 @@ def test_the_planar_wrench_is_the_sum_of_what_each_actuator_pushes(robot):
     np.testing.assert_allclose(wrench, pushes @ actuators.wrench_per_newton[:, PLANAR], atol=1e-9)
     for push, row in zip(actuators.pushes, actuators.wrench_per_newton, strict=True):
         assert np.linalg.norm(push.direction) == pytest.approx(1.0)
-        np.testing.assert_allclose(
-            row, [*push.direction, *np.cross(push.position, push.direction)], atol=1e-9
-        )
+        torque = np.cross(push.position, push.direction) + push.couple * np.array(push.direction)
+        np.testing.assert_allclose(row, [*push.direction, *torque], atol=1e-9)
     np.testing.assert_allclose(
         actuators.full_thrust,
         [actuators.thrusts(row)[i] for i, row in enumerate(np.diag(actuators.scale))],
