@@ -15,7 +15,7 @@ from tests.fulmar_cli.command_line import complaint
 
 NEW = Path(new_robots.__file__).parent
 KEYS = {
-    "robot", "actuators", "wrench", "zero_wrench_holdable", "controllable", "least_time", "trim", "passed",
+    "robot", "actuators", "wrench", "zero_wrench_holdable", "controllable", "least_time", "trim", "tried", "passed",
     "problems", "warnings",
 }  # fmt: skip
 
@@ -181,7 +181,7 @@ def test_an_implausible_value_is_one_problem_with_its_line(fulmar, tmp_path, key
     assert words in problem
 
 
-@pytest.mark.parametrize(("force", "code", "where"), [(10.0, 0, "warnings"), (50.0, 1, "problems")])
+@pytest.mark.parametrize(("force", "code", "where"), [(4.0, 0, "warnings"), (10.0, 1, "problems")])
 def test_performance_beyond_what_actuators_give_is_a_warning_and_far_beyond_a_problem(
     fulmar, tmp_path, force, code, where
 ):

@@ -17,7 +17,33 @@ SPEEDS, HEIGHTS = (0.8, 0.9, 1.0, 1.1, 1.2), (0.2, 0.5, 1.0)
 # What each control is for, by the row of `continuous_model` that it acts on.
 AXES = {"force_x": 6, "torque_x": 9, "torque_y": 10, "torque_z": 11}
 UNITS = {"force_x": "m/s²", "torque_x": "rad/s²", "torque_y": "rad/s²", "torque_z": "rad/s²"}
+FASTEST_S = (
+    1.0  # in which a mode may double: what is faster no pilot, and no controller here, is meant for [s]
+)
 LEAST = 1e-3  # share of the strongest effect on an axis that counts as one [-]
+
+
+@dataclass(frozen=True)
+class Tried:
+    """A speed and a height at which a trim was looked for."""
+
+    speed: float  # [m/s]
+    height: float | None  # None: free air [m]
+    trim: Trim | None = None
+    modes: tuple[Mode, ...] = ()
+    missing: str = ""  # why there is none
+
+    @property
+    def where(self) -> str:
+        """For people."""
+        return f"{self.speed:.4g} m/s, {'free air' if self.height is None else f'{self.height:g} m'}"
+
+    def as_json(self, altitude: float) -> dict[str, Any]:
+        """As in `fulmar check robot --json`."""
+        return {
+            "speed": self.speed, "height": self.height, "altitude": altitude, "trims": self.trim is not None,
+            "reason": self.missing or None,
+        }  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -25,15 +51,20 @@ class AircraftCheck:
     """Result for one aircraft.
 
     Attributes:
-        trims: Those that were found, with their modes.
-        missing: One line for each condition without a trim.
-        authority: Acceleration at full deflection or throttle at the first trim, by axis and control.
+        tried: Where trims were looked for.
+        altitude: Of them [m].
+        authority: Acceleration at full deflection or throttle at the middle trim, by axis and control.
     """
 
     robot: Robot
-    trims: tuple[tuple[Trim, tuple[Mode, ...]], ...]
-    missing: tuple[str, ...]
+    tried: tuple[Tried, ...]
+    altitude: float
     authority: dict[str, dict[str, float]]
+
+    @property
+    def trims(self) -> tuple[tuple[Trim, tuple[Mode, ...]], ...]:
+        """Those that were found, with their modes."""
+        return tuple((each.trim, each.modes) for each in self.tried if each.trim is not None)
 
     @property
     def missing_axes(self) -> tuple[str, ...]:
@@ -42,8 +73,27 @@ class AircraftCheck:
 
     def problems(self) -> Iterator[str]:
         """One line for each thing that is wrong."""
-        if not self.trims:
-            yield self.missing[0]
+        frame = self.robot.wings
+        cruise = next((each for each in self.tried if each.speed == frame.speed), self.tried[0])
+        if cruise.trim is None:
+            yield cruise.missing
+        elif abs(math.degrees(cruise.trim.alpha)) > frame.stall_deg:
+            yield (
+                f"'airframe.speed' = {frame.speed:g} m/s asks for an angle of attack of "
+                f"{math.degrees(cruise.trim.alpha):.1f}°, beyond 'airframe.stall_deg' = {frame.stall_deg:g}°."
+            )
+        flown = [
+            each for each in self.tried if each.trim and abs(math.degrees(each.trim.alpha)) <= frame.stall_deg
+        ]
+        fastest = max(
+            ((mode, at) for at in flown for mode in at.modes), key=lambda one: one[0].real, default=None
+        )
+        if fastest is not None and fastest[0].real > math.log(2.0) / FASTEST_S:
+            mode, at = fastest
+            yield (
+                f"at {at.where} its {mode.name} doubles in {math.log(2.0) / mode.real:.2g} s; accepted is from "
+                f"{FASTEST_S:g} s on. Look at signs and sizes in 'airframe.aerodynamics.terms', and at 'body.inertia'."
+            )
         if self.authority and self.missing_axes:
             yield f"no control moves it about or along {', '.join(self.missing_axes)}."
 
@@ -73,6 +123,7 @@ class AircraftCheck:
             "zero_wrench_holdable": bool(self.trims),
             "controllable": bool(self.trims) and not self.missing_axes,
             "trim": trims,
+            "tried": [each.as_json(self.altitude) for each in self.tried],
         }
 
     def lines(self) -> list[tuple[str, str]]:
@@ -83,16 +134,19 @@ class AircraftCheck:
             most = abs(strongest[0][1])
             shown = [f"{name} {value:+.3g}" for name, value in strongest if abs(value) > 0.05 * most]
             lines.append((f"full control, {axis}", f"{', '.join(shown)} {UNITS[axis]}"))
-        for trim, modes in self.trims:
-            where = "free air" if trim.height is None else f"{trim.height:g} m"
+        for each in self.tried:
+            trim = each.trim
+            if trim is None:
+                lines.append((each.where, f"no trim: {each.missing}"))
+                continue
             lines.append(
                 (
-                    f"{trim.speed:.4g} m/s, {where}",
+                    each.where,
                     f"α {math.degrees(trim.alpha):.2f}°, elevator {math.degrees(trim.elevator):.2f}°, throttle "
                     f"{trim.throttle:.3f}, thrust {trim.thrust:.4g} N",
                 )
             )
-            lines += [("", _mode_line(mode)) for mode in modes]
+            lines += [("", _mode_line(mode)) for mode in each.modes]
         return lines
 
 
@@ -117,18 +171,19 @@ def check_aircraft(
     asked = [(speed, height)] if speed is not None else [(share * cruise, height) for share in SPEEDS]
     if speed is None and height is None and frame.ground_effect is not None:
         asked += [(cruise, share * frame.span) for share in HEIGHTS]
-    found, missing = [], []
+    tried = []
     for at_speed, at_height in asked:
         try:
             trim = find_trim(robot, at_speed, at_height, altitude or 0.0)
         except ConfigError as error:
             if speed is not None:
                 raise
-            missing.append(str(error))
+            tried.append(Tried(at_speed, at_height, missing=str(error)))
             continue
-        found.append((trim, modes_of(robot, trim)))
-    authority = _authority(robot, found[len(found) // 2][0]) if found else {}
-    return AircraftCheck(robot, tuple(found), tuple(missing), authority)
+        tried.append(Tried(at_speed, at_height, trim, modes_of(robot, trim)))
+    found = [each.trim for each in tried if each.trim is not None]
+    authority = _authority(robot, found[len(found) // 2]) if found else {}
+    return AircraftCheck(robot, tuple(tried), altitude or 0.0, authority)
 
 
 def _authority(robot: Robot, trim: Trim) -> dict[str, dict[str, float]]:

@@ -6,7 +6,7 @@ from collections import defaultdict
 from collections.abc import Callable
 
 from fulmar_evaluation.aircraft_check import AircraftCheck, check_aircraft
-from fulmar_evaluation.wrench_check import FreeFlyerCheck, SpaceCheck, WheelCheck, WrenchCheck
+from fulmar_evaluation.wrench_check import FreeFlyerCheck, SatelliteCheck, SpaceCheck, WheelCheck, WrenchCheck
 
 Findings = WrenchCheck | AircraftCheck
 
@@ -16,5 +16,6 @@ CHECKS: dict[str, Callable[..., Findings]] = defaultdict(
     planar=WrenchCheck.of,
     rolling=WheelCheck.of,
     free_flyer=FreeFlyerCheck.of,
+    satellite=SatelliteCheck.of,
     aircraft=check_aircraft,
 )

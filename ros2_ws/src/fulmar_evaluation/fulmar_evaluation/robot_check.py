@@ -47,6 +47,7 @@ class RobotCheck:
             "robot": self.name,
             **UNKNOWN,
             "trim": [],
+            "tried": [],
             **(self.findings.as_json() if self.findings is not None else {}),
             "passed": self.passed,
             "problems": list(self.problems),

@@ -16,6 +16,7 @@ from fulmar_core.controllers.allocation import check_allocation
 from fulmar_core.dynamics.hover import hover_command, level_state
 from fulmar_core.dynamics.linear_model import LinearModel, linearise
 from fulmar_core.robots.actuators.pushing import WRENCH, Pushing
+from fulmar_core.robots.actuators.reaction_wheels import ReactionWheels
 from fulmar_core.robots.robot import Robot
 from fulmar_core.states.planar import PlanarState
 from fulmar_evaluation.wrench_limits import AXES, WrenchSet, wrench_set_of
@@ -32,7 +33,7 @@ QUARTER_TURN = 0.5 * pi
 # Of the largest entry of a row of a linear model by central differences: what is less is rounding [-].
 LEAST_EFFECT = 1e-5
 # Between `performance` and what the actuators give: beyond the first a warning, beyond the second a mistake of unit.
-USUAL_GAP, LARGEST_GAP = 2.0, 20.0
+USUAL_GAP, LARGEST_GAP = 2.0, 5.0
 
 
 @dataclass(frozen=True)
@@ -111,7 +112,7 @@ class WrenchCheck:
         problem = self._problem()
         if problem:
             yield problem
-        for gap, line in _gaps(self.robot, self.wrenches):
+        for gap, line in (*_gaps(self.robot, self.wrenches), *_water_gaps(self.robot, self.wrenches)):
             if gap <= LARGEST_GAP:
                 plausibility.warning("%s", line)
             elif not problem:  # what is wrong with the layout comes first
@@ -272,6 +273,23 @@ class SpaceCheck(WrenchCheck):
         return a, b, 2 * count
 
 
+class SatelliteCheck(SpaceCheck):
+    """Of a body that wheels turn, as fast as their momentum lets them."""
+
+    def problems(self) -> Iterator[str]:
+        """With what its wheels cannot hold; see `WrenchCheck.problems`."""
+        yield from super().problems()
+        wheels, body = self.robot.actuated_by(ReactionWheels), self.robot.body
+        held = wheels.top_momentum * np.abs(wheels.axes).sum(axis=0)
+        fastest = float((held / body.inertia[:3]).min())
+        if self.robot.performance.yaw_rate > fastest > 0.0:
+            yield (
+                f"'performance.yaw_rate' = {self.robot.performance.yaw_rate:g} rad/s; its wheels hold the momentum of "
+                f"{fastest:.4g} rad/s at most ('spin_inertia' · 'top_speed' = {wheels.top_momentum:.4g} N·m·s each). "
+                "Correct whichever is wrong."
+            )
+
+
 class FreeFlyerCheck(SpaceCheck):
     """Of a body in space that actuators push, which controllers allocate wrenches to."""
 
@@ -337,8 +355,34 @@ def _gaps(robot: Robot, wrenches: WrenchSet) -> Iterator[tuple[float, str]]:
             yield (
                 gap,
                 f"'performance.{name}' = {wanted:g} {unit}, and its actuators give {found:.4g} {unit} at most in the "
-                "plane of x and y. Correct whichever is wrong; units are N and N·m.",
+                f"plane of x and y; accepted is {found / LARGEST_GAP:.4g} to {found * LARGEST_GAP:.4g} {unit}. Correct "
+                "whichever is wrong; units are N and N·m.",
             )
+
+
+def _water_gaps(robot: Robot, wrenches: WrenchSet) -> Iterator[tuple[float, str]]:
+    """Same of a hull's top speed, as gaps of the force: where the most that pushes ahead is what the water takes."""
+    water = robot.hydrodynamics
+    if water is None or "force_x" not in wrenches.axes:
+        return
+    push = float(wrenches.limits[wrenches.axes.index("force_x")][1])
+    linear, quadratic, wanted = (
+        water.linear_damping[0],
+        water.quadratic_damping[0],
+        robot.performance.top_speed,
+    )
+    taken = wanted * (linear + quadratic * wanted)
+    if push < 1e-9 or taken < 1e-9:
+        return
+    gap = max(push / taken, taken / push)
+    if gap > USUAL_GAP:
+        fastest = 2.0 * push / (linear + sqrt(linear**2 + 4.0 * quadratic * push))
+        yield (
+            gap,
+            f"'performance.top_speed' = {wanted:g} m/s, where 'hydrodynamics' takes {taken:.4g} N; its actuators push "
+            f"by {push:.4g} N, good for {fastest:.4g} m/s. Correct whichever is wrong: linear_damping and "
+            "quadratic_damping are in N per m/s and N per (m/s)².",
+        )
 
 
 def _xyz(values: list[Any], unit: str) -> str:

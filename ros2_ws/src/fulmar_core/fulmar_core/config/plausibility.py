@@ -13,7 +13,7 @@ from fulmar_core.config.errors import ImplausibleError
 from fulmar_core.config.plausible_ranges import UNITS, Plausible, Range
 from fulmar_core.config.strict_yaml import line_of
 
-LEAST_SHARE = 0.02  # of the largest usual value: where anything from 0 on is usual, less is no likely unit
+LEAST_SHARE = 0.02  # of the largest usual value: where 0 is usual, less is no likely unit
 logger = logging.getLogger(__name__)
 # A program shows warnings once; nodes that load the same file again stay silent.
 logger.addHandler(logging.NullHandler())
@@ -26,11 +26,11 @@ def check_plausible(config: Any, table: Sequence[Plausible], path: Path) -> None
         ImplausibleError: A value lies outside of what is possible; the message starts with `file:line`.
     """
     for row in table:
-        for keys, found in _values(config, row.key.split(".")):
+        for keys, found in _found(config, row):
             value = math.hypot(*found[:2]) if row.distance else float(found)
-            if value == 0.0 and not row.zero:
-                continue
             scale = row.scale(config) if row.scale else 1.0
+            if (value == 0.0 and not row.zero) or scale == 0.0:
+                continue
             inside, usual = _times(row.possible, scale), _times(row.usual, scale)
             if _lies_in(value, usual):
                 continue
@@ -44,6 +44,15 @@ def check_plausible(config: Any, table: Sequence[Plausible], path: Path) -> None
             logger.warning(
                 "%s is unusual; usual is %s.%s", where, allowed, _other_unit(value, row.unit, usual)
             )
+
+
+def _found(config: Any, row: Plausible) -> Iterator[tuple[tuple[str, ...], Any]]:
+    """What a row is about, with its keys: values that stand in the file, or one that follows from them."""
+    keys = tuple(row.key.split("."))
+    if row.of is None:
+        yield from _values(config, keys)
+    elif (value := row.of(config)) is not None:
+        yield keys, value
 
 
 def _values(
@@ -82,9 +91,14 @@ def _number(found: Any, value: float) -> str:
 
 
 def _other_unit(value: float, unit: str, usual: Range) -> str:
-    """The unit in which a value would be usual, as a question; empty where there is none."""
+    """Units in which a value would be usual, as a question, of decimal multiples the first; empty if there is none."""
+    least = 0.0 if usual[0] > 0.0 else LEAST_SHARE * max(map(abs, usual))
+    found: dict[str, float] = {}
     for other, factor in UNITS.get(unit, ()):
-        least = usual[0] or LEAST_SHARE * usual[1]
-        if least <= value * factor <= usual[1]:
-            return f" Is it in {other}? {value:g} {other} are {value * factor:.4g} {unit}, and the key is in {unit}."
-    return ""
+        decimal = any(round(math.log10(factor / each), 9).is_integer() for each in found.values())
+        if usual[0] <= value * factor <= usual[1] and abs(value * factor) >= least and not decimal:
+            found[other] = factor
+    if not found:
+        return ""
+    means = ", ".join(f"{value:g} {other} are {value * factor:.4g} {unit}" for other, factor in found.items())
+    return f" Is it in {' or '.join(found)}? {means}, and the key is in {unit}."

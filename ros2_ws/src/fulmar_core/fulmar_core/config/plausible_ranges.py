@@ -5,6 +5,7 @@ Ranges are wide: a mistake of unit is a factor of 57 (degrees), 100 or 1000, and
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import pi
@@ -23,22 +24,33 @@ class Plausible:
     usual: Range  # a value outside is a warning
     why: str  # what the range comes from
     # The ranges are multiples of this number of the same file, which is in the key's unit.
-    scale: Callable[[Any], float] | None = None
+    scale: Callable[[Any], float] | None = None  # 0: there is nothing to compare with
     distance: bool = False  # the value is a place, and its distance from the origin in the plane counts
     zero: bool = False  # whether 0 is looked at too
+    # What follows from the key and from others, in its place, such as a slope of several terms; None for none.
+    of: Callable[[Any], float | None] | None = None
 
 
 # Units that a value may have been written in by mistake, and what one of them is in the unit of the key.
 UNITS: dict[str, tuple[tuple[str, float], ...]] = {
     "m": (("mm", 1e-3), ("cm", 1e-2)),
     "kg": (("g", 1e-3),),
-    "kg·m²": (("g·m²", 1e-3), ("kg·cm²", 1e-4), ("kg·mm²", 1e-6)),
+    "kg·m²": (("g·m²", 1e-3), ("kg·cm²", 1e-4), ("g·cm²", 1e-7), ("kg·mm²", 1e-6)),
     "N": (("mN", 1e-3), ("kN", 1e3)),
     "N·m": (("mN·m", 1e-3),),
     "rad": (("°", pi / 180.0),),
     "°": (("rad", 180.0 / pi),),
     "rad/s": (("°/s", pi / 180.0), ("rpm", pi / 30.0)),
     "°/s": (("rad/s", 180.0 / pi),),
+    "1/rad": (("1/°", 180.0 / pi),),
+    "1/°": (("1/rad", pi / 180.0),),
+    "m²": (("cm²", 1e-4), ("mm²", 1e-6)),
+    "m³": (("l", 1e-3), ("cm³", 1e-6)),
+    "W": (("hp", 745.7), ("kW", 1e3)),
+    "Pa": (("bar", 1e5), ("MPa", 1e6), ("kPa", 1e3)),
+    "kg/s": (("g/s", 1e-3),),
+    "J/(kg·K)": (("kJ/(kg·K)", 1e3),),
+    "rad/s²": (("°/s²", pi / 180.0),),
     "m/s": (("mm/s", 1e-3), ("cm/s", 1e-2), ("km/h", 1.0 / 3.6)),
     "m/s²": (("mg", 9.81e-3),),
     "s": (("ms", 1e-3), ("µs", 1e-6)),
@@ -55,9 +67,19 @@ def edge_inertia(body: Any, *, upright: bool) -> float:
     return float(body.mass * (body.radius**2 + (0.0 if upright else 0.25 * body.height**2)))
 
 
+def _own_inertia(axis: int, robot: Any) -> float:
+    """Mass of the body for the first three axes [kg], principal moments for the others [kg·m²]."""
+    return float(robot.body.mass if axis < 3 else robot.body.inertia[axis - 3])
+
+
 def _floating_draught(robot: Any) -> float:
     water = robot.hydrodynamics.hydrostatics
     return float(robot.body.mass / (water.water_density * water.waterplane_area))
+
+
+def outline_volume(body: Any) -> float:
+    """Of the upright cylinder around the body [m³]."""
+    return float(pi * body.radius**2 * body.height)
 
 
 def _noise(sensor: str, part: str, unit: str, most: float, usual: float, why: str) -> tuple[Plausible, ...]:
@@ -75,12 +97,12 @@ ROBOT: tuple[Plausible, ...] = (
     Plausible("body.radius", "m", (0.01, 30.0), (0.03, 6.0), "palm-sized robots to small aircraft"),
     Plausible("body.height", "m", (0.005, 30.0), (0.02, 6.0), "same as the radius"),
     Plausible(
-        "body.inertia.2", "kg·m²", (0.01, 3.0), (0.05, 1.05), f"{BODY}: solid cylinder 0.5 m r², thin ring 1 m r²",
+        "body.inertia.2", "kg·m²", (0.01, 1.5), (0.05, 1.05), f"{BODY}: solid cylinder 0.5 m r², thin ring 1 m r²",
         scale=lambda robot: edge_inertia(robot.body, upright=True),
     ),
     *(
         Plausible(
-            f"body.inertia.{axis}", "kg·m²", (0.001, 3.0), (0.01, 1.05), f"{BODY} and height",
+            f"body.inertia.{axis}", "kg·m²", (0.001, 1.5), (0.01, 1.05), f"{BODY} and height",
             scale=lambda robot: edge_inertia(robot.body, upright=False),
         )
         for axis in (0, 1)
@@ -90,7 +112,7 @@ ROBOT: tuple[Plausible, ...] = (
         scale=lambda robot: robot.body.radius,
     ),
     Plausible("timing.physics_dt", "s", (1e-6, 0.5), (1e-4, 0.05), "integrators of rigid bodies"),
-    Plausible("timing.control_hz", "Hz", (0.01, 1e4), (0.5, 1000.0), "controllers of mobile robots"),
+    Plausible("timing.control_hz", "Hz", (0.25, 1e4), (0.5, 1000.0), "controllers of mobile robots"),
     Plausible(
         "actuators.thrust", "N", (1e-6, MOST_ACCELERATION), (1e-4, 5.0),
         "of the mass: one nozzle accelerates by 0.0001 to 5 m/s²", scale=lambda robot: robot.body.mass,
@@ -103,13 +125,36 @@ ROBOT: tuple[Plausible, ...] = (
         "actuators.propellers.*.position", "m", (0.0, 1.5), (0.0, 1.2), "propellers sit on the body, within its radius",
         scale=lambda robot: robot.body.radius, distance=True,
     ),
+    *(
+        Plausible(
+            f"actuators.{part}.*.position.2", "m", (-1.0, 1.0), (-0.6, 0.6), "of the height: on the body",
+            scale=lambda robot: robot.body.height,
+        )
+        for part in ("nozzles", "fans", "propellers")
+    ),
+    Plausible(
+        "actuators.tank.volume", "m³", (1e-5, 0.9), (1e-4, 0.5), "of the volume of the body's outline",
+        scale=lambda robot: outline_volume(robot.body),
+    ),
+    Plausible("actuators.tank.pressure", "Pa", (1.2e5, 1.5e8), (5e5, 7e7), "bottles of 10 to 700 bar"),
+    Plausible("actuators.tank.regulated", "Pa", (1e4, 5e7), (1e5, 5e6), "cold jets: 1 to 20 bar"),
+    Plausible(
+        "actuators.tank.specific_impulse", "s", (5.0, 480.0), (30.0, 350.0),
+        "cold jets 40 to 290, monopropellants 230; in seconds, not the exhaust's m/s",
+    ),
+    Plausible(
+        "actuators.tank.gas_constant",  # word: a key of a file
+        "J/(kg·K)", (40.0, 4300.0), (60.0, 4200.0), "xenon 63 to hydrogen 4124",
+    ),
+    Plausible("actuators.tank.temperature", "K", (100.0, 1000.0), (230.0, 400.0), "in kelvin: 20 °C are 293.15 K"),
+    Plausible("actuators.tank.leak", "kg/s", (0.0, 0.1), (0.0, 0.01), "air bearings: 0.0001 to 0.001"),
     Plausible(
         "actuators.curve.*", "N", (-MOST_ACCELERATION, MOST_ACCELERATION), (-5.0, 5.0),
         "of the mass: one propeller accelerates by up to 5 m/s²", scale=lambda robot: robot.body.mass,
     ),
     Plausible("actuators.wheel_radius", "m", (0.003, 2.0), (0.01, 0.5), "toy cars to off-road robots"),
     Plausible(
-        "actuators.track", "m", (0.05, 2.0), (0.4, 2.0), "of the radius: wheels stand within the outline",
+        "actuators.track", "m", (0.15, 2.0), (0.4, 2.0), "of the radius: wheels stand within the outline",
         scale=lambda robot: robot.body.radius,
     ),
     Plausible(
@@ -125,10 +170,40 @@ ROBOT: tuple[Plausible, ...] = (
         scale=lambda robot: robot.body.mass,
     ),
     Plausible("actuators.friction", "of 1", (0.005, 5.0), (0.1, 1.5), "tyres on ice to rubber on concrete"),
+    Plausible("actuators.response.delay_s", "s", (0.0, 5.0), (0.0, 1.0), "links and drives answer within a second"),
+    Plausible("actuators.response.opening_delay_s", "s", (0.0, 2.0), (0.0, 0.3), "solenoid valves: 0.005 to 0.06 s"),
     Plausible("actuators.response.lag_s", "s", (0.0, 10.0), (0.0, 2.0), "servos, valves, propellers"),
     Plausible("actuators.response.gain.*", "of 1", (0.05, 5.0), (0.5, 1.5), "share of a command that is done"),
     Plausible(
         "hydrodynamics.hydrostatics.water_density", "kg/m³", (500.0, 2000.0), (950.0, 1100.0), "fresh to salt water",
+    ),
+    Plausible(
+        "hydrodynamics.hydrostatics.waterplane_area", "m²", (0.01, 1.3), (0.03, 1.0), "of the circle of the radius",
+        scale=lambda robot: pi * robot.body.radius**2,
+    ),
+    *(
+        Plausible(
+            f"hydrodynamics.hydrostatics.metacentric_height_{axis}", "m", (0.005, 10.0), (0.05, 3.0),
+            "of the radius: flat boats stand stiffly", scale=lambda robot: robot.body.radius,
+        )
+        for axis in ("roll", "pitch")
+    ),
+    *(
+        Plausible(
+            f"hydrodynamics.added_mass.{axis}", "kg" if axis < 3 else "kg·m²", (0.0, 10.0), (0.0, 3.0),
+            "of the body's own mass or inertia: surge 0.05 to 0.3, sway and heave up to 2 (Fossen, §6.3)",
+            scale=functools.partial(_own_inertia, axis),
+        )
+        for axis in range(6)
+    ),
+    *(
+        Plausible(
+            f"hydrodynamics.{kind}_damping.{axis}", unit.format("m" if axis < 3 else "rad"), (0.0, 200.0), (0.0, 30.0),
+            "of the body's mass or inertia: at 1 m/s or 1 rad/s, water slows it down within 0.03 s at the fastest",
+            scale=functools.partial(_own_inertia, axis),
+        )
+        for kind, unit in (("linear", "per {}/s"), ("quadratic", "per ({}/s)²"))
+        for axis in range(6)
     ),
     Plausible(
         "hydrodynamics.hydrostatics.draught", "m", (0.2, 5.0), (0.8, 1.25),
@@ -156,12 +231,18 @@ ROBOT: tuple[Plausible, ...] = (
         scale=lambda robot: robot.performance.top_speed,
     ),
     Plausible("performance.yaw_rate", "rad/s", (1e-4, 40.0), (0.005, 10.0), "satellites to drift cars"),
+    Plausible("performance.turning_acceleration", "m/s²", (1e-5, 200.0), (1e-3, 50.0), "satellites to drift cars"),
+    Plausible("costs.effort", "of 1", (0.0, 100.0), (0.0, 1.0), "of a reward of about 1 a step"),
+    Plausible("costs.change", "of 1", (0.0, 100.0), (0.0, 1.0), "of a reward of about 1 a step"),
     *_noise("odometry", "position", "m", 30.0, 3.0, "motion capture 0.001 m, satellite positioning 3 m"),
     *_noise("odometry", "heading", "rad", 1.0, 0.2, "star tracker 0.0001 rad, poor compass 0.2 rad (11°)"),
     *_noise("odometry", "velocity", "m/s", 5.0, 0.5, "Doppler 0.005 m/s, differences of poor positions 0.5 m/s"),
     *_noise("odometry", "yaw_rate", "rad/s", 2.0, 0.3, "gyroscope 0.001 rad/s, differences of headings 0.3 rad/s"),
     *_noise("imu", "accelerometer", "m/s²", 20.0, 2.0, "MEMS data sheets: 0.001 to 0.1 m/s²"),
     *_noise("imu", "gyroscope", "rad/s", 2.0, 0.2, "MEMS data sheets: 0.0005 to 0.02 rad/s"),
+    Plausible("sensors.imu.gyroscope.limit", "rad/s", (0.01, 200.0), (0.3, 80.0), "data sheets: 125 to 4000 °/s"),
+    Plausible("sensors.imu.accelerometer.limit", "m/s²", (0.1, 1e4), (9.0, 2500.0), "data sheets: 2 to 200 g"),
+    Plausible("event_cameras.*.camera.fov_deg", "°", (0.5, 120.0), (2.0, 100.0), "star trackers to wide lenses"),
     Plausible("sensors.odometry.rate_hz", "Hz", (0.05, 1e5), (0.5, 2000.0), "satellite positioning to motion capture"),
     Plausible("sensors.odometry.delay_s", "s", (0.0, 5.0), (0.0, 0.5), "a control loop with more lag is unstable"),
     Plausible("sensors.imu.rate_hz", "Hz", (0.5, 1e5), (5.0, 10_000.0), "data sheets"),
@@ -169,6 +250,26 @@ ROBOT: tuple[Plausible, ...] = (
     Plausible("limits.geofence", "m", (0.1, 1e6), (0.5, 1e4), "a laboratory to an airfield"),
     Plausible("limits.speed", "m/s", (0.005, 1000.0), (0.05, 200.0), "crawling robots to aircraft"),
     Plausible("limits.yaw_rate", "rad/s", (1e-3, 100.0), (0.01, 30.0), "satellites to model cars"),
+)  # fmt: skip
+
+# What must hold between two numbers of a file, whatever a family says of one of them.
+RELATIONS: tuple[Plausible, ...] = (
+    Plausible(
+        "body.mass", "kg", (0.2, 20_000.0), (0.5, 6000.0),
+        "of the volume of the body's outline: aircraft 2 kg/m³, metal 8000 kg/m³",
+        scale=lambda robot: outline_volume(robot.body),
+    ),
+    Plausible(
+        "body.height", "m", (0.02, 40.0), (0.08, 15.0), "of the radius", scale=lambda robot: robot.body.radius,
+    ),
+    Plausible(
+        "performance.yaw_rate", "rad/s", (0.0, 1.0), (0.0, 1.0), "of limits.yaw_rate: what is faster passes no gate",
+        scale=lambda robot: robot.limits.yaw_rate,
+    ),
+    Plausible(
+        "performance.top_speed", "m/s", (0.0, 1.0), (0.0, 1.0), "of limits.speed: what is faster passes no gate",
+        scale=lambda robot: robot.limits.speed,
+    ),
 )  # fmt: skip
 
 SHARE = "share of what the robot itself can bring up: beyond 1 it cannot hold its place"

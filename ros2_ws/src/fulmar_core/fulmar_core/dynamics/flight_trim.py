@@ -94,9 +94,14 @@ def find_trim(robot: Robot, speed: float, height: float | None = None, altitude:
     )
     worst = float(np.abs(problem.residual(found.x)).max())
     if worst > RESIDUAL:
+        advice = (
+            f"Try a speed near {robot.airframe.speed:g} m/s."
+            if speed != robot.airframe.speed
+            else "It is 'airframe.speed': look at that, at thrust, mass and area, and at the terms of CL, CD and Cm."
+        )
         raise ConfigError(
             f"'{robot.name}' has no trim at {speed:g} m/s and {'in free air' if height is None else f'{height:g} m'}: "
-            f"{problem.shortfall(found.x)}. Try a speed near {robot.airframe.speed:g} m/s."
+            f"{problem.shortfall(found.x)}. {advice}"
         )
     return problem.trim(found.x, height, altitude)
 

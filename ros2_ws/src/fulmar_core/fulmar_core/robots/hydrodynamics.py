@@ -15,6 +15,7 @@ from fulmar_core.states.arrays import array_namespace, clip
 from fulmar_core.states.gravity import GRAVITY
 from fulmar_core.states.rotation import Array, cross
 
+AXES = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 Six = tuple[float, float, float, float, float, float]
 
 
@@ -64,8 +65,13 @@ class Hydrodynamics:
     hydrostatics: Hydrostatics
 
     def __post_init__(self) -> None:
-        if min(*self.linear_damping, *self.quadratic_damping, *self.added_mass) < 0.0:
-            raise ValueError("damping and added mass must not be negative.")
+        for name in ("linear_damping", "quadratic_damping", "added_mass"):
+            least = min(getattr(self, name))
+            if least < 0.0:
+                axis = AXES[getattr(self, name).index(least)]
+                raise ValueError(
+                    f"'{name}' = {list(getattr(self, name))}: {least:g} for {axis}; it must not be negative."
+                )
 
     def planar_damping(self, u: Array, v: Array, r: Array) -> tuple[Array, Array, Array]:
         """Force and moment of the water.

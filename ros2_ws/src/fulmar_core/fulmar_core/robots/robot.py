@@ -12,6 +12,8 @@ from fulmar_core.config.errors import ConfigError
 from fulmar_core.config.strict_yaml import Kinds
 from fulmar_core.robots.actuators.families import FAMILIES
 from fulmar_core.robots.actuators.family import Actuators
+from fulmar_core.robots.actuators.parts import check_part_names
+from fulmar_core.robots.actuators.reaction_wheels import ReactionWheels
 from fulmar_core.robots.actuators.rolling import Rolling
 from fulmar_core.robots.airframe.airframe import Airframe
 from fulmar_core.robots.hydrodynamics import Hydrodynamics
@@ -24,6 +26,7 @@ from fulmar_core.robots.sensors.odometer import OdometrySpec
 from fulmar_core.robots.sensors.own_sensor import OwnSensorSpec
 from fulmar_core.robots.sensors.table import SENSORS, sensor_kind
 from fulmar_core.states.state import State
+from fulmar_core.wires.robot_name import check_robot_name
 
 Range = tuple[float, float]
 Vector3 = tuple[float, float, float]
@@ -319,6 +322,8 @@ class Robot:
         return self.kind.recipe or self.actuators.recipe
 
     def __post_init__(self) -> None:
+        check_robot_name(self.name)
+        check_part_names(self.actuators.names)
         _CHECKS.get(self.kind.name, _check_pushed)(self)
         axes = self.state_type.AXES
         if len(self.body.inertia) > 3 * (axes - 1) or len(self.body.center_of_mass) > axes:
@@ -361,7 +366,8 @@ def _check_rolling(robot: Robot) -> None:
     track = robot.actuated_by(Rolling).track
     if track > 2.0 * robot.body.radius:
         raise ValueError(
-            f"'track' = {track:g} m puts the wheels outside of the outline, whose 'radius' is {robot.body.radius:g} m."
+            f"'track' = {track:g} m puts the wheels outside of the outline: at most {2.0 * robot.body.radius:g} m, two "
+            "'radius'."
         )
     if robot.hydrodynamics is not None:
         raise ValueError("'hydrodynamics' and wheels exclude one another.")
@@ -375,6 +381,7 @@ def _check_satellite(robot: Robot) -> None:
             f"{robot.actuators.kind} only turn a body: it needs 'planar: false', its centre of mass at its origin, no "
             "'airframe', and in 'performance' 0 for all but torque and yaw_rate."
         )
+    robot.actuated_by(ReactionWheels).check_carried(robot.body.inertia[:3], any_moments=robot.body.as_printed)
 
 
 def _check_aircraft(robot: Robot) -> None:

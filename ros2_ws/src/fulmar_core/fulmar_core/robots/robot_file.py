@@ -8,7 +8,7 @@ from pathlib import Path
 from fulmar_core.config.errors import ConfigError, ImplausibleError
 from fulmar_core.config.paths import config_path
 from fulmar_core.config.plausibility import check_plausible
-from fulmar_core.config.plausible_ranges import ROBOT
+from fulmar_core.config.plausible_ranges import RELATIONS, ROBOT
 from fulmar_core.config.strict_yaml import load_config
 from fulmar_core.robots.calibration import VARIABLE, calibrated, calibration_in_use, load_calibration
 from fulmar_core.robots.robot import Robot
@@ -45,8 +45,12 @@ def load_robot_file(path: Path) -> Robot:
         ImplausibleError: It can, and has values that no robot has.
     """
     robot = load_config(Robot, path)
-    ranges = {row.key: row for row in (*ROBOT, *robot.actuators.plausible, *RANGES)}
-    check_plausible(robot, tuple(ranges.values()), path)
+    own = robot.actuators.ranges(robot)
+    replaced = {row.key for row in own}
+    rows = (*own, *(row for row in ROBOT if row.key not in replaced), *RANGES)
+    # A number that is wrong by itself is named before one that does not fit to others.
+    alone = [row for row in rows if row.scale is None]
+    check_plausible(robot, (*alone, *RELATIONS, *(row for row in rows if row.scale is not None)), path)
     _check_spans(robot, path)
     return robot
 
@@ -72,14 +76,14 @@ def use_calibration(path: Path | None, robot: str) -> None:
 def _check_spans(robot: Robot, path: Path) -> None:
     """Refuse a body that training under uncertainty would never see: a span was left as it was for another body."""
     spans, (roll, pitch, yaw) = robot.uncertainty, robot.body.inertia[:3]
-    for name, nominal, (low, high) in (
-        ("mass", robot.body.mass, spans.mass),
-        ("yaw_inertia", yaw, spans.yaw_inertia),
+    for name, key, nominal, (low, high) in (
+        ("mass", "body.mass", robot.body.mass, spans.mass),
+        ("yaw_inertia", "body.inertia.2", yaw, spans.yaw_inertia),
     ):
         if not low <= nominal <= high:
             raise ImplausibleError(
-                f"{path}: 'uncertainty' has {name}: [{low:g}, {high:g}], which does not hold the body's own "
-                f"{nominal:g}."
+                f"{path}: 'uncertainty' has {name}: [{low:g}, {high:g}], which "
+                f"does not hold the body's own {nominal:g}, '{key}'. Correct whichever is wrong."
             )
     # In space the whole tensor grows and shrinks with `yaw_inertia`: any factor leaves a body a body.
     if robot.state_type is PlanarState and spans.yaw_inertia[1] > roll + pitch:

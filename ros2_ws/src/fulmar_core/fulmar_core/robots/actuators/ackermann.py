@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 from array_api_compat import device
 
+from fulmar_core.config.plausible_ranges import Plausible
 from fulmar_core.robots.actuators.response import Response
 from fulmar_core.robots.actuators.rolling import Rolling
 from fulmar_core.states.arrays import array_namespace, clip
@@ -36,14 +37,25 @@ class Ackermann(Rolling):
     friction: float  # of the tyres on the floor [-]
     response: Response = Response()
 
+    plausible = (
+        *Rolling.plausible,
+        Plausible(
+            "performance.torque", "N·m", (0.005, 1.0), (0.02, 0.6), "of friction · weight · wheelbase",
+            scale=lambda robot: robot.actuators.friction * robot.body.mass * GRAVITY * robot.actuators.wheelbase,
+        ),
+    )  # fmt: skip
+
     def __post_init__(self) -> None:
         positive = (
             self.wheel_radius, self.track, self.wheelbase, self.max_speed,
             self.max_steering, self.wheel_force, self.friction,
         )  # fmt: skip
-        if min(positive) <= 0.0 or self.max_steering >= 0.5 * np.pi:
+        if min(positive) <= 0.0:
+            raise ValueError("sizes, speed, force, friction and steering must be greater than 0.")
+        if self.max_steering >= 0.5 * np.pi:
             raise ValueError(
-                "sizes, speed, force and friction must be greater than 0, and the steering below 1.57 rad."
+                f"'max_steering' = {self.max_steering:g} rad must be below 1.57 rad, a quarter turn. Usual is 0.1 to "
+                f"1.2 rad; {self.max_steering:g}° are {math.radians(self.max_steering):.4g} rad."
             )
         if self.response.slew and len(self.response.slew) != 2:
             raise ValueError("'slew' needs two values: of the speed and of the steering angle.")

@@ -9,15 +9,16 @@ from __future__ import annotations
 import functools
 import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from array_api_compat import device
 
-from fulmar_core.config.plausible_ranges import BODY, Plausible, edge_inertia
+from fulmar_core.config.plausible_ranges import Plausible
 from fulmar_core.robots.actuators.family import Actuators
 from fulmar_core.robots.actuators.response import Response
 from fulmar_core.robots.airframe.coefficients import SURFACES
+from fulmar_core.robots.airframe.plausible_airframe import AIRCRAFT, derivative_ranges
 from fulmar_core.robots.airframe.propulsion import ElectricMotor, PistonEngine
 from fulmar_core.states.arrays import array_namespace, clip
 from fulmar_core.states.rotation import Array
@@ -77,14 +78,7 @@ class ControlSurfaces(Actuators):
     response: Response = Response()  # only its delay and gain: servos have dynamics of their own
 
     flies = True
-    plausible = (  # wings reach farther than other robots, and carry their mass near the middle
-        Plausible("body.radius", "m", (0.01, 30.0), (0.3, 10.0), "from hand-launched models to light aircraft"),
-        Plausible(
-            "body.inertia.2", "kg·m²", (0.01, 3.0), (0.03, 1.05), f"{BODY}: light aircraft 0.04 to 0.1 m r²",
-            scale=lambda robot: edge_inertia(robot.body, upright=True),
-        ),
-        Plausible("performance.top_speed", "m/s", (0.5, 500.0), (5.0, 200.0), "models to light aircraft"),
-    )  # fmt: skip
+    plausible = AIRCRAFT
 
     def __post_init__(self) -> None:
         if len(set(self.names)) != len(self.names) or not self.surfaces:
@@ -100,6 +94,10 @@ class ControlSurfaces(Actuators):
             raise ValueError(
                 "'response' takes neither slew nor lag_s here: give servo_rate, rate_deg, and lag_s of motors."
             )
+
+    def ranges(self, robot: Any) -> tuple[Plausible, ...]:
+        """With derivatives, in the unit and the signs of the file; see `Actuators.ranges`."""
+        return (*self.plausible, *derivative_ranges(robot.airframe.aerodynamics, self.names))
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 from array_api_compat import device
 
+from fulmar_core.config.plausible_ranges import Plausible
 from fulmar_core.robots.actuators.parts import MovingParts
 from fulmar_core.robots.actuators.response import Response
 from fulmar_core.robots.actuators.rolling import Rolling
@@ -33,6 +34,21 @@ class DifferentialDrive(Rolling):
 
     takes_velocity = True
     calibrated = ("wheel_scale", "turn_scale", "lag", "delay")
+    plausible = (
+        *Rolling.plausible,
+        Plausible(
+            "actuators.max_wheel_speed", "rad/s", (0.98, 6.0), (0.99, 3.0), "of max_speed / wheel_radius",
+            scale=lambda robot: robot.actuators.max_speed / robot.actuators.wheel_radius,
+        ),
+        Plausible(
+            "actuators.max_yaw_rate", "rad/s", (0.01, 1.2), (0.03, 1.01), "of a turn on the spot at max_wheel_speed",
+            scale=lambda robot: robot.actuators.fastest_turn,
+        ),
+        Plausible(
+            "actuators.caster_x", "m", (-1.5, 1.5), (-1.05, 1.05), "of the radius: casters stand within the outline",
+            scale=lambda robot: robot.body.radius,
+        ),
+    )  # fmt: skip
 
     def __post_init__(self) -> None:
         positive = (
@@ -83,6 +99,11 @@ class DifferentialDrive(Rolling):
         within = clip(command, -most, most)
         outer = xp.abs(within[..., 0:1]) + 0.5 * self.track * xp.abs(within[..., 1:2])
         return within / clip(outer / (self.max_wheel_speed * self.wheel_radius), 1.0, None)
+
+    @property
+    def fastest_turn(self) -> float:
+        """On the spot, with the wheels at their top speed [rad/s]."""
+        return 2.0 * self.max_wheel_speed * self.wheel_radius / self.track
 
     @property
     def largest_yaw_rate(self) -> float | None:

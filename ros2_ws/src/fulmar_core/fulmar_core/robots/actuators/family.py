@@ -67,6 +67,10 @@ class Actuators(ABC):
     def limited(self, command: Array) -> Array:
         """Nearest command that the hardware can carry out, shape (..., n)."""
 
+    def ranges(self, robot: Any) -> tuple[Plausible, ...]:
+        """`plausible`, with what depends on how the file of this robot says it."""
+        return self.plausible
+
     @property
     def positions(self) -> int:
         """How many of the actuators, the first ones, are commanded by a position: surfaces on servos."""

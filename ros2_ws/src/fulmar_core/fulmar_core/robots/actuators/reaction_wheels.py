@@ -8,6 +8,7 @@ robot's file is that of the whole spacecraft with its wheels locked, with their 
 from __future__ import annotations
 
 import functools
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -45,6 +46,11 @@ class Wheel:
         return np.array(self.axis) / float(np.linalg.norm(self.axis))
 
 
+def _least_inertia(robot: Any) -> float:
+    """Of the body, with its wheels [kg·m²]."""
+    return float(min(robot.body.inertia[:3]))
+
+
 @dataclass(frozen=True)
 class Unloading:
     """A torque from outside of the body that takes momentum out of the wheels."""
@@ -78,9 +84,19 @@ class ReactionWheels(Actuators):
     turns_only = True
     excitation = Excitation(hold_s=20.0, foresight_s=0.0, calm=1.0)
     plausible = (
-        Plausible("actuators.torque", "N·m", (1e-7, 100.0), (1e-5, 5.0), "wheels of picosatellites to stations"),
-        Plausible("actuators.spin_inertia", "kg·m²", (1e-9, 10.0), (1e-7, 1.0), "same"),
-        Plausible("actuators.top_speed", "rad/s", (1.0, 1e4), (50.0, 2000.0), "500 to 20,000 rpm"),
+        Plausible(
+            "actuators.torque", "N·m", (1e-6, 5.0), (1e-4, 1.0), "of the body's smallest inertia: up to 1 rad/s²",
+            scale=_least_inertia,
+        ),
+        Plausible(
+            "actuators.spin_inertia", "kg·m²", (1e-7, 0.25), (1e-5, 0.1), "of the body's smallest, with its wheels",
+            scale=_least_inertia,
+        ),
+        Plausible("actuators.top_speed", "rad/s", (5.0, 2500.0), (50.0, 2000.0), "500 to 20,000 rpm"),
+        Plausible(
+            "actuators.unloading.torque", "N·m", (1e-5, 20.0), (1e-3, 2.0), "of a wheel's: torque rods to thrusters",
+            scale=lambda robot: robot.actuators.torque,
+        ),
     )  # fmt: skip
 
     def __post_init__(self) -> None:
@@ -90,9 +106,33 @@ class ReactionWheels(Actuators):
             raise ValueError("torque, spin_inertia and top_speed must be greater than 0.")
         if min(self.viscous, self.coulomb) < 0.0:
             raise ValueError("viscous and coulomb must not be negative.")
+        friction = self.coulomb + self.viscous * self.top_speed
+        if friction >= self.torque:
+            raise ValueError(
+                f"'coulomb' + 'viscous' · 'top_speed' = {friction:g} N·m must be below 'torque' = {self.torque:g} N·m: "
+                "with such a bearing no motor brings a wheel to its top speed."
+            )
         if self.response.slew and len(self.response.slew) != len(self.names):
             raise ValueError(f"'slew' needs {len(self.names)} values, one for each actuator.")
         self.response.refuse_lag_beside_slew()
+
+    def check_carried(self, inertia: Sequence[float], *, any_moments: bool) -> None:
+        """Refuse a body of which nothing is left without its wheels, as simulators have it.
+
+        Args:
+            inertia: Of the body with its wheels, shape (3,) [kg·m²].
+            any_moments: The body's moments are none of a body, and stay; see `Body.as_printed`.
+
+        Raises:
+            ValueError: The wheels are too heavy.
+        """
+        most = min(inertia) if any_moments else min(*inertia, sum(inertia) - 2.0 * max(inertia))
+        if self.count * self.spin_inertia >= most:
+            raise ValueError(
+                f"'actuators.spin_inertia' = {self.spin_inertia:g} kg·m² of each of {self.count} wheels is no part of "
+                f"'body.inertia' = {list(inertia)} kg·m², which is that of the whole: it must be below "
+                f"{most / self.count:.4g} kg·m²."
+            )
 
     @property
     def fixtures(self) -> tuple[Fixture, ...]:

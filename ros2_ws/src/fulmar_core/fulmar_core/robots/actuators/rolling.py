@@ -8,11 +8,13 @@ from abc import abstractmethod
 
 import numpy as np
 
+from fulmar_core.config.plausible_ranges import Plausible
 from fulmar_core.robots.actuators.excitation import Excitation
 from fulmar_core.robots.actuators.family import Actuators
 from fulmar_core.robots.actuators.parts import Fixture
 from fulmar_core.robots.actuators.refuge import RampDown, Refuge
 from fulmar_core.robots.actuators.response import Response
+from fulmar_core.states.gravity import GRAVITY
 from fulmar_core.states.planar import PlanarState
 from fulmar_core.states.rotation import Array
 
@@ -37,6 +39,22 @@ class Rolling(Actuators):
     wheel_force: float
     friction: float
     excitation = Excitation(hold_s=1.5, foresight_s=1.0)  # long enough to come up to speed, and to stop
+    plausible = (
+        Plausible(
+            "actuators.wheel_radius", "m", (0.02, 1.0), (0.05, 0.8), "of the radius of the robot's outline",
+            scale=lambda robot: robot.body.radius,
+        ),
+        Plausible(
+            "actuators.max_speed", "m/s", (0.8, 5.0), (0.95, 2.0), "of performance.top_speed",
+            scale=lambda robot: robot.performance.top_speed,
+        ),
+        Plausible("actuators.response.slew.0", "m/s²", (0.01, 100.0), (0.1, 30.0), "servos of wheels"),
+        Plausible("actuators.response.slew.1", "rad/s²", (0.02, 1000.0), (0.2, 60.0), "same; of steering rad/s"),
+        Plausible(
+            "actuators.wheel_force", "N", (0.001, 1.5), (0.02, 1.0), "of friction · weight, which tyres hold",
+            scale=lambda robot: robot.actuators.friction * robot.body.mass * GRAVITY,
+        ),
+    )  # fmt: skip
 
     @property
     @abstractmethod

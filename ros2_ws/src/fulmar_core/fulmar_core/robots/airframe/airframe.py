@@ -48,8 +48,8 @@ class Airframe:
             raise ValueError(f"'taper' = {self.taper:g} must lie in (0, 1].")
         if self.chord > 2.0 * self.area / self.span:
             raise ValueError(
-                f"'chord' = {self.chord:g} m is more than twice area / span = {self.area / self.span:.3g} m: no wing "
-                "has such a mean chord. Take the three from one source."
+                f"'chord' = {self.chord:g} m may be {2.0 * self.area / self.span:.3g} m at most, twice 'area' / 'span' "
+                f"= {self.area:g} m² / {self.span:g} m: no wing has such a mean chord. Take the three from one source."
             )
 
     @property

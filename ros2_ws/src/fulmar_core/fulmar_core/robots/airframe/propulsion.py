@@ -6,12 +6,14 @@ Piston: constant power, T = δ P η / V, cut at the static thrust.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
 from fulmar_core.states.arrays import clip
 from fulmar_core.states.rotation import Array
 
+FASTEST_TIP = 343.0  # of a propeller's blades: the speed of sound [m/s]
 SLOWEST = 0.1  # airspeed that a piston engine's thrust is computed for at the least [m/s]
 
 
@@ -30,6 +32,18 @@ class ElectricMotor:
     def __post_init__(self) -> None:
         if min(self.thrust, self.disc_area, self.efficiency, self.jet_speed) <= 0.0:
             raise ValueError("thrust, disc_area, efficiency and jet_speed must be greater than 0.")
+        tip = math.sqrt(self.disc_area / math.pi)
+        if self.top_rate * tip > FASTEST_TIP:
+            raise ValueError(
+                f"'top_rate' = {self.top_rate:g} rad/s turns the tips of 'disc_area' = {self.disc_area:g} m² at "
+                f"{self.top_rate * tip:.4g} m/s; at most {FASTEST_TIP / tip:.4g} rad/s, the speed of sound. Is it in "
+                f"rpm? {self.top_rate:g} rpm are {self.top_rate * math.pi / 30.0:.4g} rad/s."
+            )
+        if self.torque_at(1.0) > 2.0 * tip * self.thrust:
+            raise ValueError(
+                f"'torque_per_speed2' = {self.torque_per_speed2:g} N·m·s² makes {self.torque_at(1.0):.4g} N·m at "
+                f"'top_rate'; at most {2.0 * tip * self.thrust / self.top_rate**2:.4g}: thrust · the disc's diameter."
+            )
 
     def thrust_at(self, throttle: Array, airspeed: Array, density: Array) -> Array:
         """Thrust, shape (...,) [N]; throttle from 0 to 1, airspeed [m/s], density [kg/m³]."""
