@@ -11,8 +11,9 @@ import pytest
 
 from fulmar_core.config.errors import ConfigError
 from fulmar_core.config.strict_yaml import load_config
+from fulmar_core.dynamics.flight_trim import find_trim
 from fulmar_core.robots.airframe.atmosphere import SEA_LEVEL
-from fulmar_core.robots.robot_file import load_robot_file
+from fulmar_core.robots.robot_file import load_robot, load_robot_file
 from fulmar_evaluation.new_airframe import coefficient_set as module
 from fulmar_evaluation.new_airframe.coefficient_set import coefficient_set
 from fulmar_evaluation.new_airframe.geometry import Flap, Geometry
@@ -158,6 +159,57 @@ def test_an_aircraft_that_no_robot_can_be_leaves_no_file_behind(lattice, tmp_pat
     with pytest.raises(ConfigError):
         write_robot(feather, coefficient_set(feather, Path("nowhere")), out, "made up")
     assert out.read_text(encoding="utf-8") == "mine"
+
+
+SMALL = {"mass": 2.0, "inertia": (0.05, 0.1, 0.14), "speed": 15.0}
+
+
+def shrunk(craft, factor, **more):
+    """The same shape of another size."""
+    parts = {
+        name: replace(
+            part,
+            span=factor * part.span,
+            root_chord=factor * part.root_chord,
+            position=tuple(factor * each for each in part.position),
+        )
+        for name in ("wing", "tail", "fin")
+        for part in [getattr(craft, name)]
+    }
+    return replace(craft, **parts, **more)
+
+
+@pytest.mark.parametrize(
+    ("like", "factor", "more"),
+    [
+        ("airship_v7", 0.24, SMALL),
+        ("a0s", 1.0, {"speed": 31.0}),
+        ("skywalker_x8", 0.24, SMALL),
+        ("navion", 0.24, SMALL),
+    ],
+)
+def test_an_aircraft_of_any_size_is_one_whatever_it_is_like(lattice, tmp_path, like, factor, more):
+    craft = shrunk(replace(CRAFT, like=like), factor, **more)
+    out = write_robot(craft, coefficient_set(craft, Path("nowhere")), tmp_path / "craft.yaml", "made up")
+    robot = load_robot_file(out)
+    tail = abs(craft.tail.position[0]) + craft.tail.root_chord
+    assert max(0.5 * craft.wing.span, abs(craft.tail.position[0])) < robot.body.radius
+    assert robot.body.radius < 1.1 * np.hypot(tail, 0.5 * craft.wing.span)
+    assert robot.body.footprint[1] == pytest.approx(craft.wing.span, abs=0.002)
+    model = load_robot(like)
+    thrust, theirs = (sum(motor.engine.thrust for motor in each.actuators.motors) for each in (robot, model))
+    assert thrust / robot.body.mass == pytest.approx(theirs / model.body.mass, rel=1e-4)
+    assert robot.performance.force / thrust == pytest.approx(model.performance.force / theirs, rel=1e-4)
+    assert find_trim(robot, craft.speed).throttle < 0.9
+
+
+def test_a_mistake_names_the_geometry_and_what_followed_from_it(lattice, tmp_path):
+    heavy = replace(CRAFT, inertia=(0.05, 0.1, 0.14))
+    words = r"^my\.yaml: makes no aircraft, .*'body.inertia.2' = 0.14 .*radius of 2.58"
+    with pytest.raises(ConfigError, match=words) as said:
+        terms = coefficient_set(heavy, Path("nowhere"))
+        write_robot(heavy, terms, tmp_path / "craft.yaml", "made up", geometry="my.yaml")
+    assert "craft.yaml:" not in str(said.value)
 
 
 @pytest.mark.parametrize("count", [2, 4, 5, 7])

@@ -34,7 +34,8 @@ def airframe(
     """Compute an aircraft's coefficients from its geometry, by the vortex lattice of OpenAeroStruct.
 
     A lattice knows neither friction nor the fuselage nor stall: the geometry's `profile_drag` is added to the drag, and
-    `stall_deg` is taken as it is.
+    `stall_deg` is taken as it is. What the geometry does not say is that of the aircraft it is `like`, with outline,
+    motors, performance and limits scaled to its size, weight and speed.
 
     Try:
 
@@ -53,7 +54,8 @@ def airframe(
         raise ConfigError(f"{out} exists already; no file is overwritten. Give --out another, or --force.")
     shape = load_config(Geometry, geometry)
     terms = coefficient_set(shape, python)
-    write_robot(shape, terms, out, f"Coefficients by OpenAeroStruct's vortex lattice from {geometry.name}.")
+    source = f"Coefficients by OpenAeroStruct's vortex lattice from {geometry.name}."
+    write_robot(shape, terms, out, source, geometry=geometry)
     if as_json:
         print_json({"robot": shape.name, "file": str(out), "terms": terms})
         return
