@@ -20,6 +20,7 @@ from fulmar_core.loop.policy_bundle import (
     Golden,
     Passport,
     check_fit,
+    check_output,
     read_bundle,
     takes_disturbances,
 )
@@ -148,6 +149,7 @@ def _check_golden(session: onnxruntime.InferenceSession, bundle: Bundle) -> None
     except Exception as error:
         reason = str(error).splitlines()[0]
         raise BundleError(f"{folder / NETWORK}: cannot be run: {reason}. Export the policy again.") from error
+    check_output(command, logits, *memories, what=f"policy '{folder}'")
     pairs = [(logits, golden.logits), *((found, golden.next_memories) for found in memories)]
     worst = float(np.max([np.max(np.abs(found - expected)) for found, expected in pairs]))
     if not worst <= GOLDEN_TOLERANCE:

@@ -46,3 +46,12 @@ def test_a_mistake_of_an_import_gets_one_line_and_no_bundle(fulmar, more, report
     path = foreign.save_skrl(tmp_path / "agent.pt", foreign.network(8, 2))
     assert reported in complaint(fulmar("import", path, *ASKED, tmp_path / "out", *more))
     assert not (tmp_path / "out").exists()
+
+
+def test_a_network_that_gives_no_numbers_is_named_and_leaves_no_bundle(fulmar, tmp_path):
+    network = foreign.network(8, 2)
+    next(network.parameters()).data[0, 0] = float("nan")
+    path = foreign.write_onnx(tmp_path / "policy.onnx", network)
+    said = complaint(fulmar("import", path, *ASKED, tmp_path / "out"))
+    assert "its output is not a number" in said
+    assert not (tmp_path / "out").exists()

@@ -40,6 +40,8 @@ def import_policy(
 
     fulmar run turtlebot2 --task go_to_position --policy policies/imported
     """
+    from fulmar_core.config.errors import BundleError
+    from fulmar_core.loop.policy_bundle import remove_bundle
     from fulmar_core.robots.robot_file import load_robot
     from fulmar_core.tasks import load_task
     from policy_server.policy import Policy
@@ -57,7 +59,11 @@ def import_policy(
         output_activation=output_activation,
         command=invoked_command(),
     )
-    Policy(out, load_robot(passport.robot), load_task(passport.task), control_hz=passport.control_hz)
+    try:
+        Policy(out, load_robot(passport.robot), load_task(passport.task), control_hz=passport.control_hz)
+    except BundleError:
+        remove_bundle(out)  # what cannot be loaded would only be in the way of the next try
+        raise
     write_line(
         f"{out}: {passport.robot} · {passport.task} · {passport.control_hz:g} Hz · "
         f"{passport.training['imported_from']} · {passport.sha256[:12]}"

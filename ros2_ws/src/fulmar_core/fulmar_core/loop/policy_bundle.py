@@ -11,6 +11,7 @@ Knows files and hashes, not how to run a network.
 
 from __future__ import annotations
 
+import contextlib
 import difflib
 import hashlib
 import io
@@ -102,6 +103,20 @@ class Bundle:
         return _golden_of(self.golden_file, self.folder / GOLDEN)
 
 
+def check_output(*values: np.ndarray, what: str) -> None:
+    """Refuse what a network gave if it is no number: a weight is none, as after a training that diverged.
+
+    Raises:
+        BundleError: Begins with `what`.
+    """
+    wrong = [value[~np.isfinite(value)].size for value in values]
+    if any(wrong):
+        raise BundleError(
+            f"{what}: its output is not a number in {sum(wrong)} of {sum(value.size for value in values)} values. Are "
+            "all weights finite? A training that diverged leaves such."
+        )
+
+
 def write_bundle(folder: Path, network: bytes, golden: Golden, passport: Passport) -> Passport:
     """Write a bundle with its hashes; one in the same folder is replaced when the new one is complete.
 
@@ -113,7 +128,11 @@ def write_bundle(folder: Path, network: bytes, golden: Golden, passport: Passpor
 
     Returns:
         The sealed passport.
+
+    Raises:
+        BundleError: The network's output is not finite.
     """
+    check_output(golden.logits, golden.commands, golden.next_memories, what=f"{folder}: nothing is written")
     folder.mkdir(parents=True, exist_ok=True)
     vectors = io.BytesIO()
     np.savez(vectors, **{f.name: getattr(golden, f.name) for f in fields(golden)})
@@ -190,6 +209,14 @@ def check_folder(folder: Path, known: Iterable[Path] = ()) -> None:
     found = "is a file; a policy is the folder around it" if folder.exists() else "the folder does not exist"
     offer = f"Nearest bundles: {', '.join(str(bundles[name]) for name in near)}" if near else EXPORT
     raise BundleError(f"policy '{folder}': {found}. {offer}.")
+
+
+def remove_bundle(folder: Path) -> None:
+    """Remove the files of a bundle, and its folder if nothing else is in it."""
+    for name in (NETWORK, GOLDEN, PASSPORT, SIGNATURE):
+        (folder / name).unlink(missing_ok=True)
+    with contextlib.suppress(OSError):
+        folder.rmdir()
 
 
 def read_golden(folder: Path) -> Golden:
