@@ -92,6 +92,13 @@ def test_a_malformed_path_is_refused_with_the_right_form(folder, text):
     assert complaint(text) == f"'{text}' names no class: write it as mypackage.mymodule:MyClass."
 
 
+@pytest.mark.parametrize(
+    ("text", "right"), [("own.py:Mine", "own:Mine"), ("./mine/own.py:Mine", "mine.own:Mine"), ("../own.py:M", "own:M")]
+)  # fmt: skip
+def test_a_file_in_the_place_of_a_module_is_told_to_leave_its_ending_out(folder, text, right):
+    assert complaint(text) == f"'{text}' names a file: write the module, and leave .py out: {right}."
+
+
 def test_an_unknown_module_is_reported_with_the_nearest_of_the_folder(folder):
     (folder / "own_relay_board.py").write_text(GOOD)
     message = complaint("own_relay_bord:Mine")

@@ -25,6 +25,7 @@ from fulmar_core.config.yaml_text import YamlError, load
 
 SEPARATOR = ":"  # of module and class; no name of anything that Fulmar brings has one
 EXAMPLE = "mypackage.mymodule:MyClass"
+_FILE = re.compile(r"(.+)\.py:([^\W\d]\w*)")
 _PATH = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*")
 
 
@@ -39,6 +40,11 @@ def check_class_path(text: str) -> None:
     Raises:
         ConfigError: It is malformed.
     """
+    if file := _FILE.fullmatch(text):
+        dotted = ".".join(part for part in Path(file[1]).parts if part not in (".", "..", "/"))
+        raise ConfigError(
+            f"'{shortened(text)}' names a file: write the module, and leave .py out: {dotted}{SEPARATOR}{file[2]}."
+        )
     if not _PATH.fullmatch(text):
         raise ConfigError(f"'{shortened(text)}' names no class: write it as {EXAMPLE}.")
 
