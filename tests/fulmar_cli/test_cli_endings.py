@@ -88,3 +88,15 @@ def test_a_ctrl_c_that_was_answered_does_not_end_the_process_by_a_signal_afterwa
     (tmp_path / "interrupted.py").write_text(CATCHES_AN_INTERRUPT_OF_TEXT_THAT_RUNS_AS_CODE)
     ended = subprocess.run([sys.executable, "-m", "interrupted"], cwd=tmp_path, timeout=30.0, check=False)
     assert ended.returncode == 1
+
+
+@pytest.mark.parametrize("closed", [">&-", "2>&-", ">&- 2>&-"])
+def test_whoever_closes_the_output_gets_an_answer_and_no_traceback(closed):
+    """As cron and daemons do."""
+    command = f"exec {sys.executable} -m fulmar_cli.main --version {closed}"
+    done = subprocess.run(["sh", "-c", command], capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 0
+    assert "Traceback" not in done.stderr
+    if closed == ">&-":
+        assert done.stderr.startswith("fulmar: the standard output is closed")
+        assert done.stderr.count("\n") == 1

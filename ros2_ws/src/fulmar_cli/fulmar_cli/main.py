@@ -140,6 +140,7 @@ def main() -> None:
 
 
 def _run_and_exit(stops: list[str]) -> None:
+    closed = _open_nowhere()
     try:
         code = app(prog_name="fulmar", standalone_mode=False)
         sys.stdout.flush()  # here, where a closed pipe is handled
@@ -169,9 +170,24 @@ def _run_and_exit(stops: list[str]) -> None:
         if hasattr(error, "format_message"):  # what typer raises for bad usage, whichever click is behind it
             sys.exit(_complain(f"{error.format_message()}{_hint(error)}", BAD_USAGE))
         raise
+    for name in closed:
+        _complain(f"the {name} is closed, and what stands there was not shown. Give it a file: > FILE", DONE)
     if code == INTERRUPTED:
         sys.exit(_complain(stops[0] if stops else "stopped by the user", FAILED))
     sys.exit(code if isinstance(code, int) else DONE)
+
+
+def _open_nowhere() -> list[str]:
+    """Open what whoever started us has closed, as cron and daemons do, so that no other file takes its place."""
+    closed = []
+    for number, name in ((1, "stdout"), (2, "stderr")):
+        if getattr(sys, name) is None:
+            file = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 - for as long as we run
+            if file.fileno() != number:
+                os.dup2(file.fileno(), number)
+            setattr(sys, name, file)
+            closed.append("standard output" if name == "stdout" else "standard error")
+    return closed
 
 
 def _complain(message: str, code: int) -> int:
