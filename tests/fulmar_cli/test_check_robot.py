@@ -10,7 +10,7 @@ import yaml
 
 from fulmar_core.config.paths import OWN_FOLDERS, config_names, config_path
 from fulmar_core.robots.robot_file import load_robot
-from tests import new_robots
+from tests import new_robots, wrong_robots
 from tests.fulmar_cli.command_line import complaint
 
 NEW = Path(new_robots.__file__).parent
@@ -324,3 +324,17 @@ def test_the_envelope_of_an_aircraft_is_drawn(fulmar, tmp_path):
     code, _, _ = fulmar("check", "robot", "airship_v7", "--plot", str(tmp_path / "envelope.png"))
     assert code == 0
     assert (tmp_path / "envelope.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize("name", ["x.txt", "x", "x.PNGG"])
+def test_a_figure_of_no_known_kind_is_refused_before_anything_is_computed(fulmar, tmp_path, name):
+    said = complaint(fulmar("check", "robot", "microsat", "--plot", str(tmp_path / name)))
+    assert "cannot be drawn. Give a name that ends in .png, .svg, .pdf." in said
+
+
+def test_a_name_that_no_node_has_is_a_problem_line(fulmar, tmp_path):
+    path, _ = wrong_robots.altered(tmp_path, "spacecraft_16", {"name": "my-bot"})
+    code, out, _ = fulmar("check", "robot", str(path))
+    assert code == 1
+    assert "problem: " in out
+    assert "the name 'my-bot' of a robot must begin with a small letter" in out

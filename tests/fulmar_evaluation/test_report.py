@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import re
+import shutil
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -129,6 +130,12 @@ def test_runs_of_one_controller_differ(reached, silenced, tmp_path):
     assert "LQR (reached)" in words
     assert "LQR (silenced)" in words
     assert len(set(colours(["lqr", "lqr", "policy", "mine", "yours"]))) == 5
+
+
+def test_names_of_bags_are_no_formulas(reached, tmp_path):
+    odd = [Path(shutil.copytree(reached, tmp_path / name)) for name in ("a$\\frac{$", "b$")]
+    out = write_report([read_run(path) for path in odd], tmp_path / "both.png")
+    assert out.stat().st_size > 10_000
 
 
 def test_an_empty_run_still_gets_a_page_and_a_plot(tmp_path):

@@ -28,7 +28,9 @@ def robot(
     plot: Annotated[
         Path | None,
         option(
-            "FILE", "Draw forces and torques, or an aircraft's envelope, into this image (.png).", "--plot"
+            "FILE",
+            "Draw forces and torques, or an aircraft's envelope, into a .png, .svg or .pdf.",
+            "--plot",
         ),
     ] = None,
     speed: Annotated[float | None, option("M/S", "Of an aircraft: trim at this speed alone.")] = None,
@@ -60,6 +62,9 @@ def robot(
         from fulmar_cli.installation.extras import require
 
         require("matplotlib")
+        from fulmar_evaluation.report.writer import check_image
+
+        check_image(plot)
     found = check_robot(name, speed=speed, altitude=altitude, height=height)
     if as_json:
         print_json(found.as_json())
@@ -80,5 +85,7 @@ def _show(found: RobotCheck) -> None:
         for label, text in found.findings.lines():
             write_line(f"  {label:<24}{text}")
     for problem in found.problems:
-        write_line(f"  problem: {problem}" if found.robot is not None else f"{found.name}: {problem}")
+        write_line(
+            f"  problem: {problem}" if found.robot is not None else f"{found.name}: problem: {problem}"
+        )
     write_line("passed" if found.passed else "not passed")

@@ -56,6 +56,10 @@ def rates(
     from fulmar_evaluation.event_rates import cameras_of, packets_of, rates_of
 
     require(*_modules(sources, plot))
+    if plot is not None:
+        from fulmar_evaluation.report.writer import check_image
+
+        check_image(plot)
     the_robot = load_robot(robot)
     cameras = cameras_of(the_robot, sources, size=_size(size), fov_deg=fov)
     with _kept(to_bag, the_robot, cameras, sources) as keep, work_bar("estimating") as moved:

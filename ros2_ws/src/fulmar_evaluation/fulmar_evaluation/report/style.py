@@ -52,9 +52,9 @@ _RC = {
 
 
 @contextmanager
-def house_style() -> Iterator[None]:
-    """Draw in the style of the house."""
-    with mpl.rc_context(_RC):
+def house_style(**more: object) -> Iterator[None]:
+    """Draw in the style of the house; `more` are parameters of matplotlib, with _ for their dots."""
+    with mpl.rc_context(_RC | {key.replace("_", ".", 1): value for key, value in more.items()}):
         yield
 
 

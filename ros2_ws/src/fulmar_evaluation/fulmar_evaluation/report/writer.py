@@ -13,6 +13,7 @@ from fulmar_core.config.errors import ConfigError
 from fulmar_evaluation.report.page import BENCHMARK_STYLE, Part, Plot, html_page
 from fulmar_evaluation.report.style import as_png, house_style
 
+IMAGES = (".png", ".svg", ".pdf")  # endings of single figures
 MARK = "fulmar-report-of-"
 HEAD_BYTES = 1 << 16  # of each file; times of recording are among them, which no other bag has
 LARGEST = 480_000  # of a single plot [bytes]
@@ -39,7 +40,7 @@ def write_document(
     mark = source_mark(bags)
     if not force:
         check_overwrite(out, mark)
-    with house_style():
+    with house_style(text_parse_math=False):  # names of bags may have dollar signs
         data = as_png(sheet(), mark) if out.suffix == ".png" else page(mark).encode()
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
@@ -47,6 +48,18 @@ def write_document(
     except OSError as error:
         raise ConfigError(f"{out}: cannot write the report: {error.strerror}.") from error
     return out
+
+
+def check_image(path: Path) -> None:
+    """Refuse a file that no figure is drawn into, before anything is computed.
+
+    Raises:
+        ConfigError: With the endings that are allowed.
+    """
+    if path.suffix not in IMAGES:
+        raise ConfigError(
+            f"{path}: '{path.suffix}' cannot be drawn. Give a name that ends in {', '.join(IMAGES)}."
+        )
 
 
 def write_benchmark(out: Path, title: str, parts: Sequence[Part], *, style: str = "") -> Path:
