@@ -111,7 +111,7 @@ ROBOT: tuple[Plausible, ...] = (
         "uncertainty.center_of_mass", "m", (0.0, 1.0), (0.0, 0.5), "within the radius",
         scale=lambda robot: robot.body.radius,
     ),
-    Plausible("timing.physics_dt", "s", (1e-6, 0.5), (1e-4, 0.05), "integrators of rigid bodies"),
+    Plausible("timing.physics_dt", "s", (8e-5, 0.5), (1e-4, 0.05), "integrators of rigid bodies"),
     Plausible("timing.control_hz", "Hz", (0.25, 1e4), (0.5, 1000.0), "controllers of mobile robots"),
     Plausible(
         "actuators.thrust", "N", (1e-6, MOST_ACCELERATION), (1e-4, 5.0),
@@ -133,8 +133,8 @@ ROBOT: tuple[Plausible, ...] = (
         for part in ("nozzles", "fans", "propellers")
     ),
     Plausible(
-        "actuators.tank.volume", "m³", (1e-5, 0.9), (1e-4, 0.5), "of the volume of the body's outline",
-        scale=lambda robot: outline_volume(robot.body),
+        "actuators.tank.volume", "m³", (1e-4, 0.9), (1e-3, 0.6), "of where its content is as heavy as the robot",
+        scale=lambda robot: robot.body.mass * robot.actuators.tank.volume_per_kg,
     ),
     Plausible("actuators.tank.pressure", "Pa", (1.2e5, 1.5e8), (5e5, 7e7), "bottles of 10 to 700 bar"),
     Plausible("actuators.tank.regulated", "Pa", (1e4, 5e7), (1e5, 5e6), "cold jets: 1 to 20 bar"),
@@ -170,9 +170,10 @@ ROBOT: tuple[Plausible, ...] = (
         scale=lambda robot: robot.body.mass,
     ),
     Plausible("actuators.friction", "of 1", (0.005, 5.0), (0.1, 1.5), "tyres on ice to rubber on concrete"),
+    Plausible("actuators.response.slew.*", "1/s", (0.005, 500.0), (0.05, 100.0), "of a full command: propellers, fans"),
     Plausible("actuators.response.delay_s", "s", (0.0, 5.0), (0.0, 1.0), "links and drives answer within a second"),
     Plausible("actuators.response.opening_delay_s", "s", (0.0, 2.0), (0.0, 0.3), "solenoid valves: 0.005 to 0.06 s"),
-    Plausible("actuators.response.lag_s", "s", (0.0, 10.0), (0.0, 2.0), "servos, valves, propellers"),
+    Plausible("actuators.response.lag_s", "s", (0.0, 5.0), (0.0, 2.0), "servos, valves, propellers"),
     Plausible("actuators.response.gain.*", "of 1", (0.05, 5.0), (0.5, 1.5), "share of a command that is done"),
     Plausible(
         "hydrodynamics.hydrostatics.water_density", "kg/m³", (500.0, 2000.0), (950.0, 1100.0), "fresh to salt water",
@@ -219,15 +220,15 @@ ROBOT: tuple[Plausible, ...] = (
     ),
     Plausible("performance.top_speed", "m/s", (0.001, 500.0), (0.02, 100.0), "crawling robots to aircraft"),
     Plausible(
-        "performance.speed", "m/s", (0.001, 1.5), (0.02, 1.0), "of top_speed",
+        "performance.speed", "m/s", (0.01, 1.2), (0.02, 1.0), "of top_speed",
         scale=lambda robot: robot.performance.top_speed,
     ),
     Plausible(
-        "performance.reverse_speed", "m/s", (0.001, 1.5), (0.02, 1.0), "of top_speed",
+        "performance.reverse_speed", "m/s", (0.01, 1.2), (0.02, 1.0), "of top_speed",
         scale=lambda robot: robot.performance.top_speed,
     ),
     Plausible(
-        "performance.lateral_speed", "m/s", (0.001, 1.5), (0.02, 1.0), "of top_speed",
+        "performance.lateral_speed", "m/s", (0.01, 1.2), (0.02, 1.0), "of top_speed",
         scale=lambda robot: robot.performance.top_speed,
     ),
     Plausible("performance.yaw_rate", "rad/s", (1e-4, 40.0), (0.005, 10.0), "satellites to drift cars"),
@@ -236,12 +237,22 @@ ROBOT: tuple[Plausible, ...] = (
     Plausible("costs.change", "of 1", (0.0, 100.0), (0.0, 1.0), "of a reward of about 1 a step"),
     *_noise("odometry", "position", "m", 30.0, 3.0, "motion capture 0.001 m, satellite positioning 3 m"),
     *_noise("odometry", "heading", "rad", 1.0, 0.2, "star tracker 0.0001 rad, poor compass 0.2 rad (11°)"),
-    *_noise("odometry", "velocity", "m/s", 5.0, 0.5, "Doppler 0.005 m/s, differences of poor positions 0.5 m/s"),
+    *_noise("odometry", "velocity", "m/s", 4.0, 0.5, "Doppler 0.005 m/s, differences of poor positions 0.5 m/s"),
     *_noise("odometry", "yaw_rate", "rad/s", 2.0, 0.3, "gyroscope 0.001 rad/s, differences of headings 0.3 rad/s"),
-    *_noise("imu", "accelerometer", "m/s²", 20.0, 2.0, "MEMS data sheets: 0.001 to 0.1 m/s²"),
-    *_noise("imu", "gyroscope", "rad/s", 2.0, 0.2, "MEMS data sheets: 0.0005 to 0.02 rad/s"),
+    *_noise("imu", "accelerometer", "m/s²", 5.0, 2.0, "MEMS data sheets: 0.001 to 0.1 m/s²"),
+    *_noise("imu", "gyroscope", "rad/s", 0.5, 0.2, "MEMS data sheets: 0.0005 to 0.02 rad/s"),
     Plausible("sensors.imu.gyroscope.limit", "rad/s", (0.01, 200.0), (0.3, 80.0), "data sheets: 125 to 4000 °/s"),
     Plausible("sensors.imu.accelerometer.limit", "m/s²", (0.1, 1e4), (9.0, 2500.0), "data sheets: 2 to 200 g"),
+    Plausible("sensors.imu.gyroscope.walk", "rad/s/√s", (0.0, 0.05), (0.0, 0.001), "data sheets: 1e-7 to 1e-4"),
+    Plausible("event_cameras.*.camera.width", "px", (8.0, 10_000.0), (32.0, 4200.0), "event cameras: 128 to 1280"),
+    Plausible("event_cameras.*.camera.height", "px", (8.0, 10_000.0), (32.0, 4200.0), "event cameras: 128 to 1280"),
+    Plausible("event_cameras.*.camera.faintest", "mag", (-1.5, 15.0), (2.0, 12.0), "Sirius to what a tracker sees"),
+    Plausible("event_cameras.*.camera.psf_px", "px", (0.05, 50.0), (0.3, 5.0), "lenses out of focus a little"),
+    Plausible("event_cameras.*.pixels.threshold", "of 1", (0.01, 2.0), (0.05, 0.8), "data sheets: 10 to 50 %"),
+    Plausible("event_cameras.*.pixels.threshold_std", "of 1", (0.0, 0.5), (0.0, 0.15), "data sheets: 2 to 4 %"),
+    Plausible("event_cameras.*.pixels.noise_hz", "Hz", (0.0, 1000.0), (0.0, 30.0), "of a pixel: 0.01 to 10"),
+    Plausible("event_cameras.*.pixels.jitter_s", "s", (0.0, 0.02), (0.0, 0.002), "data sheets: 1e-6 to 1e-3"),
+    Plausible("event_cameras.*.pixels.refractory_s", "s", (0.0, 0.1), (0.0, 0.01), "data sheets: 1e-6 to 1e-3"),
     Plausible("event_cameras.*.camera.fov_deg", "°", (0.5, 120.0), (2.0, 100.0), "star trackers to wide lenses"),
     Plausible("sensors.odometry.rate_hz", "Hz", (0.05, 1e5), (0.5, 2000.0), "satellite positioning to motion capture"),
     Plausible("sensors.odometry.delay_s", "s", (0.0, 5.0), (0.0, 0.5), "a control loop with more lag is unstable"),
@@ -260,10 +271,24 @@ RELATIONS: tuple[Plausible, ...] = (
         scale=lambda robot: outline_volume(robot.body),
     ),
     Plausible(
-        "body.height", "m", (0.02, 40.0), (0.08, 15.0), "of the radius", scale=lambda robot: robot.body.radius,
+        "body.height", "m", (0.04, 8.0), (0.1, 5.0), "of the radius", scale=lambda robot: robot.body.radius,
+    ),
+    *(
+        Plausible(
+            f"body.footprint.{side}", "m", (0.1, 2.05), (0.3, 2.01), "of the radius of the circle around it",
+            scale=lambda robot: robot.body.radius,
+        )
+        for side in (0, 1)
     ),
     Plausible(
-        "performance.yaw_rate", "rad/s", (0.0, 1.0), (0.0, 1.0), "of limits.yaw_rate: what is faster passes no gate",
+        "body.footprint_x", "m", (-1.05, 1.05), (-0.9, 0.9), "of the radius", scale=lambda robot: robot.body.radius,
+    ),
+    Plausible(
+        "limits.speed", "m/s", (0.0, 25.0), (0.0, 8.0), "of performance.top_speed",
+        scale=lambda robot: robot.performance.top_speed,
+    ),
+    Plausible(
+        "performance.yaw_rate", "rad/s", (0.002, 1.0), (0.004, 1.0), "of limits.yaw_rate: faster passes no gate",
         scale=lambda robot: robot.limits.yaw_rate,
     ),
     Plausible(

@@ -76,15 +76,22 @@ def use_calibration(path: Path | None, robot: str) -> None:
 def _check_spans(robot: Robot, path: Path) -> None:
     """Refuse a body that training under uncertainty would never see: a span was left as it was for another body."""
     spans, (roll, pitch, yaw) = robot.uncertainty, robot.body.inertia[:3]
-    for name, key, nominal, (low, high) in (
-        ("mass", "body.mass", robot.body.mass, spans.mass),
-        ("yaw_inertia", "body.inertia.2", yaw, spans.yaw_inertia),
+    for name, key, nominal, widest, (low, high) in (
+        ("mass", "body.mass", robot.body.mass, 3.0, spans.mass),
+        ("yaw_inertia", "body.inertia.2", yaw, 6.0, spans.yaw_inertia),
+        ("drag", "hydrodynamics", 1.0, 5.0, spans.drag),
     ):
         if not low <= nominal <= high:
             raise ImplausibleError(
                 f"{path}: 'uncertainty' has {name}: [{low:g}, {high:g}], which "
                 f"does not hold the body's own {nominal:g}, '{key}'. Correct whichever is wrong."
             )
+        for end, value in enumerate((low, high)):
+            if not nominal / widest <= value <= nominal * widest:
+                raise ImplausibleError(
+                    f"{path}: 'uncertainty.{name}.{end}' = {value:g} is not plausible around the body's {nominal:g}, "
+                    f"'{key}': accepted is {nominal / widest:.4g} to {nominal * widest:.4g}."
+                )
     # In space the whole tensor grows and shrinks with `yaw_inertia`: any factor leaves a body a body.
     if robot.state_type is PlanarState and spans.yaw_inertia[1] > roll + pitch:
         raise ImplausibleError(

@@ -89,8 +89,12 @@ class ReactionWheels(Actuators):
             scale=_least_inertia,
         ),
         Plausible(
-            "actuators.spin_inertia", "kg·m²", (1e-7, 0.25), (1e-5, 0.1), "of the body's smallest, with its wheels",
+            "actuators.spin_inertia", "kg·m²", (1e-7, 0.1), (1e-5, 0.02), "of the body's smallest, with its wheels",
             scale=_least_inertia,
+        ),
+        Plausible(
+            "actuators.response.slew.*", "N·m/s", (0.01, 1e5), (0.1, 1e4), "of the motors' torque in a second",
+            scale=lambda robot: robot.actuators.torque,
         ),
         Plausible("actuators.top_speed", "rad/s", (5.0, 2500.0), (50.0, 2000.0), "500 to 20,000 rpm"),
         Plausible(

@@ -45,6 +45,11 @@ class Tank:
         """Pressure times volume of a kilogram [J/kg]."""
         return self.gas_constant * self.temperature  # word: of an ideal gas
 
+    @property
+    def volume_per_kg(self) -> float:
+        """That a kilogram takes in the full tank [m³/kg]."""
+        return self._specific_energy / self.pressure
+
     def share(self, pressure: Array) -> Array:
         """Share of the full thrust at some pressures in the tank, shape of these [-]."""
         return clip(pressure / self.regulated, 0.0, 1.0)

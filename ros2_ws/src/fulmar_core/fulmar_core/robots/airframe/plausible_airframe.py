@@ -24,15 +24,17 @@ DAMPS = "air slows a turn down"
 # Coefficient, factor, possible and usual derivative [1/rad or -], and why.
 DERIVATIVES: tuple[tuple[str, str, Range, Range, str], ...] = (
     ("CL", "alpha", (1.0, 9.0), (2.0, 7.0), "2π of a thin profile, less of a wing; angles are in 'unit'"),
-    ("CL", "q", (-10.0, 60.0), (0.0, 20.0), "tails lift as the nose rises"),
+    ("CL", "q", (-0.5, 60.0), (0.0, 20.0), "tails lift as the nose rises"),
     ("CL", "elevator", (-0.02, 4.0), (0.0, 2.0), "a positive elevator has its trailing edge down: see 'signs'"),
     ("CL", ALPHADOT, (-5.0, 20.0), (0.0, 8.0), "tails meet the wing's downwash late"),
+    ("CD", "alpha", (-0.2, 4.0), (0.0, 1.2), "2 CL CLα / (π e · aspect ratio), of induced drag"),
     ("CY", "beta", (-4.0, 0.0), (-1.5, -0.02), "wind from the right pushes to the left"),
     ("CY", "rudder", (0.0, 2.0), (0.02, 0.6), "a positive rudder has its trailing edge left: see 'signs'"),
     ("Cl", "beta", (-1.5, 0.02), (-0.5, 0.0), "dihedral and sweep: wind from the right lifts the right wing"),
     ("Cl", "p", (-3.0, -0.02), (-1.2, -0.15), DAMPS),
     ("Cl", "r", (-0.02, 2.0), (0.0, 0.6), "the wing that turns outside is faster, and lifts"),
     ("Cl", "aileron", (0.003, 3.0), (0.01, 0.7), "a positive aileron lowers the right wing: see 'signs'"),
+    ("Cl", "rudder", (-0.2, 0.4), (-0.03, 0.15), "the force on the rudder, above the centre of mass"),
     ("Cm", "alpha", (-12.0, -0.005), (-4.0, -0.1), "stable in pitch: the centre of mass is ahead of the neutral point"),
     ("Cm", "q", (-150.0, -0.2), (-50.0, -1.0), DAMPS),
     ("Cm", ALPHADOT, (-60.0, 0.0), (-25.0, 0.0), "tails meet the wing's downwash late"),
@@ -44,7 +46,7 @@ DERIVATIVES: tuple[tuple[str, str, Range, Range, str], ...] = (
     ("Cn", "rudder", (-2.0, -0.002), (-0.4, -0.01), "a positive rudder turns the nose to the left: see 'signs'"),
 )  # fmt: skip
 LEVEL: tuple[tuple[str, Range, Range, str], ...] = (  # with every factor at 0
-    ("CL", (-1.0, 3.0), (-0.3, 1.3), "level flight"),
+    ("CL", (-0.3, 3.0), (-0.15, 1.3), "level flight"),
     ("CD", (0.002, 1.0), (0.006, 0.2), "friction of a clean craft to one with its flaps out"),
     ("Cm", (-1.0, 1.0), (-0.3, 0.3), "what an elevator holds"),
 )
@@ -127,7 +129,7 @@ AIRCRAFT: tuple[Plausible, ...] = (
         "performance.force", "N", (0.2, 5.0), (0.5, 2.0), "of all propellers together", scale=_pull,
     ),
     Plausible(
-        "performance.torque", "N·m", (1e-3, 100.0), (0.02, 20.0), "of the yaw inertia: rudders turn by up to 20 rad/s²",
+        "performance.torque", "N·m", (1e-3, 40.0), (0.02, 20.0), "of the yaw inertia: rudders turn by up to 20 rad/s²",
         scale=lambda robot: robot.body.inertia[2],
     ),
     Plausible(
