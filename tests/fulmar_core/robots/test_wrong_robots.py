@@ -9,7 +9,6 @@ import pytest
 from fulmar_core.config.errors import ImplausibleError
 from fulmar_core.config.paths import config_names
 from fulmar_core.config.plausible_ranges import RELATIONS
-from fulmar_core.robots.airframe.plausible_airframe import AIRCRAFT, derivative_ranges
 from fulmar_core.robots.robot_file import load_robot, load_robot_file
 from tests.wrong_robots import altered, assert_names, times
 
@@ -149,6 +148,9 @@ def test_a_wrong_number_is_named_with_its_key_and_what_is_allowed(tmp_path, robo
 @pytest.mark.parametrize(
     ("robot", "key", "value", "named"),
     [
+        ("airship_v7", "terms.CD.alpha^2", -0.01, "terms.CD' = -.* from -6.5 to 13° .* accepted is -0.02 to 1.5"),
+        ("airship_v7", "terms.Cm.elevator^3", -3e-3, "terms.Cm' = -2.*, accepted is -8 to 8"),
+        ("airship_v7", "terms.CY.beta^3", 2.7e-2, "terms.CY' = -.*, accepted is -2 to 2"),
         ("airship_v7", "unit", "rad", "CL.alpha' = 0.105014 1/rad .* Is it in 1/°"),
         ("navion", "unit", "deg", "CL.alpha' = 4.44 1/° .* Is it in 1/rad"),
         ("sr22", "signs.elevator", 1, "CL.elevator' = -0.0103945 1/° .* see 'signs'"),
@@ -211,9 +213,9 @@ def test_a_part_that_no_frame_can_be_called_after_is_refused(tmp_path, robot, ke
 @pytest.mark.parametrize("name", [name for name in config_names("robots") if load_robot(name).flies])
 def test_a_shipped_aircraft_has_usual_derivatives_and_each_range_a_reason(name):
     robot = load_robot(name)
-    rows = list(derivative_ranges(robot.wings.aerodynamics, robot.actuators.names))
+    rows = robot.actuators.ranges(robot)
     assert {"1/rad", "1/°"} & {row.unit for row in rows}
-    for row in (*rows, *AIRCRAFT, *RELATIONS):
+    for row in (*rows, *RELATIONS):
         assert row.possible[0] <= row.usual[0] < row.usual[1] <= row.possible[1], row.key
         assert row.why
         value = row.of(robot) if row.of else 0.0

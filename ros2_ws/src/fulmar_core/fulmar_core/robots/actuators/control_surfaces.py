@@ -97,7 +97,9 @@ class ControlSurfaces(Actuators):
 
     def ranges(self, robot: Any) -> tuple[Plausible, ...]:
         """With derivatives, in the unit and the signs of the file; see `Actuators.ranges`."""
-        return (*self.plausible, *derivative_ranges(robot.airframe.aerodynamics, self.names))
+        stops = {surface.name: math.radians(surface.limit_deg) for surface in self.surfaces}
+        frame = robot.airframe
+        return (*self.plausible, *derivative_ranges(frame.aerodynamics, stops, math.radians(frame.stall_deg)))
 
     @property
     def names(self) -> tuple[str, ...]:

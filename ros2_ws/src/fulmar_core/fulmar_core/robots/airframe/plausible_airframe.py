@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -52,13 +52,14 @@ LEVEL: tuple[tuple[str, Range, Range, str], ...] = (  # with every factor at 0
 )
 # What dimensionless rates are per.
 PER = {"p": "per p b/2V", "q": "per q c/2V", "r": "per r b/2V", ALPHADOT: "per α̇ c/2V"}
-MUST = {
-    ("CL", "alpha"),
-    ("Cl", "p"),
-    ("Cm", "alpha"),
-    ("Cm", "q"),
-    ("Cn", "beta"),
-}  # without which nothing flies
+# Of a coefficient from half the stall angle downwards to it upwards, in sideslip, and with each surface at its stops.
+EXTREMES: tuple[tuple[str, Range, Range], ...] = (
+    ("CL", (-3.0, 5.0), (-1.5, 3.0)), ("CD", (-0.02, 1.5), (0.0, 0.5)), ("CY", (-2.0, 2.0), (-0.8, 0.8)),
+    ("Cl", (-1.0, 1.0), (-0.4, 0.4)), ("Cm", (-8.0, 8.0), (-4.0, 4.0)), ("Cn", (-0.8, 0.8), (-0.2, 0.2)),
+)  # fmt: skip
+SIDESLIP = 0.2  # in which they are looked at [rad]
+# Without which nothing flies.
+MUST = {("CL", "alpha"), ("Cl", "p"), ("Cm", "alpha"), ("Cm", "q"), ("Cn", "beta")}
 OWN_AXIS = {"elevator": "Cm", "aileron": "Cl", "rudder": "Cn"}  # that a surface must move
 
 
@@ -147,23 +148,24 @@ AIRCRAFT: tuple[Plausible, ...] = (
 )  # fmt: skip
 
 
-def derivative_ranges(air: Coefficients, surfaces: Iterable[str]) -> Iterator[Plausible]:
+def derivative_ranges(air: Coefficients, stops: Mapping[str, float], stall: float) -> Iterator[Plausible]:
     """Ranges of an aircraft's derivatives where its terms count from, in the unit and the signs of its file.
 
     Args:
         air: Its coefficients.
-        surfaces: Names of those that it has: each must move its own axis.
+        stops: Largest deflection of each surface, which must move its own axis [rad].
+        stall: Angle of attack up to which coefficients are of use [rad].
     """
     found = functools.cache(lambda: _derivatives(air))
     per_angle = math.radians(1.0) if air.unit == "deg" else 1.0
     for name, possible, usual, why in LEVEL:
-        yield _row(name, "1", "of 1", possible, usual, why, of=functools.partial(_one, found, (name, "1")))
+        yield _row(name, "1", "[-]", possible, usual, why, of=functools.partial(_one, found, (name, "1")))
     for name, factor, possible, usual, why in DERIVATIVES:
         by = air.signs.get(factor, 1.0) * (per_angle if factor in ANGLES else 1.0)
         unit = PER.get(factor, "1/°" if air.unit == "deg" else "1/rad")
         yield _row(
             name, factor, unit, _times(possible, by), _times(usual, by), why,
-            zero=(name, factor) in MUST or (factor in surfaces and OWN_AXIS.get(factor) == name),
+            zero=(name, factor) in MUST or (factor in stops and OWN_AXIS.get(factor) == name),
             of=functools.partial(_one, found, (name, factor)),
         )  # fmt: skip
     whole = "rad" if air.unit == "rad" else "°"
@@ -181,6 +183,13 @@ def derivative_ranges(air: Coefficients, surfaces: Iterable[str]) -> Iterator[Pl
             f"airframe.aerodynamics.{key}", whole, _times(possible, 1.0 / turn), _times(usual, 1.0 / turn),
             "angles of attached flow, in 'unit'",
         )  # fmt: skip
+    corners = functools.cache(lambda: _corners(air, stops, stall))
+    for name, possible, usual in EXTREMES:
+        yield Plausible(
+            f"airframe.aerodynamics.terms.{name}", "[-]", possible, usual,
+            f"all terms, from {-math.degrees(0.5 * stall):.3g} to {math.degrees(stall):.3g}°, at full surfaces too",
+            of=functools.partial(_worst, corners, name, possible),
+        )  # fmt: skip
 
 
 def _row(
@@ -192,6 +201,24 @@ def _row(
 
 def _one(found: Any, key: tuple[str, str]) -> float:
     return float(found()[key])
+
+
+def _worst(corners: Any, name: str, possible: Range, _robot: Any) -> float:
+    """The smallest value where that is too small, else the largest."""
+    low, high = float(corners()[name].min()), float(corners()[name].max())
+    return low if low < possible[0] else high
+
+
+def _corners(air: Coefficients, stops: Mapping[str, float], stall: float) -> dict[str, Any]:
+    """Coefficients at angles of attack, sideslips and deflections of one surface at a time, shapes (n,)."""
+    moved = [("", 0.0), *((name, side * most) for name, most in stops.items() for side in (-1.0, 1.0))]
+    states = [
+        {"alpha": alpha, "beta": beta, surface: deflection}
+        for alpha in np.linspace(-0.5 * stall, stall, 7)
+        for beta in (-SIDESLIP, 0.0, SIDESLIP)
+        for surface, deflection in moved
+    ]
+    return air.at({name: np.array([state.get(name, 0.0) for state in states]) for name in ANGLES})
 
 
 def _times(span: Range, by: float) -> Range:
