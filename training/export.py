@@ -15,7 +15,7 @@ from fulmar_core.config.errors import ConfigError
 from fulmar_core.config.seeds import HELD_OUT_SEED
 from fulmar_core.controllers.disturbance_inputs import disturbance_terms, with_disturbances
 from fulmar_core.loop.control_loop import ControlLoop
-from fulmar_core.loop.policy_bundle import FORMAT, Golden, Passport, action_of, write_bundle
+from fulmar_core.loop.policy_bundle import FORMAT, Golden, Passport, action_of, check_output, write_bundle
 from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.simulation.simulation import BatchSimulation
@@ -75,7 +75,9 @@ def export(run: Path, out: Path) -> Passport:
         | {"curve": _curve(record)}
         | _mujoco_result(record),
     )
-    return write_bundle(out, _to_onnx(network), _golden(network, robot, task), passport)
+    golden = _golden(network, robot, task)
+    check_output(golden.logits, golden.commands, golden.next_memories, what=f"{out}: no bundle is written")
+    return write_bundle(out, _to_onnx(network), golden, passport)
 
 
 def _curve(record: dict[str, Any]) -> list[dict[str, float]]:

@@ -13,7 +13,15 @@ import torch
 from fulmar_core.config.bounded_file import IMPORTED_BYTES, read_bounded
 from fulmar_core.config.errors import ConfigError
 from fulmar_core.config.seeds import HELD_OUT_SEED
-from fulmar_core.loop.policy_bundle import FORMAT, PASSPORT, Golden, Passport, action_of, write_bundle
+from fulmar_core.loop.policy_bundle import (
+    FORMAT,
+    PASSPORT,
+    Golden,
+    Passport,
+    action_of,
+    check_output,
+    write_bundle,
+)
 from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.simulation.simulation import BatchSimulation
@@ -106,6 +114,7 @@ def import_policy(
         training=_origin(path, digest, found, activations, command) | {"roboran_terms": source.inputs},
     )
     golden = _golden(source, adapter, robot, task)
+    check_output(golden.logits, golden.commands, golden.next_memories, what=f"{path}: no bundle is written")
     return write_bundle(out, adapter.around(source).SerializeToString(), golden, passport)
 
 

@@ -95,7 +95,7 @@ def test_a_malformed_path_is_refused_with_the_right_form(folder, text):
 @pytest.mark.parametrize(
     ("text", "right"), [("own.py:Mine", "own:Mine"), ("./mine/own.py:Mine", "mine.own:Mine"), ("../own.py:M", "own:M")]
 )  # fmt: skip
-def test_a_file_in_the_place_of_a_module_is_told_to_leave_its_ending_out(folder, text, right):
+def test_a_file_in_the_place_of_a_module_gets_the_advice_to_leave_its_ending_out(folder, text, right):
     assert complaint(text) == f"'{text}' names a file: write the module, and leave .py out: {right}."
 
 

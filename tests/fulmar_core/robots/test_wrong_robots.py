@@ -148,7 +148,7 @@ def test_a_wrong_number_is_named_with_its_key_and_what_is_allowed(tmp_path, robo
 @pytest.mark.parametrize(
     ("robot", "key", "value", "named"),
     [
-        ("airship_v7", "terms.CD.alpha^2", -0.01, "terms.CD' = -.* from -6.5 to 13° .* accepted is -0.02 to 1.5"),
+        ("airship_v7", "terms.CD.alpha^2", -0.01, "terms.CD' = -.* from -6.5 to 13°, .* accepted is -0.02 to 1.5"),
         ("airship_v7", "terms.Cm.elevator^3", -3e-3, "terms.Cm' = -2.*, accepted is -8 to 8"),
         ("airship_v7", "terms.CY.beta^3", 2.7e-2, "terms.CY' = -.*, accepted is -2 to 2"),
         ("airship_v7", "unit", "rad", "CL.alpha' = 0.105014 1/rad .* Is it in 1/°"),

@@ -70,7 +70,8 @@ class Hydrodynamics:
             if least < 0.0:
                 axis = AXES[getattr(self, name).index(least)]
                 raise ValueError(
-                    f"'{name}' = {list(getattr(self, name))}: {least:g} for {axis}; it must not be negative."
+                    f"'{name}' = {list(getattr(self, name))} has {least:g} for {axis}: damping and added "
+                    "mass must not be negative."
                 )
 
     def planar_damping(self, u: Array, v: Array, r: Array) -> tuple[Array, Array, Array]:
