@@ -134,19 +134,19 @@ class AircraftCheck:
             most = abs(strongest[0][1])
             shown = [f"{name} {value:+.3g}" for name, value in strongest if abs(value) > 0.05 * most]
             lines.append((f"full control, {axis}", f"{', '.join(shown)} {UNITS[axis]}"))
-        for each in self.tried:
-            trim = each.trim
+        for at in self.tried:
+            trim = at.trim
             if trim is None:
-                lines.append((each.where, f"no trim: {each.missing}"))
+                lines.append((at.where, f"no trim: {at.missing}"))
                 continue
             lines.append(
                 (
-                    each.where,
+                    at.where,
                     f"α {math.degrees(trim.alpha):.2f}°, elevator {math.degrees(trim.elevator):.2f}°, throttle "
                     f"{trim.throttle:.3f}, thrust {trim.thrust:.4g} N",
                 )
             )
-            lines += [("", _mode_line(mode)) for mode in each.modes]
+            lines += [("", _mode_line(mode)) for mode in at.modes]
         return lines
 
 

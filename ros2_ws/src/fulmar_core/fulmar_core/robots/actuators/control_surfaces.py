@@ -97,7 +97,7 @@ class ControlSurfaces(Actuators):
 
     def ranges(self, robot: Any) -> tuple[Plausible, ...]:
         """With derivatives, in the unit and the signs of the file; see `Actuators.ranges`."""
-        stops = {surface.name: math.radians(surface.limit_deg) for surface in self.surfaces}
+        stops: dict[str, float] = {surface.name: math.radians(surface.limit_deg) for surface in self.surfaces}
         frame = robot.airframe
         return (*self.plausible, *derivative_ranges(frame.aerodynamics, stops, math.radians(frame.stall_deg)))
 

@@ -169,18 +169,16 @@ def derivative_ranges(air: Coefficients, stops: Mapping[str, float], stall: floa
             of=functools.partial(_one, found, (name, factor)),
         )  # fmt: skip
     whole = "rad" if air.unit == "rad" else "°"
-    ends: tuple[tuple[str, Range, Range], ...] = (
-        ("0", (-90.0, 8.0), (-30.0, 3.0)),
-        ("1", (0.5, 90.0), (2.0, 50.0)),
-    )
-    origins: tuple[tuple[str, Range, Range], ...] = (
+    angles: tuple[tuple[str, Range, Range], ...] = (  # [deg]
+        ("alpha_range.0", (-90.0, 8.0), (-30.0, 3.0)),
+        ("alpha_range.1", (0.5, 90.0), (2.0, 50.0)),
         ("alpha_zero", (-20.0, 20.0), (-8.0, 8.0)),
         ("elevator_zero", (-30.0, 30.0), (-10.0, 10.0)),
     )
-    turn = math.degrees(1.0) if air.unit == "rad" else 1.0
-    for key, possible, usual in (*((f"alpha_range.{end}", *ranges) for end, *ranges in ends), *origins):
+    turn = math.radians(1.0) if air.unit == "rad" else 1.0
+    for key, possible, usual in angles:
         yield Plausible(
-            f"airframe.aerodynamics.{key}", whole, _times(possible, 1.0 / turn), _times(usual, 1.0 / turn),
+            f"airframe.aerodynamics.{key}", whole, _times(possible, turn), _times(usual, turn),
             "angles of attached flow, in 'unit'",
         )  # fmt: skip
     corners = functools.cache(lambda: _corners(air, stops, stall))
