@@ -14,7 +14,9 @@ import yaml
 
 from fulmar_core.config.paths import config_path
 
-RANGE = re.compile(r"accepted is|at most|must be|must lie|must not be|no body has|which does not hold")
+RANGE = re.compile(
+    r"accepted is|at most|must be|at least|must lie|must not be|no body has|which does not hold"
+)
 
 
 @functools.cache

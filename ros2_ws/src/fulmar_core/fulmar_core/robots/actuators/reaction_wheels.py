@@ -96,7 +96,7 @@ class ReactionWheels(Actuators):
             "actuators.response.slew.*", "N·m/s", (0.01, 1e5), (0.1, 1e4), "of the motors' torque in a second",
             scale=lambda robot: robot.actuators.torque,
         ),
-        Plausible("actuators.top_speed", "rad/s", (5.0, 2500.0), (50.0, 2000.0), "500 to 20,000 rpm"),
+        Plausible("actuators.top_speed", "rad/s", (50.0, 2500.0), (80.0, 2000.0), "500 to 20,000 rpm"),
         Plausible(
             "actuators.unloading.torque", "N·m", (1e-5, 20.0), (1e-3, 2.0), "of a wheel's: torque rods to thrusters",
             scale=lambda robot: robot.actuators.torque,

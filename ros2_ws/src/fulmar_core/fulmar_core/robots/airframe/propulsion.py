@@ -32,12 +32,23 @@ class ElectricMotor:
     def __post_init__(self) -> None:
         if min(self.thrust, self.disc_area, self.efficiency, self.jet_speed) <= 0.0:
             raise ValueError("thrust, disc_area, efficiency and jet_speed must be greater than 0.")
+        if min(self.torque_per_speed2, self.top_rate) < 0.0:
+            raise ValueError(
+                f"'torque_per_speed2' = {self.torque_per_speed2:g} N·m·s² and 'top_rate' = {self.top_rate:g} rad/s "
+                "must not be negative; the motor's 'rotation' says which way it turns."
+            )
         tip = math.sqrt(self.disc_area / math.pi)
         if self.top_rate * tip > FASTEST_TIP:
             raise ValueError(
                 f"'top_rate' = {self.top_rate:g} rad/s turns the tips of 'disc_area' = {self.disc_area:g} m² at "
                 f"{self.top_rate * tip:.4g} m/s; at most {FASTEST_TIP / tip:.4g} rad/s, the speed of sound. Is it in "
                 f"rpm? {self.top_rate:g} rpm are {self.top_rate * math.pi / 30.0:.4g} rad/s."
+            )
+        if 0.0 < self.top_rate * tip < self.jet_speed:
+            raise ValueError(
+                f"'top_rate' = {self.top_rate:g} rad/s turns the tips of 'disc_area' = {self.disc_area:g} m² at "
+                f"{self.top_rate * tip:.4g} m/s, slower than 'jet_speed' = {self.jet_speed:g} m/s; it must be at least "
+                f"{self.jet_speed / tip:.4g} rad/s. One rad/s is 9.549 rpm."
             )
         if self.torque_at(1.0) > 2.0 * tip * self.thrust:
             raise ValueError(
