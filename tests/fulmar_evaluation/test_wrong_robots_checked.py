@@ -46,10 +46,9 @@ COMPUTED = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("robot", "changes", "words"), COMPUTED, ids=[f"{row[0]}-{min(row[1])}" for row in COMPUTED]
-)
-def test_numbers_that_do_not_fit_one_another_are_one_problem(tmp_path, robot, changes, words):
+@pytest.mark.parametrize("case", COMPUTED, ids=[f"{row[0]}-{min(row[1])}" for row in COMPUTED])
+def test_numbers_that_do_not_fit_one_another_are_one_problem(tmp_path, case):
+    robot, changes, words = case
     path, _ = altered(tmp_path, robot, changes)
     found = check_robot(str(path))
     (problem,) = found.problems

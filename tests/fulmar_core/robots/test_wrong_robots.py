@@ -139,10 +139,9 @@ NUMBERS = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("robot", "key", "value", "words"), NUMBERS, ids=[f"{robot}-{key}" for robot, key, *_ in NUMBERS]
-)
-def test_a_wrong_number_is_named_with_its_key_and_what_is_allowed(tmp_path, robot, key, value, words):
+@pytest.mark.parametrize("case", NUMBERS, ids=[f"{robot}-{key}" for robot, key, *_ in NUMBERS])
+def test_a_wrong_number_is_named_with_its_key_and_what_is_allowed(tmp_path, case):
+    robot, key, value, words = case
     path, text = altered(tmp_path, robot, {key: value})
     with pytest.raises(ImplausibleError) as refused:
         load_robot_file(path)
