@@ -56,7 +56,7 @@ def check_image(path: Path) -> None:
     Raises:
         ConfigError: With the endings that are allowed.
     """
-    if path.suffix not in IMAGES:
+    if path.suffix.lower() not in IMAGES:
         raise ConfigError(
             f"{path}: '{path.suffix}' cannot be drawn. Give a name that ends in {', '.join(IMAGES)}."
         )
