@@ -174,6 +174,7 @@ def test_only_the_plant_publishes_applied_commands_and_only_operators_stop_or_sw
     assert publishers["actuators/state"] == {"/fulmar/plant"}
     assert publishers["estop"] == {"/fulmar/estop", "/fulmar/operator"}
     assert publishers["controller/swap"] == {"/fulmar/operator"}
+    assert publishers["relay"] == {"/fulmar/controller", "/fulmar/markers", "/fulmar/recorder"}
     assert publishers["actuators/command"] == {"/fulmar/controller"}
     assert publishers["teleop/command"] == {"/fulmar/teleop"}
 

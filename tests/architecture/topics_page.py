@@ -32,11 +32,22 @@ Every topic is recorded in the bag of a run, except {UNRECORDED}.
 | best_effort | best effort, volatile, keeps the last 50; in lock step with estimators as stream |
 
 Subscribers of Fulmar receive every topic from publishers of each quality of service, reliable and best effort, volatile
-and latched: readings of a usual driver (best effort), goals of a plain rclpy node (volatile). Only in lock step, which
-counts messages, odometry, commands and readings have to be reliable; a publisher that is not is named in `warnings` of
-the node that refuses it. There `fulmar run --goals` publishes a goal with each odometry; but for `goal_path`, its
-publisher keeps, beyond what is
-stated, all that a reliable subscriber has not received, and up to 5000 earlier ones: the stamps tell them apart.
+and latched: readings of a usual driver (best effort), goals of a plain rclpy node (volatile). A node subscribes twice
+where one subscription does not match, and each message counts once. For each subscription that does not match, ROS logs
+in the publisher "requesting incompatible QoS. No messages will be sent to it": harmless where the subscribers are
+Fulmar's. Plain publishers of goals, obstacles and e-stops see it only where a latched publisher of the topic is there,
+too, as beside `fulmar goals`, `fulmar run` and an e-stop node; best-effort publishers always do.
+
+A publisher that sends one message as soon as it has one subscriber, as `ros2 topic pub --once` does, may have found the
+recorder and not yet the controller or the plant. Nodes that receive the first hundred messages of a publisher of goals,
+obstacles and e-stops therefore pass them on (`relay`): a press counts at once, anything else after 0.3 s in which it
+does not come by itself and no newer one does. Resets and swaps are not passed on; `fulmar estop --reset` and
+`fulmar swap` wait for the answer.
+
+Only in lock step, which counts messages, odometry, commands and readings have to be reliable; a publisher that is not
+is named in `warnings` of the node that refuses it. There `fulmar run --goals` publishes a goal with each odometry; but
+for `goal_path`, its publisher keeps, beyond what is stated, all that a reliable subscriber has not received, and up to
+5000 earlier ones: the stamps tell them apart.
 
 Services: `{ESTOP_TRIGGER}`, `{ESTOP_RESET}` and `{GIVE_BACK}` (std_srvs/Trigger); `air_bearing/enable`
 (std_srvs/SetBool).

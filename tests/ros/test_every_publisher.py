@@ -12,6 +12,7 @@ import pytest
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.context import Context
+from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
@@ -19,7 +20,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from fulmar_core.controllers.law import Law
 from fulmar_core.loop.controller_settings import ControllerSettings
 from fulmar_core.robots.robot import Robot
-from fulmar_core.robots.topics import DIAGNOSTICS, ESTOP, IMU, SWAP
+from fulmar_core.robots.topics import DIAGNOSTICS, ESTOP, GOAL_POSE, IMU, OBSTACLES, SWAP, Wire
 from fulmar_core.tasks import Task, load_task
 from fulmar_ros.controller_node import ControllerNode
 from fulmar_ros.estimator_node import EstimatorNode
@@ -29,6 +30,7 @@ from fulmar_ros.markers_node import MarkersNode
 from fulmar_ros.message_class import message_class
 from fulmar_ros.operator_subscription import subscribe_every
 from fulmar_ros.plant_node import PlantNode
+from fulmar_ros.qos import publisher_qos
 from fulmar_ros.recorder_node import RecorderNode
 from fulmar_ros.runtime import spinning
 from fulmar_ros.teleop_node import TeleopNode
@@ -181,6 +183,28 @@ def test_a_message_of_every_quality_comes_once(wire: Any, offer: str, other: Nod
         until(lambda: len(got) >= 20)
         time.sleep(0.1)
         assert len(got) == 20
+
+
+@pytest.mark.parametrize("wire", [GOAL_POSE, OBSTACLES], ids=lambda wire: wire.name)
+def test_a_plain_publisher_of_an_operator_s_wire_is_warned_of_nothing_and_a_latched_one_is_received_late(
+    wire: Wire, other: Node
+) -> None:
+    kind = message_class(wire)
+    assert kind is not None
+    early = other.create_publisher(kind, wire.name, publisher_qos(wire))
+    node, plain, got = rclpy.create_node("listener", namespace="/boat"), f"/boat/plain/{wire.name}", []
+    subscribe_every(node, kind, wire, got.append, topic=plain)
+    warned: list[Any] = []
+    events = PublisherEventCallbacks(incompatible_qos=warned.append)
+    with spinning(node, lambda error: pytest.fail(repr(error))), spinning(other, lambda _error: None):
+        publisher = other.create_publisher(kind, plain, 10, event_callbacks=events)
+        until(lambda: publisher.get_subscription_count() > 0)
+        publisher.publish(kind())
+        until(lambda: len(got) == 1)
+        assert warned == []
+        early.publish(kind())
+        subscribe_every(node, kind, wire, got.append)
+        until(lambda: len(got) == 2)
 
 
 @pytest.mark.real_time

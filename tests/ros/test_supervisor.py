@@ -160,8 +160,9 @@ def test_a_goal_that_a_silent_e_stop_took_away_before_all_were_ready_is_reported
     button.pressed = None
     until(lambda: overseer.controller.values["goal_stamp_ns"] == "0")
     button.pressed = False
-    subscribe_every(other, PoseStamped, GOAL_POSE, lambda _: None)
-    giving.join()
+    with spinning(other, overseer.fail):
+        subscribe_every(other, PoseStamped, GOAL_POSE, lambda _: None)
+        giving.join()
     assert not failures
     assert overseer.controller.values["goal_stamp_ns"] == "6"
 

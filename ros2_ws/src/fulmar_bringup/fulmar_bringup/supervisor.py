@@ -10,12 +10,13 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Sequence, Set
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cached_property, partial
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from rclpy.node import Node
+from rclpy.publisher import Publisher
 from visualization_msgs.msg import MarkerArray
 
 from fulmar_bringup.node_table import status_names
@@ -69,10 +70,9 @@ class Supervisor:
         self._changed = threading.Condition()
         self._errors: list[Exception] = [] if errors is None else errors
         self.fail = self._errors.append  # gives up the wait of whoever waits
-        wire = GOAL_WIRES[task.goal_topic]
-        self._goal = node.create_publisher(TYPES[wire.name], wire.name, publisher_qos(wire))
         self._sent: list[GoalMessage] = []  # of the current goal
-        LateSubscribers(node, self._goal, lambda: list(self._sent))
+        if not plan.standing:
+            _ = self._goal  # nodes that start now find it at once
         self._obstacles = (
             node.create_publisher(MarkerArray, OBSTACLES.name, publisher_qos(OBSTACLES))
             if task.sees_obstacles
@@ -84,6 +84,14 @@ class Supervisor:
         for wire in (DIAGNOSTICS, STATUS):
             subscribe_every(node, DiagnosticArray, wire, self._on_diagnostics)
         self._plant_service = node.create_client(ChangeState, "plant/change_state")
+
+    @cached_property
+    def _goal(self) -> Publisher:
+        """Where goals are published; made where one is given, since a latched one makes plain publishers warn."""
+        wire = GOAL_WIRES[self._task.goal_topic]
+        made = self._node.create_publisher(TYPES[wire.name], wire.name, publisher_qos(wire))
+        LateSubscribers(self._node, made, lambda: list(self._sent))
+        return made
 
     def sees_living_plant(self) -> bool:
         """Whether a plant of this robot runs already, within `DISCOVERY_S`; call before ours is configured."""

@@ -416,6 +416,7 @@ class ControllerNode(LifecycleNode):
 
     def _publish_idle_status(self) -> None:
         """Publish the status where no control step does it."""
+        self.wires.relayed.look()
         self._status.wire_problems = self._wire_watch.look()
         self._see_writers()
         self._status.inputs_refused = self._readings.newest.refused, self._readings.newest.refusal

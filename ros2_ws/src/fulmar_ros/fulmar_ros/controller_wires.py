@@ -45,6 +45,7 @@ from fulmar_ros.health import Health
 from fulmar_ros.operator_subscription import destroy_all, subscribe_every
 from fulmar_ros.parameters import name_of, own_frames
 from fulmar_ros.qos import FLUSH_S, LAST_WORDS_S, flush, publish_patiently, publisher_qos, subscriber_qos
+from fulmar_ros.relay import Receive, Relay, RelayedInputs
 
 APPLIED_DEPTH = 50  # states of the actuators that may wait while this process does something else
 
@@ -124,6 +125,7 @@ class ControllerWires:
         self.subscribed: dict[Wire, bool] = {}
         # Subscriptions of what the controller follows, which one node alone may publish.
         self.followed: dict[str, list[Subscription]] = {}
+        self.relayed, self._relay = RelayedInputs(node), Relay(node)
         # Before the odometry: of two messages that wait, an executor takes that of the older subscription first.
         if on_bearing is not None:
             self.followed[AIR_BEARING.name] = self._every(Bool, AIR_BEARING, on_bearing)
@@ -132,13 +134,13 @@ class ControllerWires:
         self._follow(ACTUATORS_STATE, made, lockstep=lockstep)
         made = node.create_subscription(Odometry, ODOMETRY.name, on_odometry, odometry_qos, raw=True)
         self._follow(ODOMETRY, made, lockstep=lockstep)
-        self._every(Bool, ESTOP, on_estop)
+        self._operated(Bool, ESTOP, self._relay.relaying(ESTOP, partial(self._see_estop, on_estop)))
         self._every(String, ESTOP_RELEASED, on_estop_released)
         self._every(String, SWAP, on_swap)
         for goal in goal_wires(task.goal_topic):
-            self._every(TYPES[goal.name], goal, on_goal, with_info=True)
+            self._operated(TYPES[goal.name], goal, on_goal)
         if task.sees_obstacles:
-            self._every(MarkerArray, OBSTACLES, on_obstacles)
+            self._operated(MarkerArray, OBSTACLES, lambda message, _info: on_obstacles(message))
         for thing in task.things:
             stream = subscriber_qos(thing.wire, reliable=lockstep)
             on_pose = partial(on_thing, thing.name)
@@ -153,6 +155,15 @@ class ControllerWires:
         self._subscriptions.append(made)
         self.subscribed[wire] = False
         return made
+
+    def _see_estop(self, on_estop: Callable[[Bool], None], message: Bool, _info: dict[str, int]) -> None:
+        if message.data:
+            self.relayed.forget()
+        on_estop(message)
+
+    def _operated(self, kind: type, wire: Wire, receive: Receive) -> None:
+        """Subscribe a wire of an operator, also by way of those who received it first."""
+        self._every(kind, wire, self.relayed.receiver(kind, wire, receive), with_info=True)
 
     def _follow(self, wire: Wire, made: Subscription, *, lockstep: bool) -> None:
         self._subscriptions.append([made])
@@ -191,6 +202,8 @@ class ControllerWires:
     def destroy(self, node: LifecycleNode) -> None:
         """Destroy every endpoint."""
         destroy_all(node, self._subscriptions)
+        self.relayed.destroy(node)
+        self._relay.destroy(node)
         for publisher in self._publishers:
             node.destroy_publisher(publisher)
 

@@ -32,6 +32,7 @@ from fulmar_ros.health import Health
 from fulmar_ros.operator_subscription import subscribe_every
 from fulmar_ros.parameters import name_of, read_parameters
 from fulmar_ros.qos import LAST_WORDS_S, publisher_qos, subscriber_qos
+from fulmar_ros.relay import RelayedInputs
 from fulmar_ros.runtime import RequestExit, run_node
 
 OWN_MESSAGES = 50  # of its own e-stop messages, by which the node recognises them: 5 s of them
@@ -67,7 +68,9 @@ class EstopNode(Node):
         self._own: deque[tuple[int, int, int]] = deque(maxlen=OWN_MESSAGES)  # number, and sent between [ns]
         self._publisher = self.create_publisher(Bool, ESTOP.name, publisher_qos(ESTOP))
         self._released = self.create_publisher(String, ESTOP_RELEASED.name, publisher_qos(ESTOP_RELEASED))
-        subscribe_every(self, Bool, ESTOP, self._on_estop, with_info=True)
+        self._relayed = RelayedInputs(self)
+        pressed = self._relayed.receiver(Bool, ESTOP, self._on_estop)
+        subscribe_every(self, Bool, ESTOP, pressed, with_info=True)
         self._health = Health(self, f"{name_of(self, robot)}: estop")
         wire = command_wire(robot)
         if wire is VELOCITY_COMMAND:

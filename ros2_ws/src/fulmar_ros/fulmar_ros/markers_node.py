@@ -35,6 +35,7 @@ from fulmar_ros.marker_messages import scene_message
 from fulmar_ros.operator_subscription import LateSubscribers, subscribe_every
 from fulmar_ros.parameters import name_of, own_frames, read_parameters
 from fulmar_ros.qos import publisher_qos, subscriber_qos
+from fulmar_ros.relay import Relay
 from fulmar_ros.runtime import RequestExit, run_node
 from fulmar_ros.scene.scene import Scene
 
@@ -102,19 +103,22 @@ class MarkersNode(Node):
                     self._subscribe()
 
     def _subscribe(self) -> None:
+        relay = Relay(self)
         for wire in goal_wires(self._topic):
-            subscribe_every(self, TYPES[wire.name], wire, self._on_goal)
-        subscribe_every(self, MarkerArray, OBSTACLES, self._on_obstacles)
+            receive = relay.relaying(wire, self._on_goal)
+            subscribe_every(self, TYPES[wire.name], wire, receive, with_info=True)
+        receive = relay.relaying(OBSTACLES, self._on_obstacles)
+        subscribe_every(self, MarkerArray, OBSTACLES, receive, with_info=True)
         applied = subscriber_qos(ACTUATORS_STATE, depth=10)
         self.create_subscription(JointState, ACTUATORS_STATE.name, self._on_applied, applied)
         subscribe_every(self, DiagnosticArray, STATUS, self._on_status)
 
-    def _on_goal(self, message: GoalMessage) -> None:
+    def _on_goal(self, message: GoalMessage, _info: dict[str, int]) -> None:
         targets, self._problem = goal_of(message, self._frames)
         if targets is not None:  # what is no goal is not drawn: the controller refuses it, too
             self._scene.give_goal(targets, stamp_ns(message.header.stamp))
 
-    def _on_obstacles(self, message: MarkerArray) -> None:
+    def _on_obstacles(self, message: MarkerArray, _info: dict[str, int]) -> None:
         obstacles, self._problem = obstacles_of(message, self._frames)
         if obstacles is not None:
             self._scene.give_obstacles(obstacles)

@@ -20,7 +20,7 @@ from fulmar_ros.qos import AT_ONCE, STREAM_DEPTH, subscriber_qos
 
 # Asks rclpy for message info.
 _WITH_INFO = inspect.signature(lambda message, info: None)
-SUBSCRIPTIONS = 2  # of one latched wire, as its reliable publishers count them
+SUBSCRIPTIONS = 2  # of one latched wire, as its latched publishers count them
 # Messages by which a second delivery is recognised; the middleware keeps no more for a reader
 REMEMBERED = 5000
 
@@ -42,7 +42,8 @@ def subscribe_every(
     A publisher with default settings is volatile and never matches a transient-local subscription; a volatile
     subscription misses what a latched publisher sent before. A best-effort publisher matches no reliable subscription;
     a best-effort subscription does not get again what was lost. All of them together receive everything, and the second
-    delivery of a message is dropped. The best-effort one is made with the first publisher that needs it.
+    delivery of a message is dropped. The best-effort one is made with the first publisher that needs it; so is the
+    latched one of a wire of the operator, since each that is there makes plain publishers warn of it.
 
     Args:
         node: Owner of the subscriptions.
@@ -60,30 +61,49 @@ def subscribe_every(
         The subscriptions, for `destroy_all`; a later one joins the list.
     """
     depth = max(wire.latest, STREAM_DEPTH) if depth is None else depth
-    receive = with_message_info(_Once(callback, with_info=with_info).pass_on)
+    receive = with_message_info(Once(callback, with_info=with_info).pass_on)
     made: list[Subscription] = []
+    kinds: set[str] = set()
     lock = threading.Lock()
 
-    def add(*, reliable: bool, latched: bool, events: SubscriptionEventCallbacks) -> None:
+    def add(what: str, *, reliable: bool, latched: bool, events: SubscriptionEventCallbacks) -> None:
         qos = subscriber_qos(wire, reliable=reliable, depth=depth, latched=latched, lossless=lossless)
         name = topic or wire.name
-        made.append(node.create_subscription(kind, name, receive, qos, raw=raw, event_callbacks=events))
+        with lock:
+            if what not in kinds:
+                kinds.add(what)
+                made.append(
+                    node.create_subscription(kind, name, receive, qos, raw=raw, event_callbacks=events)
+                )
 
     def add_best_effort(_event: Any = None) -> None:
-        with lock:
-            if len(made) == reliables:
-                add(reliable=False, latched=False, events=SubscriptionEventCallbacks())
+        add("best effort", reliable=False, latched=False, events=SubscriptionEventCallbacks())
 
-    durabilities = (False, True) if wire.delivery == "latched" else (False,)
-    reliables = len(durabilities)
-    for latched in durabilities:
-        # A volatile publisher does not match the latched subscription, which is no fault.
+    def add_latched() -> None:
+        # A volatile publisher does not match it, which is no fault.
         quiet = SubscriptionEventCallbacks(use_default_callbacks=False)
-        events = quiet if latched else SubscriptionEventCallbacks(incompatible_qos=add_best_effort)
-        add(reliable=True, latched=latched, events=events)
+        add("latched", reliable=True, latched=True, events=quiet)
+
+    def on_publisher(_event: Any) -> None:
+        if "latched" not in kinds and _is_offered_latched(node, topic or wire.name):
+            add_latched()
+
+    on_demand = wire.delivery == "latched" and wire.source == "operator"
+    events = SubscriptionEventCallbacks(
+        incompatible_qos=add_best_effort, matched=on_publisher if on_demand else None
+    )
+    add("usual", reliable=True, latched=False, events=events)
+    if wire.delivery == "latched" and not on_demand:
+        add_latched()
     if wire in AT_ONCE:
         add_best_effort()
     return made
+
+
+def _is_offered_latched(node: Node, topic: str) -> bool:
+    """Whether the graph shows a publisher of a topic that keeps messages for subscribers to come."""
+    infos = node.get_publishers_info_by_topic(node.resolve_topic_name(topic))
+    return any(info.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL for info in infos)
 
 
 def destroy_all(node: Node, subscriptions: Iterable[list[Subscription]]) -> None:
@@ -109,7 +129,7 @@ def with_message_info(callback: Callable[[Any, dict[str, int]], None]) -> Callab
     return on_message
 
 
-class _Once:
+class Once:
     """A callback of several subscriptions that passes each message on once, by its source time and number."""
 
     def __init__(self, callback: Callable[..., None], *, with_info: bool) -> None:
@@ -125,6 +145,10 @@ class _Once:
             self._callback(message, info)
         else:
             self._callback(message)
+
+    def knows(self, info: dict[str, int]) -> bool:
+        """Whether the message with this info came before."""
+        return (info["source_timestamp"], info["publication_sequence_number"]) in self._known
 
     def _is_second(self, sent_ns: int, number: int) -> bool:
         """Whether this message came before; one without a source time is passed on each time."""

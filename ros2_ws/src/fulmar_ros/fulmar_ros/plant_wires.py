@@ -55,6 +55,7 @@ from fulmar_ros.parameters import own_frames
 from fulmar_ros.plant_clock import SimulatedTime
 from fulmar_ros.plant_period import PlantPeriod
 from fulmar_ros.qos import FLUSH_S, LAST_WORDS_S, flush, publish_patiently, publisher_qos, subscriber_qos
+from fulmar_ros.relay import RelayedInputs
 from fulmar_ros.sensor_wires import SensorWires
 from fulmar_ros.sent_states import SentStates
 
@@ -153,8 +154,10 @@ class PlantWires:
         self._commands = node.create_subscription(
             TwistStamped if by_velocity else JointState, wire.name, self._on_command, commands, raw=True
         )
+        self._relayed = RelayedInputs(node)
+        pressed = self._relayed.receiver(Bool, ESTOP, self._on_estop)
         self._operator = [
-            subscribe_every(node, Bool, ESTOP, self._on_estop),
+            subscribe_every(node, Bool, ESTOP, pressed, with_info=True),
             subscribe_every(node, String, ESTOP_RELEASED, self._on_estop_released),
         ]
         # The wires that are subscribed; the values say whether a best-effort publisher is refused.
@@ -168,6 +171,7 @@ class PlantWires:
         """Destroy every endpoint."""
         self.end_capture()
         destroy_all(node, ([self._commands], *self._operator))
+        self._relayed.destroy(node)
         if self._period is not None:
             node.destroy_subscription(self._period.answers)
         node.destroy_service(self._give_back)
@@ -321,7 +325,7 @@ class PlantWires:
         if command is not None:  # what is damaged feeds no watchdog
             self._take(command.names, command.values, command.stamp_ns)
 
-    def _on_estop(self, message: Bool) -> None:
+    def _on_estop(self, message: Bool, _info: dict[str, int]) -> None:
         with self.lock:
             self._guard.estop.receive(bool(message.data), time.monotonic_ns())
 

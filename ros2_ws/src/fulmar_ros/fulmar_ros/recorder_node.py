@@ -42,6 +42,7 @@ from fulmar_ros.parameters import read_parameters
 from fulmar_ros.qos import EVERYTHING
 from fulmar_ros.recorder_health import RecorderHealth
 from fulmar_ros.recorder_settings import RecorderSettings
+from fulmar_ros.relay import Relay
 from fulmar_ros.runtime import RequestExit, run_node
 
 QUIET_S = 0.2  # nothing came for this long: what was published before the stop is here
@@ -94,6 +95,7 @@ class RecorderNode(Node):
         self._provenance = threading.Thread(target=self._attach_provenance, name="provenance", daemon=True)
         self._provenance.start()
         commands: list[list[Subscription]] = []
+        relay = Relay(self)
         for wire, topic in self._topics.items():
             put = self._keep(topic)
             if settings.lossless and wire in REPEATED:
@@ -104,7 +106,7 @@ class RecorderNode(Node):
                 self,
                 classes[wire],
                 wire,
-                put,
+                relay.relaying(wire, put),
                 depth=EVERYTHING,
                 raw=True,
                 with_info=True,

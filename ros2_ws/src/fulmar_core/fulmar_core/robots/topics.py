@@ -191,6 +191,11 @@ SWAP = Wire(
     "controller/swap", "std_msgs/msg/String", "operator", "stream", "on demand",
     "folder of the policy bundle to load; `controller/status` reports the result",
 )  # fmt: skip
+RELAY = Wire(
+    "relay", "std_msgs/msg/UInt8MultiArray", "every node", "stream", "with the first messages of a publisher",
+    "a goal, an obstacle or a press of the e-stop that a node received, for those not found by its publisher yet: "
+    "`layout.dim[0].label` has topic, source time [ns] and number, `data` the message", recorded=False,
+)  # fmt: skip
 VELOCITY_COMMAND = Wire(
     "cmd_vel", "geometry_msgs/msg/TwistStamped", "controller", "stream", "control rate",
     "command of a differential drive: `linear.x` and `angular.z`, stamped as the observation it answers",
@@ -226,8 +231,8 @@ WIRES: tuple[Wire, ...] = (
     *SENSOR_WIRES.values(), MOCAP, TRUTH, ACTUATORS_STATE, ACTUATORS_HEALTH, CLOCK, COMMAND, VELOCITY_COMMAND,
     OBSERVATION, ACTION, BELIEVED, METADATA, STATUS, DIAGNOSTICS, GOAL_POSE, GOAL_POINT, GOAL_PATH, GOAL_POSES,
     GOAL_VELOCITY, OBSTACLES, MARKERS, BLOCK, AIR_BEARING, DEVICE_STATE, ESTOP, ESTOP_RELEASED, TELEOP, JOY, SWAP,
-    TRANSFORMS, STATIC_TRANSFORMS, DESCRIPTION, INERTIA, INERTIA_COVARIANCE, INERTIA_STATUS, EVENTS, EVENTS_2, RATE,
-    RATE_STATUS, PERIOD, ANSWER,
+    RELAY, TRANSFORMS, STATIC_TRANSFORMS, DESCRIPTION, INERTIA, INERTIA_COVARIANCE, INERTIA_STATUS, EVENTS, EVENTS_2,
+    RATE, RATE_STATUS, PERIOD, ANSWER,
 )  # fmt: skip
 
 
