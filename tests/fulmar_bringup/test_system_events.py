@@ -57,6 +57,15 @@ def test_a_goal_is_reached_once_the_robot_has_been_there_for_a_second(system):
     assert system.after(1.0) == ["reached"]
 
 
+def test_a_goal_that_is_not_followed_is_a_refused_one_with_the_reason(system):
+    far = "goal is 100.0 m away, beyond the geofence of 8 m"
+    values = {"goals_received": "1", "goal_stamp_ns": "5", "goal_refused_stamp_ns": "5"}
+    assert system.after(1.0, goal_refused=far, **values) == ["goal_refused"]
+    assert system.events[0][1]["reason"] == far
+    assert system.after(1.0) == []
+    assert system.after(1.0, goal_refused="", goals_received="2", goal_stamp_ns="6") == ["goal"]
+
+
 def test_targets_of_a_path_are_counted_from_each_goal_on(system):
     assert system.after(1.0, goals_received="1", goals_done="0") == ["goal"]
     assert system.after(1.0, goals_done="1") == ["target"]

@@ -258,6 +258,29 @@ def test_with_robot_and_controller_the_node_goes_on(tmp_path, neighbour: Neighbo
     assert codes == []
 
 
+@pytest.mark.parametrize("gone", ["robot", "controller"])
+def test_goals_end_with_one_line_when_their_robot_or_its_controller_went_silent(
+    gone: str, tmp_path, neighbour: Neighbour, capfd
+) -> None:
+    topic, code = "/floating_platform/goal_point", 1
+    listener = neighbour.node.create_subscription(PointStamped, topic, lambda _message: None, 10)
+    with goal_node(tmp_path, POSITIONS, give_up_s=0.5, **PATIENT) as (node, codes):
+        with streaming(neighbour):
+            until(lambda: node._alone_checked)
+            time.sleep(0.6)
+            assert codes == []
+            if gone == "controller":
+                neighbour.node.destroy_subscription(listener)
+                until(lambda: codes == [code])
+        until(lambda: codes == [code])
+    (line,) = [line for line in capfd.readouterr().err.splitlines() if "ERROR" in line]
+    missing = {
+        "robot": "the robot went silent: nothing comes on /floating_platform/odom",
+        "controller": f"no controller subscribes {topic} any more",
+    }
+    assert f"{missing[gone]} (for 0.5 s)" in line and "fulmar goals --wait" in line
+
+
 @pytest.mark.slow  # the node itself ends in half a second, above
 def test_goals_for_a_robot_that_is_not_up_end_with_one_line(tmp_path, ros_domain: RosDomain) -> None:
     words = ("goals", "lab_pose", "--robot", "floating_platform")
@@ -305,6 +328,17 @@ def test_a_pose_outside_the_area_of_the_running_controller_ends_with_one_line_an
         in line
     )
     assert controller.guard.loop.goal.current.tolist() == before
+
+
+def test_a_pose_beyond_the_geofence_of_the_running_controller_ends_with_one_line(
+    neighbour: Neighbour, stream: Stream, controller: Any, capfd
+) -> None:
+    with single_goal_node(100.0, 3.0, 90.0, **PATIENT) as (_, codes):
+        until(lambda: codes == [1])
+    said = capfd.readouterr().err
+    (line,) = [line for line in said.splitlines() if "ERROR" in line]
+    assert "the controller refuses the goal: goal is 100.0 m away, beyond the geofence of 8 m" in line
+    assert "goal refused: goal is 100.0 m away, beyond the geofence of 8 m" in said
 
 
 @pytest.mark.parametrize("neighbour", ["turtlebot2"], indirect=True)

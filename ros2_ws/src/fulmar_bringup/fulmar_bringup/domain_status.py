@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.node import Node
 
-from fulmar_bringup.node_spec import PARTS, PLANT
+from fulmar_bringup.node_spec import CONTROLLER, PARTS, PLANT
 from fulmar_bringup.node_table import status_names
 from fulmar_core.robots.topics import DIAGNOSTICS, ESTOP_TRIGGER
+from fulmar_core.safety.arbiter import Mode, asks_for_a_goal
 from fulmar_core.safety.estop import HOLDS, SILENT
 from fulmar_core.safety.watchdog import NO_COMMAND
 from fulmar_core.wires.robot_name import namespace_of
@@ -21,6 +23,7 @@ from fulmar_ros.runtime import ros_node
 NODES, REPORTING = status_names(), status_names(silent=False)
 SETTLE_S = 0.25  # after the last node was discovered, for others
 LOOK_S = 0.02
+WAIT_LOOK_S = 0.1
 LEVELS = {DiagnosticStatus.OK: "ok", DiagnosticStatus.WARN: "warn", DiagnosticStatus.ERROR: "error"}
 
 
@@ -47,6 +50,14 @@ class NodeStatus:
         )
         return self.level in ("ok", "warn") or (self.level == "error" and designed)
 
+    @property
+    def takes_goals(self) -> bool:
+        """Whether it is a controller that follows a goal, or waits for one."""
+        acts = self.mode == Mode.ACTIVE.value
+        return self.node == CONTROLLER and (
+            acts or (self.mode == Mode.ARMED.value and asks_for_a_goal(self.reason))
+        )
+
 
 @dataclass(frozen=True)
 class RobotStatus:
@@ -56,18 +67,35 @@ class RobotStatus:
     estop: str  # pressed, silent, released, or none: no e-stop node runs and none is pressed
     nodes: list[NodeStatus] = field(default_factory=list)
 
+    @property
+    def active(self) -> bool:
+        """Whether its controller takes goals."""
+        return any(node.takes_goals for node in self.nodes)
+
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
-        return asdict(self)
+        return {**asdict(self), "active": self.active}
 
 
-def domain_status(name: str | None, wanted: str | None, *, timeout_s: float) -> list[RobotStatus]:
+def all_active(robots: Sequence[RobotStatus]) -> bool:
+    """Whether there are robots, and the controller of each takes goals."""
+    return bool(robots) and all(robot.active for robot in robots)
+
+
+def domain_status(
+    name: str | None,
+    wanted: str | None,
+    *,
+    timeout_s: float,
+    until: Callable[[Sequence[RobotStatus]], bool] | None = None,
+) -> list[RobotStatus]:
     """Look until every discovered node of every robot has reported, or the time is over.
 
     Args:
         name: Name of the only robot to look for; None for all.
         wanted: The only node to look for; it is awaited until the time is over.
         timeout_s: Longest look [s].
+        until: What is awaited instead of all reports, such as `all_active`.
 
     Returns:
         Robots by name, each with its plant, its controller and the other nodes that were found, or with the wanted
@@ -77,8 +105,9 @@ def domain_status(name: str | None, wanted: str | None, *, timeout_s: float) -> 
     with ros_node("status", errors.append) as node:
         look = _Look(node, name, wanted)
         until_s = time.monotonic() + timeout_s
-        while not (errors or look.complete() or time.monotonic() > until_s):
-            time.sleep(LOOK_S)
+        complete = look.complete if until is None else lambda: look.settled() and until(look.robots())
+        while not (errors or complete() or time.monotonic() > until_s):
+            time.sleep(LOOK_S if until is None else WAIT_LOOK_S)
         return look.robots()
 
 
@@ -103,12 +132,13 @@ class _Look:
         """Whether nothing is awaited any more."""
         if self._wanted is not None and self._wanted in REPORTING:
             robots = {robot for robot, node in self._reports if node == self._wanted}
-            return bool(robots) and (self._name is not None or self._settled())
+            return bool(robots) and (self._name is not None or self.settled())
         if self._wanted is not None:
-            return bool(self._discovered()) and self._settled()
-        return bool(self._reports) and self._settled() and not self._silent()
+            return bool(self._discovered()) and self.settled()
+        return bool(self._reports) and self.settled() and not self._silent()
 
-    def _settled(self) -> bool:
+    def settled(self) -> bool:
+        """Whether no node was discovered for a while."""
         found = self._discovered()
         if found != self._graph:
             self._graph, self._changed_s = found, time.monotonic()
@@ -126,7 +156,9 @@ class _Look:
         }
 
     def _silent(self) -> set[tuple[str, str]]:
-        return {each for each in self._graph if each[1] in REPORTING} - self._reports.keys()
+        """Nodes that have not reported yet, plant and controller of each robot among them, discovered or not."""
+        parts = {(robot, part) for robot, _ in self._graph | self._reports.keys() for part in PARTS}
+        return {each for each in self._graph | parts if each[1] in REPORTING} - self._reports.keys()
 
     def robots(self) -> list[RobotStatus]:
         """Every robot that was found."""

@@ -97,7 +97,9 @@ class SystemEvents:
         goals, done = values.get("goals_received", "0"), int(values.get("goals_done", "0"))
         if goals != self._goals:
             self._goals, self._goal_s, self._done, self._inside_s = goals, time_s, 0, None
-            self._emit("goal", time_s=time_s, stamp_ns=int(values.get("goal_stamp_ns", "0")))
+            stamp = values.get("goal_stamp_ns", "0")
+            if not refused[0] or refused[1] != stamp:  # one beyond the geofence came, and is not followed
+                self._emit("goal", time_s=time_s, stamp_ns=int(stamp))
         if done > self._done:
             self._done = done
             self._emit("target", time_s=time_s, done=done)

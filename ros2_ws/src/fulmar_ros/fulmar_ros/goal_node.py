@@ -23,6 +23,7 @@ from fulmar_core.config.errors import DONE, FAILED
 from fulmar_core.config.paths import config_names
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.robots.topics import GOAL_PATH, GOAL_WIRES, ODOMETRY, STATUS
+from fulmar_core.safety.arbiter import BEYOND_GEOFENCE
 from fulmar_core.safety.geofence import OUT_OF_BOUNDS
 from fulmar_core.safety.input_gate import InputGate, Measurement
 from fulmar_core.states.spatial import SpatialState
@@ -57,7 +58,7 @@ class GoalSettings:
     rate: float = 1.0  # seconds of the robot's own time a wall-clock second
     lockstep: bool = False  # publish the goal with each odometry: plant and controller wait for it
     stay: bool = False  # go on when everything is done, until stopped
-    # End with exit code 1 when so long after the start there is no usable odometry, or no subscriber; 0: wait [s].
+    # End with exit code 1 where for so long there is no usable odometry, or no subscriber; 0: wait [s].
     give_up_s: float = 0.0
     # Where to go on: the value `place` of the status of a goal node that has died; empty: at the beginning.
     place: str = ""
@@ -121,7 +122,8 @@ class GoalNode(Node):
         # The first goal waits for a subscriber; nodes that start together do not look for one.
         self._has_subscriber = self._settings.stay
         self._subscribers_checked = self._settings.stay  # nodes that start together subscribe each other
-        self._began = self._usable_at = time.monotonic()
+        self._began = self._usable_at = self._subscribed_at = time.monotonic()
+        self._refused = ""  # what the controller said of the newest goal
         wire = GOAL_WIRES[self._sequence.topic]
         # In lock step a goal comes with each odometry, and a recorder that lags behind needs them all. A path is the
         # same in each step and may be long: its newest message is enough.
@@ -206,7 +208,7 @@ class GoalNode(Node):
         self._sent, self._sent_at_ns = goal, self._time_ns
 
     def _on_status(self, message: DiagnosticArray) -> None:
-        """End where the controller refuses the goal for good: it lies outside the robot's area."""
+        """Say why the controller refuses the goal, and end where it does for good: it lies too far away."""
         values = {pair.key: pair.value for status in message.status[:1] for pair in status.values}
         reason = values.get("goal_refused", "")
         with self._lock:
@@ -214,11 +216,15 @@ class GoalNode(Node):
             mine = sent is not None and values.get("goal_refused_stamp_ns") == str(
                 stamp_ns(sent.header.stamp)
             )
-            if self._over or not mine or not reason.startswith(OUT_OF_BOUNDS):
+            if self._over or not mine or reason == self._refused:
                 return
-            self._over = True
-        self.get_logger().error(f"the controller refuses the goal: {reason}")
-        self._request_exit(FAILED)
+            self._refused = reason
+            self._over = reason.startswith(OUT_OF_BOUNDS) or BEYOND_GEOFENCE in reason
+        if self._over:
+            self.get_logger().error(f"the controller refuses the goal: {reason}")
+            self._request_exit(FAILED)
+        elif reason:
+            self.get_logger().warning(f"the controller refuses the goal: {reason}")
 
     def _publish_progress(self) -> None:
         if self._sequence.progress != self._progress:
@@ -242,6 +248,7 @@ class GoalNode(Node):
         """Notice silence, of the odometry and of whoever should listen; by a steady clock."""
         if self._settings.give_up_s:
             self._give_up_if_alone()
+            self._give_up_if_silent()
         with self._lock:
             now = time.monotonic()
             limit_s = self._timeout_s if self._newest else PATIENCE_S
@@ -274,6 +281,28 @@ class GoalNode(Node):
             advice = "Start the robot and its controller, or wait for them: fulmar goals --wait. "
             advice += running_robots_text(self)
         self.get_logger().error(f"{missing} {after}. {advice}")
+        self._request_exit(FAILED)
+
+    def _give_up_if_silent(self) -> None:
+        """End where a robot, or its controller, that was there has been gone for the time for it."""
+        with self._lock:
+            now, limit_s, topic = time.monotonic(), self._settings.give_up_s, self._publisher.topic_name
+            if self._subscribed(topic):
+                self._subscribed_at = now
+            silent = now - self._usable_at > limit_s
+            if self._over or not self._alone_checked or not (silent or now - self._subscribed_at > limit_s):
+                return
+            self._over = True
+            nothing = self._problem or f"nothing comes on {self.resolve_topic_name(ODOMETRY.name)}"
+            missing = (
+                f"the robot went silent: {nothing}"
+                if silent
+                else f"no controller subscribes {topic} any more"
+            )
+        self.get_logger().error(
+            f"{missing} (for {limit_s:g} s); {self._progress}. Start it again and give the goals anew, or wait for it: "
+            f"fulmar goals --wait. {running_robots_text(self)}"
+        )
         self._request_exit(FAILED)
 
     def _pause(self) -> None:

@@ -10,6 +10,7 @@ from visualization_msgs.msg import MarkerArray
 
 from fulmar_bags.message_reader import goal_of, obstacles_of, stamp_ns, thing_of
 from fulmar_core.loop.guarded_loop import GuardedLoop
+from fulmar_core.safety.arbiter import BEYOND_GEOFENCE
 from fulmar_core.wires.robot_name import Frames
 from fulmar_ros.goal_age import GoalAge
 from fulmar_ros.goal_messages import GoalMessage
@@ -31,6 +32,7 @@ class MissionInputs:
             refuses_old_goals: Whether goals from before the newest reset of the e-stop are refused; see `GoalAge`.
         """
         self._frames, self._warn = frames, warn
+        self._was_too_far = False
         self.goal_age = GoalAge(counts=refuses_old_goals)
 
     def take_goal(self, guard: GuardedLoop, message: GoalMessage, info: dict[str, int]) -> None:
@@ -41,9 +43,15 @@ class MissionInputs:
         if targets is None or problem:
             guard.refuse_goal(problem, stamp)
         else:
-            problem = guard.take_goal(targets, stamp, time.monotonic_ns())
+            problem = guard.take_goal(targets, stamp, time.monotonic_ns()) or self._too_far(guard)
         if problem:
             self._warn(f"goal refused: {problem}")
+
+    def _too_far(self, guard: GuardedLoop) -> str:
+        """Why a goal that was taken is not followed: beyond the geofence; empty if it is, or if the last was as far."""
+        reason, before = guard.decide(time.monotonic_ns()).reason, self._was_too_far
+        self._was_too_far = BEYOND_GEOFENCE in reason
+        return reason if self._was_too_far and not before else ""
 
     def take_obstacles(self, guard: GuardedLoop, message: MarkerArray) -> bool:
         """Give obstacles to the loop; whether it got them."""

@@ -7,42 +7,70 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from fulmar_bringup.console import console, output, print_json
+from fulmar_bringup.console import console, log_line, output, print_json
 from fulmar_cli.commands.arguments import JsonOption, argument, option
-from fulmar_core.config.errors import DONE, FAILED, UnknownNameError
+from fulmar_core.config.errors import DONE, FAILED, ConfigError, UnknownNameError
 
 if TYPE_CHECKING:
     from fulmar_bringup.domain_status import NodeStatus, RobotStatus
 
 
+ACTIVE = "active"  # what can be awaited
+TIMEOUT_S, WAIT_S = 3.0, 60.0
+NO_REPORT = ("silent", "absent")  # levels of nodes that have not reported
+
+
 def status(
     name: Annotated[str | None, argument("[NAME]", "Name of the only robot; every one by default.")] = None,
     node: Annotated[str | None, option("plant|controller|...", "The only node to look for.")] = None,
+    wait: Annotated[
+        str | None,
+        option("active", "Wait until the controller of the robot, or of each that is found, takes goals."),
+    ] = None,
     timeout: Annotated[
-        float, option("S", "Longest wait for a node that does not report.", min=0.1, max=60.0)
-    ] = 3.0,
+        float | None,
+        option(
+            "S",
+            f"Longest wait for a node that does not report; {TIMEOUT_S:g} by default, {WAIT_S:g} with --wait.",
+            min=0.1,
+            max=3600.0,
+        ),
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """List the robots and nodes of this ROS domain: level, mode, reason, e-stop, and the age of their diagnostics.
 
-    A health check for containers and services: it ends as soon as every node that is discovered has reported. Exit
-    code: 0 all well; 1 a node is absent, silent or in error, or no robot is found. A pressed e-stop is no error. With
-    --node plant missing commands are none either: the plant is up, in its safe state, and obeys the next controller.
+    A health check for containers and services: it ends as soon as every node has reported. Exit code: 0 all well; 1 a
+    node does not report or is in error, or no robot is found. A pressed e-stop is no error. With --node plant missing
+    commands are none either: the plant is up, in its safe state, and obeys the next controller.
+
+    With --wait active it waits until the controller takes goals, which it does from its start on, once it receives
+    odometry and no e-stop is pressed: a goal that is published before may be lost. Exit code: 0 it takes goals, 1 it
+    does not within the timeout.
 
     Try:
 
     fulmar status
 
     fulmar status floating_platform --node plant
+
+    fulmar status floating_platform --wait active --timeout 30
     """
-    from fulmar_bringup.domain_status import NODES, domain_status
+    from fulmar_bringup.domain_status import NODES, all_active, domain_status
 
     if node is not None and node not in NODES:
         raise UnknownNameError("node", node, NODES)
-    robots = domain_status(name, node, timeout_s=timeout)
+    if wait is not None and wait != ACTIVE:
+        raise UnknownNameError("state of --wait", wait, (ACTIVE,))
+    if wait and node:
+        raise ConfigError("--wait active waits for a controller; it takes no --node. Leave one of them out.")
+    timeout = timeout or (WAIT_S if wait else TIMEOUT_S)
+    robots = domain_status(name, node, timeout_s=timeout, until=all_active if wait else None)
     well = bool(robots) and all(one.well(alone=node is not None) for robot in robots for one in robot.nodes)
     if as_json:
-        print_json({"well": well, "robots": [robot.as_dict() for robot in robots]})
+        print_json(
+            {"well": well, "active": all_active(robots), "robots": [robot.as_dict() for robot in robots]}
+        )
     elif not robots:
         what = (node or "robot") + (f" of '{name}'" if name and node else f" '{name}'" if name else "")
         domain = os.environ.get("ROS_DOMAIN_ID") or "0"
@@ -52,18 +80,26 @@ def status(
             markup=False, soft_wrap=True,
         )  # fmt: skip
     for robot in robots if not as_json else ():
-        _show(robot)
-    raise typer.Exit(DONE if well else FAILED)
+        _show(robot, timeout)
+        if wait and not robot.active:
+            log_line(f"the controller of '{robot.name}' takes no goals within {timeout:g} s.")
+    raise typer.Exit(DONE if (all_active(robots) if wait else well) else FAILED)
 
 
-def _show(robot: RobotStatus) -> None:
+def _show(robot: RobotStatus, timeout_s: float) -> None:
     output.print(f"{robot.name}  e-stop: {robot.estop}", markup=False)
     width = max([11, *(len(node.node) + 1 for node in robot.nodes)])
     for node in robot.nodes:
-        output.print(f"  {node.node:<{width}}{node.level:<7}{_words(node)}", markup=False, soft_wrap=True)
+        level = "?" if node.level in NO_REPORT else node.level
+        output.print(
+            f"  {node.node:<{width}}{level:<7}{_words(node, timeout_s)}", markup=False, soft_wrap=True
+        )
 
 
-def _words(node: NodeStatus) -> str:
+def _words(node: NodeStatus, timeout_s: float) -> str:
+    if node.level in NO_REPORT:
+        there = ", though it is there" if node.level == "silent" else ""
+        return f"no report within {timeout_s:g} s{there}"
     age = "" if node.age_s is None else f"{node.age_s:.1f} s ago"
     place = f"process {node.pid} on {node.host}" if node.pid else ""
     return ", ".join(filter(None, (node.mode, node.reason, age, place)))

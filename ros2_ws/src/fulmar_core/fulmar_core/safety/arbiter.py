@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 BEARING_OFF = "the air bearing is off"
+BEYOND_GEOFENCE = "beyond the geofence"  # a part of the reason by which a goal that came is not followed
 
 
 class Mode(Enum):
@@ -87,6 +88,11 @@ def arbitrate(flags: Flags, now_ns: int) -> Decision:
         return Decision(
             Mode.ARMED,
             False,
-            f"goal is {flags.goal_distance:.1f} m away, beyond the geofence of {flags.geofence:g} m",
+            f"goal is {flags.goal_distance:.1f} m away, {BEYOND_GEOFENCE} of {flags.geofence:g} m",
         )
     return Decision(Mode.ACTIVE, True, "")
+
+
+def asks_for_a_goal(reason: str) -> bool:
+    """Whether a reason not to act means that only a goal, or one that is nearer, is missing."""
+    return reason.endswith(" yet") or BEYOND_GEOFENCE in reason
