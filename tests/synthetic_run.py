@@ -302,16 +302,47 @@ class RunMessages:
         self._write(name, message, log_ns)
 
     def joints(
-        self, name: str, values: np.ndarray, time_s: float, log_ns: int, field: str = "effort"
+        self,
+        name: str,
+        values: np.ndarray,
+        time_s: float,
+        log_ns: int,
+        field: str = "effort",
+        names: Sequence[str] = (),
     ) -> None:
         arrays = dict.fromkeys(("position", "velocity", "effort"), np.zeros(0))
         message = self._new(
             "sensor_msgs/msg/JointState",
             header=self._header(time_s),
-            name=list(self._names),
+            name=list(names or self._names),
             **(arrays | {field: np.asarray(values, dtype=float)}),
         )
         self._write(name, message, log_ns)
+
+    def imu(self, rate: np.ndarray, time_s: float, log_ns: int) -> None:
+        zero = np.zeros(9)
+        message = self._new(
+            "sensor_msgs/msg/Imu",
+            header=self._header(time_s, "base_link"),
+            orientation=self._vector("Quaternion", np.array([0.0, 0.0, 0.0, 1.0])),
+            orientation_covariance=zero,
+            angular_velocity=self._vector("Vector3", rate),
+            angular_velocity_covariance=zero,
+            linear_acceleration=self._vector("Vector3", np.zeros(3)),
+            linear_acceleration_covariance=zero,
+        )
+        self._write("imu/data", message, log_ns)
+
+    def inertia(self, tensor: Sequence[float], std: float, time_s: float, log_ns: int) -> None:
+        moments = dict(zip(("ixx", "iyy", "izz", "ixy", "ixz", "iyz"), tensor, strict=True))
+        com = self._vector("Vector3", np.zeros(3))
+        inertia = self._new("geometry_msgs/msg/Inertia", m=1.0, com=com, **moments)
+        message = self._new("geometry_msgs/msg/InertiaStamped", header=self._header(time_s), inertia=inertia)
+        self._write("inertia", message, log_ns)
+        layout = self._new("std_msgs/msg/MultiArrayLayout", dim=[], data_offset=0)
+        spread = (std**2 * np.eye(6)).ravel()
+        message = self._new("std_msgs/msg/Float64MultiArray", layout=layout, data=spread)
+        self._write("inertia/covariance", message, log_ns)
 
     def health(self, name: str, part: str, values: dict[str, str], log_ns: int) -> None:
         status = self._new(

@@ -89,10 +89,10 @@ def test_a_page_of_a_flight_shows_height_surfaces_and_energy(flight, tmp_path):
     for label in (
         "height [m]",
         "height error [m]",
-        "energy [s]",
+        "full throttle [s]",
         "deflection [°]",
         "throttle",
-        "lqi, measured",
+        "LQI, measured",
     ):
         assert label in words
     assert "body's x" not in words
@@ -116,7 +116,7 @@ def test_a_bag_without_measured_surfaces_shows_what_was_applied(flight):
     (run,) = views([dataclasses.replace(flight, surfaces=NO_SURFACES)])
     rows = Figure().subplots(2, 1)
     draw_surfaces(rows, run)
-    assert rows[0].get_title(loc="left") == "lqi, applied"
+    assert rows[0].get_title(loc="left") == "LQI, applied"
     elevator = rows[0].lines[0].get_ydata()
     np.testing.assert_allclose(elevator, np.rad2deg(flight.applied.effort[:-1, 0]), rtol=0, atol=1e-4)
 

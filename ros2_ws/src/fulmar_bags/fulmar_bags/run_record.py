@@ -11,6 +11,7 @@ import numpy as np
 from fulmar_bags.contents import Bag, json_object, open_bag
 from fulmar_bags.decode import NS, Odometries, Vectors, odometries
 from fulmar_bags.figures import controller_of
+from fulmar_bags.other_readings import NO_INERTIAS, NO_SERIES, Inertias, Series, gyroscope_s, inertias, series
 from fulmar_bags.wire_reader import Received, WireReader
 from fulmar_bags.writer import RUN_RECORD
 from fulmar_core.config.errors import BagError, ConfigError
@@ -156,6 +157,10 @@ class RunRecord:
     warnings: tuple[str, ...]  # what could not be read
     surfaces: Surfaces = NO_SURFACES  # `surfaces/state` of an aircraft
     supply: Pressures = NO_PRESSURES  # `supply/pressure` of thrusters
+    wheels: Series = NO_SERIES  # speeds of reaction wheels [rad/s]
+    air_data: Series = NO_SERIES  # of an aircraft: airspeed [m/s], angles [rad], height [m]
+    gyroscope_s: tuple[float, ...] = ()  # stamps of a satellite's inertial unit [s]
+    inertia: Inertias = NO_INERTIAS  # that estimators published
 
     @property
     def actuation(self) -> Actuation:
@@ -247,6 +252,10 @@ def _record(bag: Bag, info: dict[str, Any]) -> RunRecord:
         warnings=tuple(reader.warnings),
         surfaces=Surfaces(surfaces.stamp_ns / NS, surfaces.names, surfaces.values),
         supply=_pressures(reader),
+        wheels=series(reader, SENSOR_WIRES["wheels"], "velocity"),
+        air_data=series(reader, SENSOR_WIRES["air_data"], "position"),
+        gyroscope_s=gyroscope_s(reader),
+        inertia=inertias(reader),
     )
 
 

@@ -100,7 +100,7 @@ FIGURES = {
         "Standard deviation over time of the share of full command, mean over the actuators (the words of the "
         "thesis); at most 0.5 for a valve.", "less",
     ),
-    "collided": Figure("collided", "-", "Share of episodes that touched an obstacle.", "less"),
+    "collided": Figure("collided", "-", "Share of episodes that hit an obstacle (aircraft: water, ground).", "less"),
     "left_the_geofence": Figure(
         "left the geofence", "-", "Share of episodes that were beyond the geofence at any step.", "less",
     ),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -49,6 +50,7 @@ def summarise(record: RunRecord) -> dict[str, Any]:
         "success": result is not None and result.success,
         **{name: result.figure(name) if result else None for name in FIGURES},
         "collided": None if result is None else bool(result.figures["collided"]),
+        "touched": result.robot.kind.obstacle if result and result.figures["collided"] else None,
         "path_error_m": result.path_error_m if result else None,
         **_tracking(result),
         "goals_progress": result.progress if result else None,
@@ -210,18 +212,30 @@ def last_beliefs(record: RunRecord) -> str:
     return status.values.get("beliefs", "") if status else ""
 
 
-FIGURE_TEXTS = {
-    "final_position_error_m": "{:.3f} m off",
-    "final_heading_error_deg": "{:.1f}° off",
-    "final_attitude_error_deg": "attitude {:.1f}° off",
-    "goals_reached": "{:.0f} targets reached",
-    "velocity_error_m_s": "velocity {:.3f} m/s off",
-    "yaw_rate_error_deg_s": "turn rate {:.1f}°/s off",
-    "rate_error_deg_s": "turn rate {:.1f}°/s off",
-    "path_error_m": "path {:.3f} m off",
-    "tracking_error_m": "moving target {:.3f} m off",
-    "tracking_error_deg": "its attitude {:.1f}° off",
-    "goals_progress": "{}",
+FINEST_DEG = 0.001  # finer differences of attitudes are not said
+
+
+def degrees_text(value: float | None) -> str:
+    """An angle for people, with as many digits as small ones need [deg]."""
+    if value is None:
+        return "–"
+    if value < FINEST_DEG:
+        return f"below {FINEST_DEG:g}°"
+    return f"{value:.1f}°" if value >= 0.95 else f"{value:.2f}°" if value >= 0.095 else f"{value:.3f}°"
+
+
+FIGURE_TEXTS: dict[str, Callable[[Any], str]] = {
+    "final_position_error_m": "{:.3f} m off".format,
+    "final_heading_error_deg": lambda value: f"{degrees_text(value)} off",
+    "final_attitude_error_deg": lambda value: f"attitude {degrees_text(value)} off",
+    "goals_reached": "{:.0f} targets reached".format,
+    "velocity_error_m_s": "velocity {:.3f} m/s off".format,
+    "yaw_rate_error_deg_s": "turn rate {:.1f}°/s off".format,
+    "rate_error_deg_s": "turn rate {:.1f}°/s off".format,
+    "path_error_m": "path {:.3f} m off".format,
+    "tracking_error_m": "moving target {:.3f} m off".format,
+    "tracking_error_deg": "its attitude {:.1f}° off".format,
+    "goals_progress": str,
 }
 
 
@@ -235,8 +249,8 @@ def summary_text(summary: dict[str, Any]) -> str:
             result += f" after {summary['time_to_target_s']:.1f} s"
     else:
         result = "moved without a goal"
-    known = [text.format(summary[key]) for key, text in FIGURE_TEXTS.items() if summary[key] is not None]
-    known += ["touched an obstacle"] if summary["collided"] else []
+    known = [text(summary[key]) for key, text in FIGURE_TEXTS.items() if summary[key] is not None]
+    known += [f"touched {summary['touched']}"] if summary["touched"] else []
     length = f"; length of the run {summary['duration_s']:.0f} s"
     lines = [f"{summary['controller']}: {', '.join([result, *known])}{length}"]
     if summary["steps"]:

@@ -30,7 +30,7 @@ from fulmar_bags.figures import describe
 from fulmar_core.robots.topics import SENSOR_WIRES
 from fulmar_evaluation.report.page import Part, Plot, cells, html_page, table
 from fulmar_evaluation.report.space_plot import SIDES
-from fulmar_evaluation.report.style import CONTROLLER_COLOURS, legend, quiet_grid
+from fulmar_evaluation.report.style import BODY_AXES, CONTROLLER_COLOURS, legend, quiet_grid
 from fulmar_evaluation.report.supply_plot import draw_pressure
 from fulmar_evaluation.report.writer import write_document
 
@@ -88,7 +88,7 @@ def write_bag_report(
 
 def _drawings(bag: Bag, seen: Odometries) -> list[Drawing]:
     time_s = (seen.stamp_ns - seen.stamp_ns[0]) / 1e9 if len(seen) else np.zeros(0)
-    space = _leaves_the_plane(seen)
+    space, stays = _leaves_the_plane(seen), _stays(seen)
     speed = np.linalg.norm(seen.twist[:, : 3 if space else 2], axis=1)
     turning = np.linalg.norm(seen.twist[:, 3:], axis=1) if space else seen.twist[:, 5]
 
@@ -122,6 +122,13 @@ def _drawings(bag: Bag, seen: Odometries) -> list[Drawing]:
         axes.set_xlabel("time [s]")
         axes.set_ylabel("delay [ms]")
 
+    def turns(axes: Axes) -> None:
+        for axis, colour, rate in zip("xyz", BODY_AXES, np.rad2deg(seen.twist[:, 3:]).T, strict=True):
+            axes.plot(time_s, rate, color=colour, lw=1.1, label=f"about {axis}")
+        axes.set_xlabel("time [s]")
+        axes.set_ylabel("turn rate [°/s]")
+        legend(axes, loc="best", ncols=3)
+
     found = [
         Drawing(
             f"The path, seen {SIDES[0].title if space else SIDES[0].name}",
@@ -134,6 +141,10 @@ def _drawings(bag: Bag, seen: Odometries) -> list[Drawing]:
             "How fast", _PACE_IN_SPACE if space else "Speed and turn rate in the body's frame.", 2.2, pace
         ),
     ]
+    if stays:
+        found = [
+            Drawing("How it turned", "About the axes of the body; its place stays the same.", 2.2, turns)
+        ]
     for topic in bag.topics.values():
         if topic.type in COMMANDS and len(topic):
             measured = topic.name.endswith(f"/{SENSOR_WIRES['surfaces'].name}")
@@ -142,11 +153,9 @@ def _drawings(bag: Bag, seen: Odometries) -> list[Drawing]:
                 found.append(_actuators(topic.name, vectors, _seconds(vectors, seen, topic.type == TWIST)))
         if topic.type == SENSOR_WIRES["supply"].type and len(topic):
             found.append(_pressure(topic, seen))
-    found.append(
-        Drawing(
-            "How late the odometry came", "Recorded minus stamped, beyond the quickest message.", 2.0, delay
-        )
-    )
+    if not (bag.info or {}).get("lockstep"):  # where stamps and clocks have nothing to do with each other
+        late = "Recorded minus stamped, beyond the quickest message."
+        found.append(Drawing("How late the odometry came", late, 2.0, delay))
     return found
 
 
@@ -170,6 +179,11 @@ def _leaves_the_plane(seen: Odometries) -> bool:
     upright = 1.0 - 2.0 * np.sum(seen.pose[:, 3:5] ** 2, axis=1)  # cosine of the tilt
     wide = np.ptp(seen.pose[:, :3], axis=0)
     return bool(np.min(upright) < np.cos(LARGEST_TILT) or wide[2] > LARGEST_RISE * max(1.0, *wide[:2]))
+
+
+def _stays(seen: Odometries) -> bool:
+    """Whether a body turns at one place, as satellites do, of which no place is measured."""
+    return bool(len(seen)) and not np.ptp(seen.pose[:, :3], axis=0).any() and bool(seen.twist[:, 3:].any())
 
 
 def _seconds(vectors: Vectors, seen: Odometries, unstamped: bool) -> np.ndarray:

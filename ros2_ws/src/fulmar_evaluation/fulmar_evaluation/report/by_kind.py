@@ -4,31 +4,39 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+from matplotlib.axes import Axes
 from matplotlib.figure import SubFigure
 
 from fulmar_core.robots.robot import Robot
 from fulmar_evaluation.report import run_figures as figures
+from fulmar_evaluation.report import satellite_figures as satellites
 from fulmar_evaluation.report.control_plot import actuators_height, draw_actuators
 from fulmar_evaluation.report.envelope_plot import write_envelope_plot
 from fulmar_evaluation.report.flight_plot import (
+    FLIGHT_MOTION_ROWS,
     FLIGHT_ROWS,
     PATH_ROWS,
     draw_flight,
+    draw_flight_motion,
     draw_flight_path,
     draw_surfaces,
+    flight_table,
 )
+from fulmar_evaluation.report.motion_plot import MOTION_ROWS, draw_motion
 from fulmar_evaluation.report.page import Plot
-from fulmar_evaluation.report.run_view import View, evaluated
+from fulmar_evaluation.report.run_view import Row, View, belief_rows, evaluated, use_row
+from fulmar_evaluation.report.satellite_plot import torque_rows
 from fulmar_evaluation.report.space_plot import draw_space
 from fulmar_evaluation.report.style import legend
 from fulmar_evaluation.report.trajectory_plot import draw_trajectory
 from fulmar_evaluation.report.wrench_plot import write_wrench_plot
 
-Figures = tuple[Callable[[Sequence[View]], Plot], ...]
+Figures = tuple[Callable[[Sequence[View]], Plot | None], ...]
 Draw = Callable[[SubFigure, Sequence[View]], object]
+DrawRows = Callable[[Sequence[Axes], Sequence[View]], None]
 
 
 def _draw_trajectory(figure: SubFigure, runs: Sequence[View]) -> None:
@@ -68,39 +76,55 @@ class Plots:
 
     Attributes:
         of_check: Writes what a check shows into an image, and returns its path.
-        path: Sections of a report about the motion.
+        path: Sections of a report about the motion; None from one that has nothing to show.
         use: Same about the actuators.
+        rows: What its table of figures has beside what every robot has.
         draw_path: Draws the path on the sheet that has everything.
         draw_use: Draws there what the actuators did.
         use_height: Room for that [inch].
         path_rows: Rows over time that `draw_path` needs at least.
-        in_space: The sheet has speed and turn rate over time too.
+        motion_rows: Rows of the sheet that show how it moved.
+        draw_motion: Draws them.
     """
 
     of_check: Callable[[Robot, Path], Path] = write_wrench_plot
     path: Figures = (figures.space_path, figures.progress, figures.motion)
     use: Figures = (figures.actuators, figures.use)
+    rows: Callable[[Sequence[View]], list[Row]] = lambda runs: [use_row(runs), *belief_rows(runs)]
     draw_path: Draw = _draw_space
     draw_use: Draw = _draw_actuators
     use_height: Callable[[Sequence[View]], float] = lambda runs: len(runs) * actuators_height(runs, 1.5) + 0.2
     path_rows: int = 0
-    in_space: bool = True
+    motion_rows: int = MOTION_ROWS
+    draw_motion: DrawRows = draw_motion
 
 
-_IN_PLANE = Plots(path=(figures.trajectory, figures.progress), draw_path=_draw_trajectory, in_space=False)
+_IN_PLANE = Plots(path=(figures.trajectory, figures.progress), draw_path=_draw_trajectory, motion_rows=0)
 PLOTS = defaultdict(
     Plots,
     planar=_IN_PLANE,
-    rolling=_IN_PLANE,
-    satellite=Plots(path=(figures.progress, figures.motion)),  # it stays where it is
+    rolling=replace(_IN_PLANE, rows=lambda runs: []),  # nothing believes anything of wheels
+    satellite=Plots(  # it stays where it is
+        path=(figures.progress, satellites.attitude, satellites.wheels, satellites.inertia),
+        use=(satellites.torques,),
+        rows=satellites.table,
+        draw_path=satellites.sheet_path,
+        draw_use=satellites.sheet_torques,
+        use_height=lambda runs: 1.6 * torque_rows(runs) + 0.2,
+        path_rows=5,
+        motion_rows=0,
+    ),
     aircraft=Plots(
         of_check=write_envelope_plot,
-        path=(figures.flight_path, figures.progress, figures.flight, figures.motion),
+        path=(figures.flight_path, figures.progress, figures.flight, figures.flight_motion),
         use=(figures.surfaces,),
+        rows=flight_table,
         draw_path=_draw_flight,
         draw_use=_draw_surfaces,
         use_height=lambda _runs: 3.6,
         path_rows=PATH_ROWS + FLIGHT_ROWS,
+        motion_rows=FLIGHT_MOTION_ROWS,
+        draw_motion=draw_flight_motion,
     ),
 )
 

@@ -11,12 +11,11 @@ from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Polygon
-from matplotlib.patheffects import withStroke
 from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullLocator
 
 from fulmar_core.robots.robot import Body
 from fulmar_core.tasks.terms import Tolerance
-from fulmar_evaluation.report.style import DASHED, FAINT, INK, PAPER, quiet_grid
+from fulmar_evaluation.report.style import DASHED, FAINT, INK, PAPER, READABLE, quiet_grid
 
 WIDTH = 9.2  # of a figure that fills the page of a benchmark [inch]
 LENGTHS = {0.001: "1 mm", 0.01: "1 cm", 0.1: "10 cm", 1.0: "1 m", 10.0: "10 m"}
@@ -67,10 +66,8 @@ def share_axis(axes: Axes, ticks: MaxNLocator) -> None:
 def limit_line(axes: Axes, value: float, label: str = "") -> None:
     """A dashed line at a tolerance, with its name above it."""
     axes.axhline(value, color=INK, linestyle=DASHED, linewidth=1.0)
-    text = axes.text(
-        0.005, value, label, transform=axes.get_yaxis_transform(), va="bottom", fontsize=8.5, color=INK
-    )
-    text.set_path_effects([withStroke(linewidth=3.0, foreground="white")])  # readable where a curve passes
+    look = {"va": "bottom", "fontsize": 8.5, "color": INK, "bbox": READABLE}
+    axes.text(0.005, value, label, transform=axes.get_yaxis_transform(), **look)
 
 
 def bands(axes: Axes, time_s: np.ndarray, quantiles: np.ndarray, colour: str, *, half: bool = True) -> None:

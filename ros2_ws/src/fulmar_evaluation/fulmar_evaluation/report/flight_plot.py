@@ -9,15 +9,15 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from fulmar_core.robots.actuators.control_surfaces import is_throttle
+from fulmar_core.states.attitude import euler_of
 from fulmar_core.tasks.follow_reference import FollowReference
-from fulmar_evaluation.report.run_view import View, evaluated
-from fulmar_evaluation.report.style import BODY_AXES, CONTROLLER_COLOURS, DASHED, INK, legend, quiet_grid
+from fulmar_evaluation.report.run_view import Row, View, evaluated
+from fulmar_evaluation.report.style import BODY_AXES, DASHED, INK, PARTS, STROKES, legend_over, quiet_grid
 from fulmar_evaluation.run_evaluation import RunResult
 
-PATH_ROWS, FLIGHT_ROWS = 2, 3
+PATH_ROWS, FLIGHT_ROWS, FLIGHT_MOTION_ROWS = 2, 3, 3
 LEAST_SPAN = 0.5  # of an axis of height or side: less is noise [m]
 REFERENCE: dict[str, Any] = {"color": INK, "linestyle": DASHED, "linewidth": 0.9, "label": "reference"}
-PARTS = (*BODY_AXES, CONTROLLER_COLOURS["policy"], CONTROLLER_COLOURS["lqr"])  # of surfaces and throttles
 
 
 def draw_flight_path(rows: Sequence[Axes] | np.ndarray, runs: Sequence[View]) -> None:
@@ -31,8 +31,8 @@ def draw_flight_path(rows: Sequence[Axes] | np.ndarray, runs: Sequence[View]) ->
         _at_least(axes)
         quiet_grid(axes)
         axes.set_ylabel("y [m]" if up == 1 else "z [m]")
-    rows[0].set_title("to the left")
-    rows[1].set_title("height")
+    rows[0].set_title("from above (x, y)")
+    rows[1].set_title("from the side (x, z)")
     rows[0].tick_params(labelbottom=False)
     rows[-1].set_xlabel("x [m]")
 
@@ -50,7 +50,7 @@ def draw_flight(rows: Sequence[Axes] | np.ndarray, runs: Sequence[View]) -> None
             if order == 0:
                 height.plot(result.time_s, aims[:, 2], **REFERENCE)
     _at_least(height)
-    for axes, label in zip(rows, ("height [m]", "height error [m]", "energy [s]"), strict=True):
+    for axes, label in zip(rows, ("height [m]", "height error [m]", "full throttle [s]"), strict=True):
         quiet_grid(axes)
         axes.set_xlim(0.0, max((result.duration_s for _, result in evaluated(runs)), default=1.0))
         axes.set_ylabel(label)
@@ -58,6 +58,45 @@ def draw_flight(rows: Sequence[Axes] | np.ndarray, runs: Sequence[View]) -> None
     for axes in rows[:-1]:
         axes.tick_params(labelbottom=False)
     energy.set_xlabel("time [s]")
+
+
+def draw_flight_motion(rows: Sequence[Axes] | np.ndarray, runs: Sequence[View]) -> None:
+    """Speed through the air and over the ground, how it lies in the air, and how it turns, below one another."""
+    speed, attitude, rates = rows
+    for stroke, (run, result) in zip(STROKES, evaluated(runs), strict=False):
+        motion, air, before = (
+            run.record.motion,
+            run.record.air_data,
+            f"{run.label}, " if len(runs) > 1 else "",
+        )
+        look = {"color": run.colour, "linewidth": 1.1}
+        if "airspeed" in air.names:
+            measured = air.values[:, air.names.index("airspeed")]
+            time_s = air.stamp_s - float(motion.stamp_s[0])
+            speed.plot(time_s, measured, alpha=0.6, label=f"{before}through the air", **look)
+        over = {"color": INK if len(runs) == 1 else run.colour, "linewidth": 1.1, "linestyle": DASHED}
+        speed.plot(result.time_s, result.run.speed[0], label=f"{before}over the ground", **over)
+        x, y, z, w = motion.quat_xyzw[result.samples].T
+        roll, pitch, _ = np.rad2deg(np.stack(euler_of((x, y, z, w))))
+        turning = np.rad2deg(motion.angular_velocity_in_body[result.samples]).T
+        lines = [
+            (attitude, roll, "roll, right wing down", BODY_AXES[0]),
+            (attitude, -pitch, "pitch, nose up", BODY_AXES[1]),
+        ]
+        for values, axis, colour in zip(turning, "xyz", BODY_AXES, strict=True):
+            lines.append((rates, values, f"about {axis}", colour))
+        for axes, values, label, colour in lines:
+            axes.plot(
+                result.time_s, values, label=before + label, color=colour, linestyle=stroke, linewidth=1.0
+            )
+    for axes, label in zip(rows, ("speed [m/s]", "attitude [°]", "turn rate [°/s]"), strict=True):
+        quiet_grid(axes)
+        axes.set_xlim(0.0, max((result.duration_s for _, result in evaluated(runs)), default=1.0))
+        axes.set_ylabel(label)
+        legend_over(axes)
+        axes.tick_params(labelbottom=axes is rates)
+    _at_least(speed)
+    rates.set_xlabel("time [s]")
 
 
 def reference_places(result: RunResult) -> np.ndarray | None:
@@ -107,10 +146,32 @@ def draw_surfaces(rows: Sequence[Axes] | np.ndarray, run: View) -> None:
     for axes, label in zip(rows, ("deflection [°]", "throttle"), strict=True):
         quiet_grid(axes)
         axes.set_ylabel(label)
-        legend(axes, loc="upper right", ncols=3)
+        legend_over(axes)
     rows[0].tick_params(labelbottom=False)
     rows[1].set_ylim(0.0, 1.05)
     rows[1].set_xlabel("time [s]")
+
+
+def flight_table(runs: Sequence[View]) -> list[Row]:
+    """Speed and height of flights in figures."""
+
+    def spread(values: np.ndarray, unit: str) -> str:
+        if not values.size:
+            return "–"
+        return f"{values.min():.1f} / {values.mean():.1f} / {values.max():.1f} {unit}"
+
+    def airspeed(run: View) -> str:
+        air = run.record.air_data
+        return spread(air.values[:, air.names.index("airspeed")], "m/s") if "airspeed" in air.names else "–"
+
+    def height(run: View) -> str:
+        return spread(run.record.motion.position[:, 2], "m")
+
+    least = "least / mean / most"
+    return [
+        ("Airspeed", least, [airspeed(run) for run in runs]),
+        ("Height", least, [height(run) for run in runs]),
+    ]
 
 
 def _at_least(axes: Axes) -> None:

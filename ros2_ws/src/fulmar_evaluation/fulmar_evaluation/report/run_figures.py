@@ -10,9 +10,11 @@ from matplotlib.figure import Figure
 from fulmar_evaluation.report.control_plot import actuators_height, draw_actuators, draw_latency, draw_use
 from fulmar_evaluation.report.error_plot import counting, draw_progress, strips
 from fulmar_evaluation.report.flight_plot import (
+    FLIGHT_MOTION_ROWS,
     FLIGHT_ROWS,
     PATH_ROWS,
     draw_flight,
+    draw_flight_motion,
     draw_flight_path,
     draw_surfaces,
 )
@@ -103,13 +105,24 @@ def flight(runs: Sequence[View]) -> Plot:
     draw_flight(rows, runs)
     legend(rows[0], loc="upper right", ncols=len(runs))
     caption = """
-    The dashed line is the reference. Energy is the mean square of the throttles, added up: seconds at full throttle."""
+    The dashed line is the reference. Energy is the mean square of the throttles, added up: so many seconds at full
+    throttle would cost as much."""
     return Plot("Height and energy", caption, figure)
+
+
+def flight_motion(runs: Sequence[View]) -> Plot:
+    """Airspeed, attitude and turn rates of a flight."""
+    figure = Figure(figsize=(WIDTH, 0.5 + 1.6 * FLIGHT_MOTION_ROWS), layout="constrained")
+    draw_flight_motion(figure.subplots(FLIGHT_MOTION_ROWS, 1, sharex=True), runs)
+    caption = """
+    Speed through the air as the probe measures it, speed over the ground, roll, pitch and turn rates as they truly
+    are; turn rates about the body's axes: x ahead, y to the left, z up."""
+    return Plot("How it flew", caption, figure)
 
 
 def surfaces(runs: Sequence[View]) -> Plot:
     """What the surfaces and throttles of aircraft did."""
-    figure = Figure(figsize=(WIDTH, 3.8 * len(runs)), layout="constrained")
+    figure = Figure(figsize=(WIDTH, 4.0 * len(runs)), layout="constrained")
     rows = figure.subplots(2 * len(runs), 1, squeeze=False)[:, 0]
     for number, run in enumerate(runs):
         draw_surfaces(rows[2 * number : 2 * number + 2], run)

@@ -15,7 +15,6 @@ from fulmar_core.states.spatial import SpatialState
 from fulmar_evaluation.report.by_kind import plots_of
 from fulmar_evaluation.report.control_plot import draw_latency
 from fulmar_evaluation.report.error_plot import draw_progress
-from fulmar_evaluation.report.motion_plot import MOTION_ROWS, draw_motion
 from fulmar_evaluation.report.page import Part, cells, faint, html_page, table
 from fulmar_evaluation.report.run_figures import latency, strip_count, supply
 from fulmar_evaluation.report.run_view import View, evaluated, result_of, rule, table_rows, views
@@ -69,6 +68,7 @@ def _parts(runs: Sequence[View]) -> list[Part]:
     shown = plots_of(runs)
     gauge = (supply,) if any(len(run.record.supply) for run in runs) else ()
     plots = (*shown.path, *shown.use, *gauge, latency) if evaluated(runs) else ()
+    drawn = [plot(runs) for plot in plots]
     return [
         *faint(_subtitle(runs)),
         f'<div class="results">{"".join(map(_result, runs))}</div>',
@@ -78,7 +78,7 @@ def _parts(runs: Sequence[View]) -> list[Part]:
         *(_beliefs(run) for run in runs if run.summary["beliefs"]),
         "<h2>In figures</h2>",
         _table(runs),
-        *(plot(runs) for plot in plots),
+        *(plot for plot in drawn if plot is not None),
         "<h2>Where this comes from</h2>",
         f"<dl>{''.join(map(_origin, runs))}</dl>",
     ]
@@ -127,7 +127,7 @@ def _table(runs: Sequence[View]) -> str:
     heads = ["<th></th>", *(f"<th {_run_colour(run)}>{_name(run)}</th>" for run in runs)]
     rows = (
         f"<tr><td>{escape(what)}{f'<small>{escape(why)}</small>' if why else ''}</td>{cells(values)}</tr>"
-        for what, why, values in table_rows(runs)
+        for what, why, values in table_rows(runs, plots_of(runs).rows(runs))
     )
     return table(heads, rows)
 
@@ -153,21 +153,21 @@ def _origin(run: View) -> str:
 def _overview(runs: Sequence[View], title: str) -> Figure:
     """All of it on one sheet."""
     plots = plots_of(runs)
-    count, motion = strip_count(runs), MOTION_ROWS if plots.in_space else 0
-    high = 1.28 * max(count + motion + 1, plots.path_rows) if plots.in_space else 4.9
+    count, motion = strip_count(runs), plots.motion_rows
+    high = 1.28 * max(count + motion + 1, plots.path_rows) if motion or plots.path_rows else 4.9
     low = plots.use_height(runs)
     figure = Figure(figsize=(11.0, high + low + 0.5), layout="constrained")
     top, bottom = figure.subfigures(2, 1, height_ratios=(high, low))
-    near = plots.in_space and any(has_place(result) for _, result in evaluated(runs))
+    near = motion and any(has_place(result) for _, result in evaluated(runs))
     left, right = top.subfigures(1, 2, width_ratios=(1.2 if near else 1.0, 1.0))
     plots.draw_path(left, runs)
     axes = right.subplots(
         count + motion + 1, 1, gridspec_kw={"height_ratios": (*[1.0] * (count + motion), 0.9)}
     )
     draw_progress(axes[:count], runs)
-    if plots.in_space:
+    if motion:
         axes[count - 1].set_xlabel("")
-        draw_motion(axes[count:-1], runs)
+        plots.draw_motion(axes[count:-1], runs)
     draw_latency(axes[-1], runs)
     plots.draw_use(bottom, runs)
     figure.suptitle(title, fontsize=13, fontweight="bold")

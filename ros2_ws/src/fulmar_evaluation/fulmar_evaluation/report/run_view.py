@@ -11,10 +11,12 @@ import numpy as np
 from fulmar_bags.run_record import RunRecord
 from fulmar_evaluation.report.style import colours
 from fulmar_evaluation.run_evaluation import RunResult, evaluate_run
-from fulmar_evaluation.run_summary import latencies_ms, summarise
+from fulmar_evaluation.run_summary import degrees_text, latencies_ms, summarise
+from policy_server.controllers import CONTROLLERS
 
 DISPLAY_NAMES = {
     "lqr": "LQR",
+    "lqi": "LQI",
     "pd": "PD",
     "mpc": "MPC",
     "mppi": "MPPI",
@@ -22,6 +24,7 @@ DISPLAY_NAMES = {
     "lqr_drift": "DRIFT's LQR",
     "policy": "policy",
     "classical": "classical law",
+    "adaptive": "adaptive law",
     "excite": "excitation",
     "external": "external controller",
 }
@@ -45,6 +48,12 @@ class View:
     def binary(self) -> bool:
         """Whether the actuators are valves, open or closed."""
         return self.result is None or self.result.robot.actuators.binary
+
+    @property
+    def strives(self) -> bool:
+        """Whether the controller meant to meet the goal; one that is not known here counts as such."""
+        name = str(self.record.info.get("controller", ""))
+        return name not in CONTROLLERS or CONTROLLERS[name].strives
 
 
 def views(records: Sequence[RunRecord]) -> list[View]:
@@ -73,9 +82,11 @@ def result_of(run: View) -> tuple[str, str]:
     result = run.result
     if result is None:
         return "No result", "The bag holds fewer than two states, so there is nothing to evaluate."
+    if not run.strives:
+        return "Moved", "The controller moved the robot to show its parameters; there was no goal to meet."
     if not result.long_enough:
         return "Missed", f"The run ended after {result.duration_s:.1f} s, too early to evaluate."
-    touched = " It touched an obstacle." if result.figures["collided"] else ""
+    touched = f" It touched {result.robot.kind.obstacle}." if result.figures["collided"] else ""
     if result.progress is not None:
         path = run.summary["path_error_m"]
         way = "" if path is None else f" On average the robot was {_length(path)} from the path."
@@ -96,10 +107,11 @@ def result_of(run: View) -> tuple[str, str]:
             f"and the turn rate {_known(run, 'yaw_rate_error_deg_s', 'rate_error_deg_s'):.1f}°/s, on average, "
             "changes of the target included."
         )
-    what, error = f"the {result.task.subject}", _length(run.summary["final_position_error_m"])
+    what, place = f"the {result.task.subject}", run.summary["final_position_error_m"]
     turned = _known(run, "final_heading_error_deg", "final_attitude_error_deg")
-    if turned is not None:
-        error += f" and {_value(turned, '°', 1)}"
+    parts = [] if place is None else [_length(place)]
+    parts += [] if turned is None else [degrees_text(turned)]
+    error = " and ".join(parts) or "–"
     if result.success:
         return "Reached", (
             f"The goal was reached after {result.figure('time_to_target_s'):.1f} s and held to the end. "
@@ -122,13 +134,16 @@ def rule(runs: Sequence[View]) -> str:
         if run.result is not None:
             task, tolerance = run.result.task, run.result.task.tolerance
             angle_deg = tolerance.attitude_deg or tolerance.heading_deg
-            heading = f" and {angle_deg:g}°" if angle_deg > 0.0 else ""
+            place = [f"{100 * tolerance.position:g} cm"] if tolerance.position > 0.0 else []
+            within = " and ".join([*place, *([f"{angle_deg:g}°"] if angle_deg > 0.0 else [])])
+            if not run.strives:
+                return ""
             if run.result.progress is not None:
                 return "A run counts as done if the goals of its file came to their end and the last one was kept."
             if run.result.counts:
                 return (
-                    f"A target counts as reached within {100 * tolerance.position:g} cm{heading}, and a run that "
-                    f"reaches {task.required} of them as a success."
+                    f"A target counts as reached within {within}, and a run that reaches {task.required} of them as a "
+                    "success."
                 )
             if tolerance.velocity > 0.0:
                 rate_deg = tolerance.rate_deg or tolerance.yaw_rate_deg
@@ -137,25 +152,51 @@ def rule(runs: Sequence[View]) -> str:
                     f"within {rate_deg:g}°/s of the target for all of the last {tolerance.hold_s:g} s."
                 )
             return (
-                f"A run counts as reached if the {task.subject} stays within {100 * tolerance.position:g} cm"
-                f"{heading} of the goal for all of the last {tolerance.hold_s:g} s."
+                f"A run counts as reached if the {task.subject} stays within {within} of the goal for all of the last "
+                f"{tolerance.hold_s:g} s."
             )
     return ""
 
 
-def table_rows(runs: Sequence[View]) -> list[Row]:
-    """The figures of every run, one row each."""
+def _row(runs: Sequence[View], what: str, why: str, cell: Callable[[dict[str, Any]], str]) -> Row:
+    return what, why, [cell(run.summary) for run in runs]
+
+
+def use_row(runs: Sequence[View]) -> Row:
+    """How much of its actuators a robot used, for those that have a command of rest."""
+    return _row(runs, "Actuators in use", "average share of them", lambda s: _percent(s["actuator_use"]))
+
+
+def belief_rows(runs: Sequence[View]) -> list[Row]:
+    """What was believed of valves or fans, for robots of which that is estimated."""
+    return [
+        _row(
+            runs,
+            f"Believed {how}",
+            "valves or fans",
+            lambda s, key=f"believed_{how}": ", ".join(s[key]) or "none",
+        )
+        for how in ("dead", "open")
+    ]
+
+
+def table_rows(runs: Sequence[View], own: Sequence[Row]) -> list[Row]:
+    """The figures of every run, one row each, without those that no run has; `own` are of the kind of robot."""
 
     def row(what: str, why: str, cell: Callable[[dict[str, Any]], str]) -> Row:
-        return what, why, [cell(run.summary) for run in runs]
+        return _row(runs, what, why, cell)
 
     def spread(key: str) -> Callable[[dict[str, Any]], str]:
-        return lambda s: " / ".join(_value(s[key][name], "", 2) for name in ("p50", "p99", "max"))
+        def cell(summary: dict[str, Any]) -> str:
+            texts = [_value(summary[key][name], "", 2) for name in ("p50", "p99", "max")]
+            return " / ".join(texts) if any(text != "–" for text in texts) else "–"
 
-    asked = [
+        return cell
+
+    rows = [
         row("Final position error", "", lambda s: _length(s["final_position_error_m"])),
-        row("Final heading error", "", lambda s: _value(s["final_heading_error_deg"], "°", 1)),
-        row("Final attitude error", "", lambda s: _value(s["final_attitude_error_deg"], "°", 1)),
+        row("Final heading error", "", lambda s: degrees_text(s["final_heading_error_deg"])),
+        row("Final attitude error", "", lambda s: degrees_text(s["final_attitude_error_deg"])),
         row("Time to goal", "from when on it stayed", lambda s: _value(s["time_to_target_s"], " s", 1)),
         row("Targets reached", "", lambda s: _value(s["goals_reached"], "", 0)),
         row("Goals of the file", "", lambda s: s["goals_progress"] or "–"),
@@ -163,26 +204,28 @@ def table_rows(runs: Sequence[View]) -> list[Row]:
         row("Velocity error", "mean", lambda s: _value(s["velocity_error_m_s"], " m/s", 3)),
         row("Turn rate error", "mean", lambda s: _value(s["yaw_rate_error_deg_s"], "°/s", 1)),
         row("Turn rate error", "mean, about all axes", lambda s: _value(s["rate_error_deg_s"], "°/s", 1)),
-    ]
-    return [
-        *(line for line in asked if any(cell != "–" for cell in line[2])),
         row("Length of the run", "simulated time", lambda s: _value(s["duration_s"], " s", 1)),
-        row("Actuators in use", "average share of them", lambda s: _percent(s["actuator_use"])),
+        *own,
         row("Commands", "answered measurements", lambda s: f"{s['steps']}"),
         row("Control rate", "in the robot's own time", lambda s: _value(s["control_rate_hz"], " Hz", 2)),
         row("Command rate", "wall-clock", lambda s: _value(s["wall_control_rate_hz"], " Hz", 2)),
-        row("Latency [ms]", "median / p99 / longest", spread("latency_ms")),
+        row(
+            "Latency [ms]", "measurement sent to command taken: median / p99 / longest", spread("latency_ms")
+        ),
         row("Period error [ms]", "median / p99 / largest", spread("period_error_ms")),
         row("Inference [ms]", "median / p99 / longest", spread("inference_ms")),
         row("Overruns", "deadlines missed", lambda s: _value(s["overruns"], "", 0)),
-        row("Believed dead", "valves or fans", lambda s: ", ".join(s["believed_dead"]) or "none"),
-        row("Believed open", "valves or fans", lambda s: ", ".join(s["believed_open"]) or "none"),
         row("Watchdog trips", "no fresh command", lambda s: _value(s["watchdog_trips"], "", 0)),
     ]
+    return [line for line in rows if any(cell != "–" for cell in line[2])]
 
 
 def _length(metres: float | None) -> str:
-    return "–" if metres is None else f"{metres:.2f} m" if metres >= 1.0 else f"{100 * metres:.1f} cm"
+    if metres is None:
+        return "–"
+    if metres >= 1.0:
+        return f"{metres:.2f} m"
+    return f"{100 * metres:.1f} cm" if metres >= 0.01 else f"{1000 * metres:.1f} mm"
 
 
 def _percent(share: float | None) -> str:

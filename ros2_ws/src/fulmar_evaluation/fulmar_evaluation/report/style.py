@@ -12,12 +12,14 @@ from io import BytesIO, StringIO
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, SubFigure
 
 INK, FAINT, PAPER = "#1f2430", "#8a919e", "#fefefd"
 ALARM = "#d6336c"
 BODY_AXES = ("#c25b52", "#4f9a57", "#7d5ba6")  # x, y, z of a body in space; no blue: policies are
 DASHED = (0, (4, 3))
+STROKES = ("-", DASHED, (0, (1, 1.5)), (0, (5, 2, 1, 2)))  # of runs whose colours mean something else
+READABLE = {"facecolor": PAPER, "edgecolor": "none", "alpha": 0.75, "pad": 1.0}  # of words over a curve
 VARIABLES = {INK: "var(--ink)", FAINT: "var(--faint)", PAPER: "var(--paper)"}
 
 # A controller keeps its colour from report to report; each is readable on white and on near-black.
@@ -28,8 +30,14 @@ CONTROLLER_COLOURS = {
     "mpc": "#a23b9e",
     "lqr_drift": "#8a6d3b",
     "classical": "#1a9e84",
+    "lqi": "#6a55c2",
     "excite": "#777777",
 }
+PARTS = (
+    *BODY_AXES,
+    CONTROLLER_COLOURS["policy"],
+    CONTROLLER_COLOURS["lqr"],
+)  # of surfaces, throttles, wheels
 OTHER_COLOURS = ("#8d62d9", "#3f9e4d", "#b8860b", "#5f7a8c")
 
 _RC = {
@@ -80,6 +88,21 @@ def legend(axes: Axes, **how: object) -> None:
     """A legend, where something has a name."""
     if axes.get_legend_handles_labels()[0]:
         axes.legend(**how)
+
+
+def legend_above(figure: Figure | SubFigure, axes: Axes, most: int = 6) -> None:
+    """What the lines of some axes mean, above the whole figure, where it covers none of them."""
+    handles, labels = axes.get_legend_handles_labels()
+    if handles:
+        figure.legend(handles, labels, loc="outside upper left", ncols=min(len(labels), most), fontsize=8.5)
+
+
+def legend_over(axes: Axes, most: int = 6) -> None:
+    """The same to the right above one of several axes."""
+    handles, labels = axes.get_legend_handles_labels()
+    if handles:
+        look = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "fontsize": 8.5, "handlelength": 1.2}
+        axes.legend(handles, labels, ncols=min(len(labels), most), columnspacing=1.2, **look)
 
 
 def as_svg(figure: Figure) -> str:

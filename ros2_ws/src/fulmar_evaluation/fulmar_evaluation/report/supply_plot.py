@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 
-from fulmar_evaluation.report.run_view import View
+from fulmar_evaluation.report.run_view import View, evaluated
 from fulmar_evaluation.report.style import quiet_grid
 
 PASCAL_PER_BAR = 1e5
@@ -22,7 +22,13 @@ def draw_supply(axes: Axes, runs: Sequence[View]) -> None:
             begin_s = float(run.record.motion.stamp_s[0]) if len(run.record.motion) else float(stamps[0])
             draw_pressure(axes, stamps - begin_s, run.record.supply.pascal, run.colour, run.label)
     for regulated in {pressure for run in runs for pressure in _regulated(run)}:
-        axes.axhline(regulated / PASCAL_PER_BAR, color="0.5", ls="--", lw=0.9)
+        bar = regulated / PASCAL_PER_BAR
+        axes.axhline(bar, color="0.5", ls="--", lw=0.9)
+        axes.annotate(
+            f"regulator {bar:g} bar", (1.0, bar), xycoords=axes.get_yaxis_transform(), fontsize=8.5,
+            xytext=(-2.0, 2.0), textcoords="offset points", ha="right", va="bottom",
+        )  # fmt: skip
+    axes.set_xlim(0.0, max((result.duration_s for _, result in evaluated(runs)), default=None))
 
 
 def draw_pressure(axes: Axes, time_s: np.ndarray, pascal: np.ndarray, colour: str, label: str = "") -> None:

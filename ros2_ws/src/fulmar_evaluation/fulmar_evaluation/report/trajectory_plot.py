@@ -82,8 +82,8 @@ def draw_near(axes: Axes, runs: Sequence[View], columns: tuple[int, int]) -> Non
 
 
 def has_place(result: RunResult) -> bool:
-    """Whether the goal is one place in the world."""
-    return result.task.goal_topic in ("goal_pose", "goal_point")
+    """Whether the goal is one place in the world, within a tolerance; that of an attitude is none."""
+    return result.task.goal_topic in ("goal_pose", "goal_point") and result.task.tolerance.position > 0.0
 
 
 def _word(axes: Axes, text: str, place: np.ndarray, away: float, *, va: str) -> None:

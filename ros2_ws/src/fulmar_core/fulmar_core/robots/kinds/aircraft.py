@@ -20,5 +20,6 @@ AIRCRAFT = Kind(
     usual_scenario="nominal",
     stays=False,
     rests=False,
+    obstacle="the water or the ground",
     outdoors=True,
 )

@@ -35,6 +35,7 @@ class Kind:
     stays: bool = True  # it can stay where it is; else it flies on for ever
     rests: bool = True  # it comes to no harm at its safe command; else its safe state is a flight down
     tilt_deg: float = 180.0  # largest of the attitudes that it can hold, which tasks draw and ask for [deg]
+    obstacle: str = "an obstacle"  # what it runs into, in words
     outdoors: bool = False  # satellite navigation is in its loop
     # Of a wrench's six, those along and about which its actuators move it.
     axes: tuple[int, ...] = (0, 1, 2, 3, 4, 5)
