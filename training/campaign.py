@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from training.advice import advice
 from training.executors import Executor, Watch
 from training.jobs import Job, Outcome
 
@@ -81,4 +82,7 @@ def campaign_text(result: dict[str, Any], out: Path) -> str:
         return "\n".join([*lines, f"no run of {out} succeeded"])
     mean, spread = result["success_mean"], result["success_std"]
     lines.append(f"success {mean:.3f} ± {spread:.3f}; best: seed {result['best_seed']}")
-    return "\n".join([*lines, f"next: fulmar export {result['best_run']} --out DIR"])
+    best = next(each for each in result["seeds"] if each["seed"] == result["best_seed"])
+    success = best["success_held_out"] if best["success_mujoco"] is None else best["success_mujoco"]
+    record = {key: result[key] for key in ("robot", "task")} | {key: best[key] for key in ("steps", "wall_s")}
+    return "\n".join([*lines, *advice(Path(result["best_run"]), record, success)])

@@ -89,6 +89,7 @@ def train(
 
 
 def _learn_once(job: Job, *, resumes: bool, as_json: bool) -> None:
+    from training.advice import advice, usual_training
     from training.evaluator import evaluate_in_mujoco
     from training.jobs import learn
     from training.progress import LearningBar
@@ -116,11 +117,17 @@ def _learn_once(job: Job, *, resumes: bool, as_json: bool) -> None:
     log_line(f"learned from {steps:,} steps in {wall_s:.0f} s; evaluating in MuJoCo")
     figures = evaluate_in_mujoco(job.out, episodes=job.episodes)
     if as_json:
-        print_json({"run": str(job.out), "steps": steps, "wall_s": wall_s, "mujoco": figures})
+        usual = usual_training(job.robot, job.task)
+        found = {"run": str(job.out), "steps": steps, "wall_s": wall_s, "mujoco": figures, "usual": usual}
+        print_json(found)
         return
-    rate = figures["success_rate"]
+    rate, learned = (
+        figures["success_rate"],
+        {"robot": job.robot, "task": job.task, "steps": steps, "wall_s": wall_s},
+    )
     write_line(f"success {rate:.3f} of {job.episodes} episodes in MuJoCo; run folder {job.out}")
-    write_line(f"next: fulmar export {job.out} --out DIR")
+    for line in advice(job.out, learned, rate):
+        write_line(line)
 
 
 def _learn_campaign(job: Job, request: TrainingRequest, *, as_json: bool) -> None:
