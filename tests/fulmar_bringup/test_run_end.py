@@ -33,6 +33,9 @@ class Overseer:
     def silent_s(self, report: Report) -> float:
         return time.monotonic() - report.received_s
 
+    def since_s(self, moment_s: float) -> float:
+        return time.monotonic() - moment_s
+
     def wait_until(self, condition, alive) -> None:
         for level, message in self._reports:
             mode = message if message == "finished" else "running"
@@ -51,6 +54,33 @@ class Keeper:
 
 def watched(mode: str, *reports: tuple[str, str], end_on_estop: bool = False) -> None:
     _wait_for_end(PLAN, Overseer(mode, *reports), Keeper(), lambda *_: None, end_on_estop=end_on_estop)
+
+
+def stepped(monkeypatch, *times_s: float) -> None:
+    """Watch a run in lock step whose plant reports these simulated times, a minute of wall-clock time apart."""
+    overseer, now_s = Overseer("active"), [0.0]
+    monkeypatch.setattr(time, "monotonic", lambda: now_s[0])
+
+    def wait_until(condition, alive) -> None:
+        for time_s in times_s:
+            now_s[0] += 60.0
+            values = {"mode": "running", "sim_time_s": str(1.0 + time_s)}
+            overseer.plant = Report("ok", "running", values, now_s[0])
+            overseer.controller.received_s = now_s[0]
+            assert not condition()
+            alive()
+
+    overseer.wait_until = wait_until
+    _wait_for_end(replace(PLAN, lockstep=True), overseer, Keeper(), lambda *_: None, end_on_estop=False)
+
+
+def test_a_run_in_lock_step_may_take_as_long_as_it_takes(monkeypatch):
+    stepped(monkeypatch, *(0.1 * step for step in range(10)))
+
+
+def test_a_run_in_lock_step_that_stands_still_ends(monkeypatch):
+    with pytest.raises(RunFailed, match=r"stands still: 0\.20 s of it were over 20 s of wall-clock time ago"):
+        stepped(monkeypatch, 0.1, 0.2, 0.2)
 
 
 def test_a_late_command_ends_a_run_that_acts():

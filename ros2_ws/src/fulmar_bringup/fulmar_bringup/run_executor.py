@@ -45,6 +45,7 @@ LAST_WORDS_S = 0.5  # after a controller died, the plant still shows that its ac
 SILENT_S = 2.0  # a controller without a status for so long hangs, in real time
 PLANT_SILENT_S = 3.0  # the same for a plant, which publishes its status once a second
 LOCKSTEP_SILENT_S = 10.0  # in lock step both are busy, and a plant itself waits 5 s for an answer
+STALLED_S = 20.0  # in lock step, a simulated time that stands still for so long will not go on
 
 
 @dataclass(frozen=True)
@@ -220,8 +221,9 @@ def _wait_for_end(
     """Watch a run until its time is over; an e-stop holds the robot meanwhile, and ends the run only if asked to."""
     began = time.monotonic()
     plant_limit_s, controller_limit_s = silence_limits_s(plan)
-    limit_s = 30.0 + 1.5 * plan.duration_s / plan.rate + (plan.duration_s if plan.lockstep else 0.0)
+    limit_s = 30.0 + 1.5 * plan.duration_s / plan.rate
     limit_s += LANDS_S if plan.hardware and not load_robot(plan.robot).kind.rests else 0.0
+    steps = Stall(overseer)
 
     def failed() -> bool:
         message = overseer.plant.message
@@ -240,7 +242,9 @@ def _wait_for_end(
             raise RunFailed(f"controller: {overseer.controller.message}")
         raise_if_silent("controller", overseer.silent_s(controller), controller_limit_s)
         raise_if_silent("plant", overseer.silent_s(plant), plant_limit_s)
-        if time.monotonic() - began > limit_s:
+        if plan.lockstep:  # which takes as long as it takes, as long as it goes on
+            steps.look(passed_s(plan, plant))
+        elif time.monotonic() - began > limit_s:
             raise RunFailed(f"the run did not end within {limit_s:.0f} s of wall-clock time")
 
     errors: list[str] = []
@@ -254,6 +258,28 @@ def _wait_for_end(
     if errors:
         raise RunFailed(f"plant: {errors[0]}")
     running()
+
+
+class Stall:
+    """Notices that a run in lock step does not go on."""
+
+    def __init__(self, overseer: Supervisor) -> None:
+        """Begin with nothing done; time in which the overseer does not listen itself does not count."""
+        self._overseer, self._passed_s, self._moved_s = overseer, -1.0, time.monotonic()
+
+    def look(self, passed_s: float) -> None:
+        """Look at how much of the run is over now [s].
+
+        Raises:
+            RunFailed: It has been as much for too long.
+        """
+        if passed_s != self._passed_s:
+            self._passed_s, self._moved_s = passed_s, time.monotonic()
+        elif self._overseer.since_s(self._moved_s) > STALLED_S:
+            raise RunFailed(
+                f"the run stands still: {passed_s:.2f} s of it were over {STALLED_S:g} s of wall-clock time ago, and "
+                "no more are. Look at the output of its nodes."
+            )
 
 
 def passed_s(plan: RunPlan, plant: Report) -> float:

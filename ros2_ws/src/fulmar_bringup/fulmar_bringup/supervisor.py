@@ -130,9 +130,11 @@ class Supervisor:
 
         Time in which this process did not listen, since it was stopped itself, does not count.
         """
-        if not report.received_s:
-            return 0.0
-        return time.monotonic() - max(report.received_s, self._listens_s)
+        return self.since_s(report.received_s) if report.received_s else 0.0
+
+    def since_s(self, moment_s: float) -> float:
+        """How much of the time since a moment of the monotonic clock this process has listened [s]."""
+        return time.monotonic() - max(moment_s, self._listens_s)
 
     def listen(self) -> None:
         """Count silences from now on, since nobody has looked at them for a while."""
