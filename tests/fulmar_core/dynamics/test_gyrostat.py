@@ -110,7 +110,7 @@ class TestMotors:
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"wheels": ()}, "'wheels' must not be empty"),
+        ({"wheels": ()}, "'wheels' has no wheel"),
         ({"torque": 0.0}, "must be greater than 0"),
         ({"viscous": -1.0}, "must not be negative"),
         ({"wheels": (Wheel("a", (1.0, 0.0, 0.0)),) * 2}, "a name of its own"),

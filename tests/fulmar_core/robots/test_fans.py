@@ -33,8 +33,8 @@ def test_a_fan_pushes_one_way_and_no_harder_than_it_can():
     ("changes", "words"),
     [
         ({"thrust": 0.0}, "'thrust' must be greater than 0"),
-        ({"fans": ()}, "'fans' must not be empty"),
-        ({"fans": (FANS.fans[0], FANS.fans[0])}, "each needs a name of its own"),
+        ({"fans": ()}, "'fans' has no fan"),
+        ({"fans": (FANS.fans[0], FANS.fans[0])}, "'fans' has 2 with the name 'fan_1'"),
         ({"response": Response(slew=(1.0,))}, "'slew' needs 6 values, one for each fan"),
         ({"response": Response(slew=(1.0,) * 6, lag_s=0.1)}, "not both"),
     ],

@@ -15,8 +15,10 @@ from fulmar_bags.other_readings import NO_INERTIAS, NO_SERIES, Inertias, Series,
 from fulmar_bags.wire_reader import Received, WireReader
 from fulmar_bags.writer import RUN_RECORD
 from fulmar_core.config.errors import BagError, ConfigError
+from fulmar_core.config.own_class import is_own
 from fulmar_core.config.paths import config_names
 from fulmar_core.robots.topics import (
+    ACTION,
     ACTUATORS_STATE,
     COMMAND,
     DIAGNOSTICS,
@@ -161,6 +163,7 @@ class RunRecord:
     air_data: Series = NO_SERIES  # of an aircraft: airspeed [m/s], angles [rad], height [m]
     gyroscope_s: tuple[float, ...] = ()  # stamps of a satellite's inertial unit [s]
     inertia: Inertias = NO_INERTIAS  # that estimators published
+    actions: Series = NO_SERIES  # of a controller of the user's own, before limits
 
     @property
     def actuation(self) -> Actuation:
@@ -256,6 +259,7 @@ def _record(bag: Bag, info: dict[str, Any]) -> RunRecord:
         air_data=series(reader, SENSOR_WIRES["air_data"], "position"),
         gyroscope_s=gyroscope_s(reader),
         inertia=inertias(reader),
+        actions=series(reader, ACTION, "effort") if is_own(str(info.get("controller", ""))) else NO_SERIES,
     )
 
 

@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fulmar_bringup.run_plan import RunPlan
+from fulmar_core.config.own_class import is_own
 from fulmar_core.controllers.controller import Controller
+from fulmar_core.loop.fallback import warm_up
 from fulmar_core.loop.rollout import WORLDS, batches, roll_out_in_backends
 from fulmar_core.robots.jsbsim_models import jsbsim_model
 from fulmar_core.robots.robot import Robot
@@ -22,6 +24,7 @@ from fulmar_core.tasks import Task
 from fulmar_core.tasks.path_task import evaluated_task
 from fulmar_core.worlds.scenario import Scenario, load_scenario
 from fulmar_evaluation.waypoint_score import bound_figures, has_bound, waypoint_bound
+from policy_server.own_controller import OwnController
 
 if TYPE_CHECKING:
     from fulmar_evaluation.ros_evaluation import RosPool
@@ -59,6 +62,8 @@ class Trial:
 
         plan = self.plan
         choice = Choice(plan.control_hz, plan.policy, seed=plan.seed)
+        if is_own(plan.controller):  # says what is wrong with its actions
+            warm_up(load_controller(plan.controller, self.robot, self.task, choice), self.robot, self.task)
         return load_controller(plan.controller, self.robot, self.task, choice)
 
     def drawn(self, numbers: np.ndarray) -> Episode:
@@ -68,7 +73,11 @@ class Trial:
 
 
 def runs_of(
-    trial: Trial, progress: Progress = lambda steps: None, *, pool: RosPool | None = None
+    trial: Trial,
+    progress: Progress = lambda steps: None,
+    *,
+    pool: RosPool | None = None,
+    controller: Controller | None = None,
 ) -> Iterator[Trajectories]:
     """Run the episodes of a trial, in their order.
 
@@ -76,6 +85,7 @@ def runs_of(
         trial: What to run.
         progress: Called with how many control steps have been done.
         pool: Processes that stay for one trial after another, through ros; by default it has its own.
+        controller: The trial's, where the caller wants to look at it afterwards; not through ros.
 
     Yields:
         What happened, for the next so many episodes.
@@ -98,7 +108,7 @@ def runs_of(
     robot, task, scenario = trial.robot, trial.task, load_scenario(plan.scenario)
     if trial.through == "batch":
         yield from batches(
-            trial.controller(),
+            controller or trial.controller(),
             robot,
             task,
             scenario,
@@ -109,7 +119,7 @@ def runs_of(
         )
         return
     yield roll_out_in_backends(
-        trial.controller(),
+        controller or trial.controller(),
         _simulator(trial, robot, task, scenario),
         task,
         scenario,
@@ -165,12 +175,12 @@ def evaluate_trial(trial: Trial, progress: Progress = lambda steps: None) -> dic
 
     Returns:
         Success rate and every figure, JSON-ready. Where waypoints are counted, also what physics allows in the first
-        `bounded`: `bound`, the rule in words, and the shares of it.
+        `bounded`: `bound`, the rule in words, and the shares of it. `warnings` of a controller of the user's own.
     """
-    tally = Tally(trial.task)
-    for run in runs_of(trial, progress):
+    tally, controller = Tally(trial.task), None if trial.through == "ros" else trial.controller()
+    for run in runs_of(trial, progress, controller=controller):
         tally.add(run)
-    figures, more = tally.figures, {}
+    figures, more = tally.figures, dict[str, Any]()
     if has_bound(trial.task):
         numbers = np.arange(min(trial.episodes, trial.bounded))
         bound = waypoint_bound(trial.robot, trial.task, trial.drawn(numbers), trial.task.episode_s)
@@ -181,6 +191,8 @@ def evaluate_trial(trial: Trial, progress: Progress = lambda steps: None) -> dic
             "bound_episodes": len(numbers),
             "share_of_mean_bound": share_of_mean(goals[: len(numbers)], bound.goals),
         }
+    beyond = controller.range.warning if isinstance(controller, OwnController) else ""
+    more |= {"warnings": [beyond]} if beyond else {}
     return {**summarise(tally.succeeded, figures), **more, "control_steps": tally.steps}
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from fulmar_bags.run_record import HealthSample, RunRecord
 from fulmar_core.robots.wire_check import BETWEEN, WARNINGS, WIRE_WARNINGS
+from fulmar_core.safety.command_range import CommandRange
 from fulmar_core.safety.estop import HOLDS
 from fulmar_evaluation.run_evaluation import RunResult, evaluate_run
 from policy_server.controllers import EXTERNAL, controller_entry
@@ -63,7 +64,7 @@ def summarise(record: RunRecord) -> dict[str, Any]:
         "watchdog_trips": _total(plant, None, "watchdog_trips"),
         "actuator_use": _use(result),
         "estop_pressed": estop_pressed(record),
-        "warnings": warnings_of(record),
+        "warnings": [*warnings_of(record), *_beyond_limits(record, result)],
         "believed_dead": believed(record, "believed_dead"),
         "believed_open": believed(record, "believed_open"),
         "beliefs": last_beliefs(record),
@@ -87,6 +88,15 @@ def warnings_of(record: RunRecord) -> list[str]:
     )
     pressed = ["the e-stop was pressed and held the robot until a reset"] if estop_pressed(record) else []
     return [*pressed, *found]
+
+
+def _beyond_limits(record: RunRecord, result: RunResult | None) -> list[str]:
+    """That a controller of the user's own mostly asked for more than the actuators can do."""
+    if result is None or not len(record.actions):
+        return []
+    seen = CommandRange(result.robot.actuators)
+    seen.see(record.actions.values)
+    return [seen.warning] if seen.warning else []
 
 
 def _stopped_by(sample: HealthSample, reason: str) -> bool:

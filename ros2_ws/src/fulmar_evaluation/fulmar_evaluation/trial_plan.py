@@ -166,6 +166,8 @@ def print_figures(figures: dict[str, Any], output: Console) -> None:
     if "bound" in f:
         line = f"bound on goals, of the first {f['bound_episodes']} episodes: {f['bound']}"
         output.print(line, markup=False, soft_wrap=True)
+    for warning in f.get("warnings", []):
+        output.print(f"warning: {warning}", markup=False, soft_wrap=True)
     output.print(
         f"success {f['success_rate']:.3f} of {f['episodes']} episodes of {f['episode_s']:g} s "
         f"(seed {f['seed']}) through {f['through']}; {f['wall_s']:.1f} s, {f['steps_per_s']:,.0f} steps/s"

@@ -38,16 +38,21 @@ def warm_up(
     """Warm a loaded controller up, on the start of an episode of its task; `said` adds entries to its metadata.
 
     Raises:
-        ConfigError: It raised.
+        ConfigError: It raised, or its actions have a wrong shape.
     """
     episode = draw_episodes(robot, task, load_scenario("nominal"), seed=0, numbers=np.zeros(1, dtype=int))
     loop = ControlLoop(robot, task, controller)
     loop.begin(goal_in_float64(episode.goal))
     try:
         for number in range(WARM_UP):
-            loop.step(episode.start, {}, round(1e9 * number * loop.dt))
+            step = loop.step(episode.start, {}, round(1e9 * number * loop.dt))
+            if step.action.shape != step.command.shape:
+                raise ConfigError(
+                    f"controller '{controller.name}': {step.refusal}. `act` returns a row for each robot, of which a "
+                    "node has one, with a value for each actuator."
+                )
         loop.reset()
-    except TaskError:
+    except (TaskError, ConfigError):
         raise
     except Exception as error:
         module = controller.name.partition(SEPARATOR)[0]

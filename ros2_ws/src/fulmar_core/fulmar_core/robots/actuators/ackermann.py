@@ -61,6 +61,11 @@ class Ackermann(Rolling):
             raise ValueError("'slew' needs two values: of the speed and of the steering angle.")
 
     @property
+    def units(self) -> tuple[str, ...]:
+        """Of the two commands; see `Actuators.units`."""
+        return ("m/s", "rad")
+
+    @property
     def names(self) -> tuple[str, ...]:
         """Names of a command's entries."""
         return "speed", "steering_angle"

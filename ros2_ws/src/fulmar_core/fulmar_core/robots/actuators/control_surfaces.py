@@ -15,7 +15,7 @@ import numpy as np
 from array_api_compat import device
 
 from fulmar_core.config.plausible_ranges import Plausible
-from fulmar_core.robots.actuators.family import Actuators
+from fulmar_core.robots.actuators.family import Actuators, check_names
 from fulmar_core.robots.actuators.response import Response
 from fulmar_core.robots.airframe.coefficients import SURFACES
 from fulmar_core.robots.airframe.plausible_airframe import AIRCRAFT, derivative_ranges
@@ -81,10 +81,8 @@ class ControlSurfaces(Actuators):
     plausible = AIRCRAFT
 
     def __post_init__(self) -> None:
-        if len(set(self.names)) != len(self.names) or not self.surfaces:
-            raise ValueError(
-                "'surfaces' must not be empty, and each surface and motor needs a name of its own."
-            )
+        check_names("surfaces", "surface", [surface.name for surface in self.surfaces])
+        check_names("motors", "motor", self.names)
         order = [SURFACES.index(surface.name) for surface in self.surfaces]
         if order != sorted(order):
             raise ValueError(f"'surfaces' must be in the order {', '.join(SURFACES)}.")
@@ -100,6 +98,11 @@ class ControlSurfaces(Actuators):
         stops: dict[str, float] = {surface.name: math.radians(surface.limit_deg) for surface in self.surfaces}
         frame = robot.airframe
         return (*self.plausible, *derivative_ranges(frame.aerodynamics, stops, math.radians(frame.stall_deg)))
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Deflections, and shares of full throttle; see `Actuators.units`."""
+        return ("rad",) * self.positions + ("of full throttle",) * (len(self.names) - self.positions)
 
     @property
     def names(self) -> tuple[str, ...]:

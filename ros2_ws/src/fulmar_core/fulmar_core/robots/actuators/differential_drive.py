@@ -61,6 +61,11 @@ class DifferentialDrive(Rolling):
             raise ValueError("'slew' needs two values: of the speed and of the turn rate.")
 
     @property
+    def units(self) -> tuple[str, ...]:
+        """Of the two commands; see `Actuators.units`."""
+        return ("m/s", "rad/s")
+
+    @property
     def names(self) -> tuple[str, ...]:
         """Names of a command's entries."""
         return "speed", "turn_rate"

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import functools
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import Field
 from typing import Any, ClassVar
 
@@ -20,6 +21,26 @@ from fulmar_core.robots.actuators.refuge import Refuge, StopAtOnce
 from fulmar_core.robots.actuators.response import Response
 from fulmar_core.robots.actuators.tank import Tank
 from fulmar_core.states.rotation import Array
+
+
+def check_names(key: str, one: str, names: Sequence[str]) -> None:
+    """Reject a list of actuators that is empty, or in which two have one name.
+
+    Args:
+        key: Of the list in the YAML.
+        one: What one of them is called.
+        names: Theirs.
+
+    Raises:
+        ValueError: Says which of both.
+    """
+    if not names:
+        raise ValueError(f"'{key}' has no {one}. Give one or more, each with a 'name'.")
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise ValueError(
+            f"'{key}' has {names.count(twice)} with the name '{twice}'. Give each {one} a name of its own."
+        )
 
 
 class Actuators(ABC):
@@ -57,6 +78,11 @@ class Actuators(ABC):
     @abstractmethod
     def names(self) -> tuple[str, ...]:
         """Names of the actuators."""
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Unit of each command, in the order of `names`; by default a share of the full one."""
+        return ("of full command",) * len(self.names)
 
     @property
     @abstractmethod

@@ -11,7 +11,7 @@ import numpy as np
 from array_api_compat import device
 
 from fulmar_core.robots.actuators.excitation import Excitation
-from fulmar_core.robots.actuators.family import Actuators
+from fulmar_core.robots.actuators.family import Actuators, check_names
 from fulmar_core.robots.actuators.parts import Fixture
 from fulmar_core.states.arrays import array_namespace, sum_of
 from fulmar_core.states.attitude import Vector
@@ -85,8 +85,7 @@ class Pushing(Actuators):
             ValueError: There are none, two have one name, or `response` does not fit them.
         """
         count, one = len(self.names), key.removesuffix("s")
-        if not count or len(set(self.names)) != count:
-            raise ValueError(f"'{key}' must not be empty, and each needs a name of its own.")
+        check_names(key, one, self.names)
         if self.response.slew and len(self.response.slew) != count:
             raise ValueError(f"'slew' needs {count} values, one for each {one}.")
         self.response.refuse_lag_beside_slew()
@@ -207,7 +206,8 @@ def wrench_columns(count: int) -> list[int]:
     """
     if count not in (len(PLANAR), WRENCH):
         raise ValueError(
-            f"a wrench has {len(PLANAR)} numbers in the plane and {WRENCH} in space, found {count}."
+            f"a wrench has {len(PLANAR)} numbers for robots on a floor or on water and {WRENCH} in space, "
+            f"found {count}."
         )
     return PLANAR if count == len(PLANAR) else list(range(WRENCH))
 

@@ -17,7 +17,7 @@ from array_api_compat import device
 
 from fulmar_core.config.plausible_ranges import Plausible
 from fulmar_core.robots.actuators.excitation import Excitation
-from fulmar_core.robots.actuators.family import Actuators
+from fulmar_core.robots.actuators.family import Actuators, check_names
 from fulmar_core.robots.actuators.parts import Fixture
 from fulmar_core.robots.actuators.response import Response
 from fulmar_core.states.arrays import array_namespace, clip, sum_of
@@ -104,8 +104,8 @@ class ReactionWheels(Actuators):
     )  # fmt: skip
 
     def __post_init__(self) -> None:
-        if not self.wheels or len(set(self.names)) != len(self.names):
-            raise ValueError("'wheels' must not be empty, and each needs a name of its own.")
+        check_names("wheels", "wheel", self.wheel_names)
+        check_names("wheels", "wheel", self.names)  # an unloading torque has a name, too
         if min(self.torque, self.spin_inertia, self.top_speed) <= 0.0:
             raise ValueError("torque, spin_inertia and top_speed must be greater than 0.")
         if min(self.viscous, self.coulomb) < 0.0:
@@ -148,6 +148,11 @@ class ReactionWheels(Actuators):
         """Names of the wheels, and of the unloading torques about the body's axes where there is unloading."""
         outside = tuple(f"unload_{axis}" for axis in AXES) if self.unloading is not None else ()
         return (*self.wheel_names, *outside)
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Torques; see `Actuators.units`."""
+        return ("N·m",) * len(self.names)
 
     @property
     def wheel_names(self) -> tuple[str, ...]:

@@ -14,6 +14,7 @@ from fulmar_core.robots.sensors.kind import MessageFields, SensorKind, Truth
 from fulmar_core.robots.sensors.odometer import Channel, largest_reading
 from fulmar_core.robots.sensors.ranges import in_order, named_problem
 from fulmar_core.robots.sensors.sampling import Sampling, sensor_rng
+from fulmar_core.states.rotation import rotate
 from fulmar_core.wires.reading import Reading
 from fulmar_core.wires.wire import Wire
 
@@ -98,6 +99,23 @@ class AirProbes:
             spread = np.diag(self._std**2 + self._quantum**2 / 12.0)
             self._sampling.put(Reading(AirData(self._spec.names, values), covariance=spread), time_s)
         return self._sampling.take(time_s)
+
+
+def wind_of(quat_xyzw: np.ndarray, velocity: np.ndarray, air: np.ndarray) -> np.ndarray:
+    """The wind that an aircraft meets: its velocity over the ground without that through the air.
+
+    Args:
+        quat_xyzw: Attitude, body to world, shape (..., 4).
+        velocity: Of the aircraft over the ground, along the world's axes, shape (..., 3) [m/s].
+        air: Airspeed [m/s], angle of attack and sideslip [rad], as `Inputs.readings` has them, shape (..., 3 or more).
+
+    Returns:
+        Along the world's axes, where the wind blows to, shape (..., 3) [m/s].
+    """
+    speed, alpha, beta = air[..., 0], air[..., 1], air[..., 2]
+    ahead, right, down = np.cos(alpha) * np.cos(beta), np.sin(beta), np.sin(alpha) * np.cos(beta)
+    through = speed[..., None] * np.stack((ahead, -right, -down), axis=-1)  # ahead, left, up
+    return np.asarray(velocity - rotate(quat_xyzw, through))
 
 
 def _write(reading: Reading, _spec: AirDataSpec) -> list[Any]:
