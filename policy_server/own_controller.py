@@ -19,6 +19,7 @@ from fulmar_core.controllers.controller import Inputs
 from fulmar_core.estimators.actuator_health.filters import HealthSettings
 from fulmar_core.estimators.readings import readings_of
 from fulmar_core.robots.robot import Robot
+from fulmar_core.safety.command_range import CommandRange
 from fulmar_core.tasks import Task
 
 MEMBERS = ("reset", "act")
@@ -31,6 +32,7 @@ class OwnController:
         estimator: The user's own `estimator`, where the class has one; see `Controller`.
         readings: The user's own `readings`, where the class has them; see `Controller`.
         observer: The user's own `observer`, likewise.
+        range: Counts the steps in which it asked for more than the actuators can do.
     """
 
     def __init__(self, path: str, robot: Robot, task: Task, control_hz: float) -> None:
@@ -46,6 +48,7 @@ class OwnController:
             ConfigError: The class cannot be loaded, lacks a member, or its constructor raises.
         """
         self.name, self.control_hz = path, control_hz
+        self.range = CommandRange(robot.actuators)
         robot.timing.substeps(control_hz)  # refuses rates that the physics cannot keep
         cls = load_class(path, members=MEMBERS, what="controller")
         self._source, self._settings = source_of(cls), settings_beside(cls)
@@ -69,7 +72,9 @@ class OwnController:
 
     def act(self, inputs: Inputs) -> np.ndarray:
         """Command of the user's controller; see `Controller.act`."""
-        return np.asarray(self._own.act(inputs), dtype=float)
+        action = np.asarray(self._own.act(inputs), dtype=float)
+        self.range.see(action)
+        return action
 
     def metadata(self) -> dict[str, Any]:
         """Class, robot, task, rate and settings, with the SHA-256 of these and of the module's source."""

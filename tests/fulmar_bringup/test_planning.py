@@ -212,7 +212,9 @@ def test_a_bundle_for_something_else_stops_a_run_unless_a_fallback_is_named(plan
 
 
 def test_a_fallback_that_has_nothing_for_the_robot_is_refused(plan):
-    with pytest.raises(ConfigError, match="is for robots that are pushed in the plane with thrusters"):
+    with pytest.raises(
+        ConfigError, match="is for robots that are pushed over a floor or water with thrusters"
+    ):
         plan(robot="turtlebot2", controller="classical", guards=dict(fallback="lqr"))
 
 

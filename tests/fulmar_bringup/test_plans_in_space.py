@@ -83,7 +83,7 @@ def test_a_box_reaches_the_controller(plan):
             {"guards": {"estimator": "mocap_imu"}},
             "pushed in space. Use 'mocap_imu_3d' of configs/estimators, or leave it out.",
         ),
-        ({"task": "go_to_pose"}, "task 'go_to_pose' is for robots that are pushed in the plane"),
+        ({"task": "go_to_pose"}, "task 'go_to_pose' is for robots that are pushed over a floor or water"),
         ({"robot": "floating_platform"}, "task 'go_to_pose_3d' is for bodies that are pushed in space"),
         (
             {"controller": STILL, "guards": {"area": (-1.0, 1.0, -1.0, 1.0)}},

@@ -43,7 +43,10 @@ def broken_configs(tmp_path, monkeypatch):
             ["run", "turtlebot2", "--task", "race_waypoints", "--controller", "classical", "--goal", "1,2,0"],
             "the targets of task 'race_waypoints' do not fit into one --goal",
         ),
-        (["run", "leatherback", "--controller", "lqr"], "controller 'lqr' is for robots that are pushed in the plane"),
+        (
+            ["run", "leatherback", "--controller", "lqr"],
+            "controller 'lqr' is for robots that are pushed over a floor or water",
+        ),
         (
             [*RUN, "--controller", "fuzzy"],
             "unknown controller 'fuzzy'. Known: adaptive, classical, excite, external, lqi, lqr, lqr_drift, mpc, "
@@ -52,12 +55,12 @@ def broken_configs(tmp_path, monkeypatch):
         (
             ["evaluate", "floating_platform", "go_to_pose", "--controller", "pd"],
             "'pd' is for bodies that are pushed in space with thrusters or fans, satellites that only turn with "
-            "reaction_wheels; 'floating_platform' is one of the robots that are pushed in the plane",
+            "reaction_wheels; 'floating_platform' is one of the robots that are pushed over a floor or water",
         ),
         (
             ["evaluate", "spacecraft_16", "go_to_pose", "--controller", "pd"],
-            "'go_to_pose' is for robots that are pushed in the plane and robots on wheels; 'spacecraft_16' is one of "
-            "the bodies that are pushed in space. Did you mean 'go_to_pose_3d'?",
+            "'go_to_pose' is for robots that are pushed over a floor or water and robots on wheels; 'spacecraft_16' is "
+            "one of the bodies that are pushed in space. Did you mean 'go_to_pose_3d'?",
         ),
         (
             ["evaluate", "spacecraft_16", "track_velocities_3d", "--controller", "excite"],

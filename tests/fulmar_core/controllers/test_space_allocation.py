@@ -103,5 +103,7 @@ def test_openings_by_degrees_on_one_line_are_refused_in_space():
 
 
 def test_a_weight_of_another_size_is_refused():
-    with pytest.raises(ValueError, match="3 numbers in the plane and 6 in space, found 4"):
+    with pytest.raises(
+        ValueError, match="3 numbers for robots on a floor or on water and 6 in space, found 4"
+    ):
         allocation_of(VALVES, weight=np.eye(4), cost=0.0)

@@ -214,7 +214,12 @@ def test_gains_that_cannot_be_are_refused():
             "mpc",
             "'spacecraft_16' is one of the bodies that are pushed in space with thrusters. Use --controller classical",
         ),
-        ("spacecraft_16", "go_to_pose", "lqr", "'go_to_pose' is for robots that are pushed in the plane"),
+        (
+            "spacecraft_16",
+            "go_to_pose",
+            "lqr",
+            "'go_to_pose' is for robots that are pushed over a floor or water",
+        ),
         (
             "floating_platform",
             "go_to_pose_3d",

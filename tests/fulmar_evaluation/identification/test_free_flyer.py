@@ -96,5 +96,5 @@ def test_a_sign_of_the_quaternion_says_nothing(nominal, drive):
 
 
 def test_a_ballast_in_space_is_refused(nominal, drive):
-    with pytest.raises(ConfigError, match="--ballast is for robots in the plane"):
+    with pytest.raises(ConfigError, match="--ballast is for robots that move on a floor or on water"):
         identify(nominal, [drive, replace(drive, load=1)], ballasts={1: Weight(1.0)})

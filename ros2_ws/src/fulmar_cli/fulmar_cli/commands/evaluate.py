@@ -40,7 +40,8 @@ def evaluate(
         ),
     ] = "mujoco",
     episodes: Annotated[
-        int | None, option("N", "Number of episodes; 4,096 in the batch, 256 elsewhere.", min=1)
+        int | None,
+        option("N", "Number of episodes; 4,096 in the batch, 256 through simulators or ROS.", min=1),
     ] = None,
     seed: SeedOption = EVALUATION_SEED,
     scenario: ScenarioOption = "nominal",

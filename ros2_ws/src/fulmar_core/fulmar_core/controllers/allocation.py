@@ -62,6 +62,6 @@ def check_allocation(actuators: Pushing, numbers: int) -> None:
         )
     if numbers == WRENCH and actuators.shared_pressure and not actuators.binary:
         raise ValueError(
-            "valves that open by degrees on one line are allocated in the plane only; in space use on/off valves "
+            "valves that open by degrees on one line are for robots on a floor or on water; in space use on/off valves "
             "('continuous: false'), or none that share ('shared_pressure: false')."
         )

@@ -329,7 +329,8 @@ class Robot:
         if len(self.body.inertia) > 3 * (axes - 1) or len(self.body.center_of_mass) > axes:
             raise ValueError(
                 f"'body.inertia' has {len(self.body.inertia)} values and 'body.center_of_mass' "
-                f"{len(self.body.center_of_mass)}; a robot in the plane has xx, yy, zz and x, y. Leave out the others."
+                f"{len(self.body.center_of_mass)}; a robot on a floor or on water has xx, yy, zz and x, y. Leave out "
+                "the others."
             )
         if len(self.event_cameras) > 2:
             raise ValueError("'event_cameras' has more than two; a rate is estimated from one or two.")

@@ -125,7 +125,8 @@ def _prepared(
         )
     if ballasts and not how.ballast:
         raise ConfigError(
-            f"--ballast is for robots in the plane; weigh '{robot.name}' and give --known mass=KG+-KG."
+            f"--ballast is for robots that move on a floor or on water; weigh '{robot.name}' and give "
+            "--known mass=KG+-KG."
         )
     loads = ({load: weight.mass for load, weight in ballasts.items()},) if how.ballast else ()
     model = how.model(robot, robot.actuators, *loads)

@@ -7,7 +7,7 @@ from fulmar_core.states.planar import PlanarState
 
 PLANAR = Kind(
     name="planar",
-    plural="robots that are pushed in the plane",
+    plural="robots that are pushed over a floor or water",
     state_type=PlanarState,
     usual_robot="floating_platform",
     usual_task="go_to_pose",
