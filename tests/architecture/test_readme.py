@@ -1,10 +1,17 @@
-"""README: short, with make targets and folders that exist; test_docs.py checks its commands and links."""
+"""README: short, with every robot and task, make targets and folders that exist, and small pictures.
+
+test_docs.py checks its commands and links.
+"""
 
 from __future__ import annotations
 
 import re
 
 import pytest
+
+from fulmar_core.config.paths import config_names
+
+LARGEST = 150_000  # of a picture [bytes]
 
 
 @pytest.fixture
@@ -27,3 +34,29 @@ def test_folders_exist(readme, repository):
     folders = re.findall(r"^\| `([a-z_0-9/]+/)` \|", readme, re.MULTILINE)
     assert len(folders) >= 8
     assert all((repository / folder).is_dir() for folder in folders)
+
+
+def named(readme: str, head: str) -> set[str]:
+    """Names in the first table whose head begins so, in code."""
+    table = readme.split(head)[1].split("\n\n")[0]
+    return set(re.findall(r"`([a-z0-9_]+)`", table))
+
+
+def test_the_table_of_robots_has_every_robot_and_no_other(readme):
+    assert named(readme, "| Robot |") == set(config_names("robots"))
+
+
+def test_the_table_of_tasks_has_every_task_and_no_other(readme):
+    assert named(readme, "| Tasks |") == set(config_names("tasks"))
+
+
+def test_pictures_are_small(readme, repository):
+    pictures = re.findall(r"\]\((docs/pictures/[a-z]+\.png)\)", readme)
+    assert len(pictures) == 3
+    for picture in (*pictures, "docs/pictures/satellite.png"):
+        assert (repository / picture).stat().st_size < LARGEST, picture
+
+
+def test_each_picture_has_the_command_that_makes_it(readme):
+    for name in re.findall(r"\]\(docs/pictures/([a-z]+)\.png\)", readme):
+        assert f"--record runs/{name}\n" in readme

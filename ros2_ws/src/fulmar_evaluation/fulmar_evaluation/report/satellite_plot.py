@@ -185,7 +185,7 @@ def _limit(axes: Axes, seen: float, limit: float, words: str) -> None:
         axes.set_ylim(-1.15 * limit, 1.15 * limit)
     share = f"{100.0 * seen / limit:.2g} %" if seen < limit else "all"
     axes.text(
-        0.995, 0.03, f"{words}: {share} of it used at most", ha="right", va="bottom", transform=axes.transAxes,
+        0.995, 0.97, f"{words}: {share} of it used at most", ha="right", va="top", transform=axes.transAxes,
         fontsize=8.5, color=INK, bbox=READABLE,
     )  # fmt: skip
 
