@@ -19,6 +19,7 @@ import psutil
 
 from fulmar_bringup.console import printable
 from fulmar_bringup.node_spec import NodeSpec, Parameter
+from fulmar_core.config.module_path import safe_environment
 from fulmar_core.config.process import LAUNCHER_PID
 from fulmar_ros.middleware import environment_of_any_node, middleware_environment
 
@@ -26,6 +27,8 @@ PATIENCE_S = 4.0  # for an orderly end, before it is no longer asked for
 KILL_S = 2.0  # for a process to be gone after SIGKILL [s]
 GLUE = "fulmar_ros."  # package whose modules have a `main` that runs a node
 YIELDING = "fulmar_ros.yielding_start"
+OWN = "fulmar_core.config.own_module"  # finds modules of users
+PACKAGES = ("fulmar_", "sim_nodes.", "policy_server.", "hardware_drivers.", "tests.")  # of our nodes
 LAST_WORDS_S = 1.0  # for what a child that ended has left in the pipe; a grandchild may keep it open
 
 
@@ -54,6 +57,7 @@ class ProcessGroup:
     def __init__(self, environment: Mapping[str, str] | None = None) -> None:
         """Begin without children, whose environment is ours and what is given."""
         given = {**os.environ, **child_environment(), **(environment or {})}
+        given |= safe_environment(given)
         self._environment = given | environment_of_any_node(given)
         self._children: dict[str, psutil.Popen] = {}
         self._relays: dict[str, _Relay] = {}
@@ -161,8 +165,10 @@ def command_line(spec: NodeSpec, *, yielding: bool = False) -> list[str]:
         arguments += ["-r", f"{topic}:={other}"]
     arguments += ["--log-level", "warn"] if spec.quiet else []
     elsewhere = ["ip", "netns", "exec", spec.network] if spec.network else []
-    giving_way = [YIELDING] if yielding and spec.module.startswith(GLUE) else []
-    return [*elsewhere, sys.executable, "-m", *giving_way, spec.module, "--ros-args", *arguments]
+    through = [] if spec.module.startswith(PACKAGES) else [OWN]
+    if yielding and spec.module.startswith(GLUE):
+        through = [YIELDING]
+    return [*elsewhere, sys.executable, "-m", *through, spec.module, "--ros-args", *arguments]
 
 
 def child_environment() -> dict[str, str]:

@@ -1,26 +1,29 @@
 """Load a user's own class by its dotted path: `mypackage.mymodule:MyClass`.
 
 Controllers, tasks and drivers of users come this way. The module is searched for in the current folder first, then on
-PYTHONPATH and among the installed packages, in every process: `fulmar` and the scripts of ROS do not have the current
-folder on their path, `python -m` has it. Nothing is executed but the import.
+PYTHONPATH and among the installed packages, in every process. What it imports is searched for in the current folder
+last, so that no file there takes the place of a module that others need. Nothing is executed but the import.
 """
 
 from __future__ import annotations
 
 import importlib
 import importlib.util
-import os
 import pkgutil
 import re
 import sys
 import traceback
 import types
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from importlib.abc import MetaPathFinder
+from importlib.machinery import ModuleSpec, PathFinder
 from pathlib import Path
 from typing import Any
 
 from fulmar_core.config.bounded_file import CONFIG_BYTES, read_bounded
 from fulmar_core.config.errors import ConfigError, FulmarError, did_you_mean, shortened
+from fulmar_core.config.module_path import current_folder, search_current_folder
 from fulmar_core.config.yaml_text import YamlError, load
 
 SEPARATOR = ":"  # of module and class; no name of anything that Fulmar brings has one
@@ -142,36 +145,52 @@ def one_line(error: BaseException, module_name: str) -> str:
     return f"{type(error).__name__}: {text}" + (f" ({place})" if place else "")
 
 
-def search_current_folder() -> None:
-    """Put the current folder first on the path of modules, where it is not there already."""
+class _CurrentFolderFirst(MetaPathFinder):
+    """Finds one module, and no other, in the current folder."""
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+
+    def find_spec(self, fullname: str, path: object = None, target: object = None) -> ModuleSpec | None:
+        if fullname != self._name or fullname in sys.stdlib_module_names:
+            return None
+        found = PathFinder.find_spec(fullname, [current_folder()])
+        return found if found and found.origin else None
+
+
+@contextmanager
+def current_folder_first(name: str) -> Iterator[None]:
+    """Search the current folder for one module before all other folders, and for what it imports after them."""
+    search_current_folder()
+    finder = _CurrentFolderFirst(name)
+    sys.meta_path.insert(0, finder)
     try:
-        folder = os.getcwd()
-    except OSError:  # the folder was removed
-        return
-    if sys.path[:1] not in ([folder], [""]):
-        sys.path.insert(0, folder)
+        yield
+    finally:
+        sys.meta_path.remove(finder)
 
 
 def _module(name: str, what: str) -> types.ModuleType:
-    search_current_folder()
     importlib.invalidate_caches()
+    top = name.partition(".")[0]
     try:
-        module = importlib.import_module(name)
+        with current_folder_first(top):
+            module = importlib.import_module(name)
     except (Exception, SystemExit) as error:
         missing = error.name if isinstance(error, ModuleNotFoundError) else None
         if missing and (name == missing or name.startswith(f"{missing}.")):
             raise _not_found(name, what) from None
         raise ConfigError(f"{what}: module '{name}' cannot be imported: {one_line(error, name)}.") from error
-    _check_not_shadowed(name.partition(".")[0], what)
+    _check_not_shadowed(top, what)
     return module
 
 
 def _not_found(name: str, what: str) -> ConfigError:
     parent, _, last = name.rpartition(".")
-    folders = [os.getcwd()] if not parent else list(getattr(sys.modules.get(parent), "__path__", []))
+    folders = [current_folder()] if not parent else list(getattr(sys.modules.get(parent), "__path__", []))
     if parent and not folders:
         top = name.partition(".")[0]
-        parent, last, folders = "", top, [os.getcwd()]
+        parent, last, folders = "", top, [current_folder()]
     known = [module.name for module in pkgutil.iter_modules(folders)]
     where = (
         f"package '{parent}'" if parent else f"{folders[0]}, on PYTHONPATH or among the installed packages"
