@@ -31,6 +31,7 @@ from fulmar_core.config.process import LAUNCHER_PID, end_with
 from fulmar_core.config.yielding import take_place
 from fulmar_ros.middleware import range_for_rclpy, set_up_middleware, static_peers, strangers_can_send
 from fulmar_ros.peer_filter import PeerFilter
+from fulmar_ros.ros_check import check_log_folder
 
 PRIVATE = 0o077  # rights that group and others do not get
 # A thread that waits for the interpreter gets it after this long; Python's own 5 ms is a lot of 20 ms.
@@ -124,10 +125,12 @@ def init_ros(argv: Sequence[str] | None = (), *, context: rclpy.Context | None =
         context: By default the global one.
 
     Raises:
-        ConfigError: ROS_STATIC_PEERS cannot be resolved, or packets of others cannot be kept out.
+        ConfigError: ROS_STATIC_PEERS cannot be resolved, packets of others cannot be kept out, or logs cannot be
+            written.
         RuntimeError: The arguments cannot be read.
     """
     set_up_middleware()
+    check_log_folder(os.environ)
     with range_for_rclpy():
         arguments = None if argv is None else list(argv)
         rclpy.init(args=arguments, context=context, signal_handler_options=SignalHandlerOptions.NO)

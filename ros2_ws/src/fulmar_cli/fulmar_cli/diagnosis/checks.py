@@ -33,6 +33,7 @@ from fulmar_cli.diagnosis.network import (
     check_running_robots,
 )
 from fulmar_cli.diagnosis.sockets import check_sockets
+from fulmar_ros.ros_check import ros_fault
 
 PURPOSES = ("hardware", "sim")
 EXTRAS_OF_A_ROBOT = ("ros", "policy", "bags")
@@ -54,10 +55,11 @@ def diagnose(purpose: str | None = None, name: str | None = None) -> list[Findin
     hardware, here = purpose == "hardware", Path.cwd()
     files = diagnose_hardware(name) if hardware else []  # first: a mistake in its name needs no other check
     environment = dict(os.environ)  # as it was given: the checks of ROS add Fulmar's own settings
+    fault = ros_fault(environment)
     extras = EXTRAS_OF_A_ROBOT if hardware else EXTRAS_OF_A_SIMULATION
     checks: list[Callable[[], Finding]] = [
         check_python,
-        *(partial(check_extra, extra) for extra in extras),
+        *(partial(check_extra, extra) for extra in extras if not (fault and extra == "ros")),
         check_tf,
         check_configuration,
         check_policies,
@@ -66,8 +68,7 @@ def diagnose(purpose: str | None = None, name: str | None = None) -> list[Findin
         partial(check_profile, environment),
         check_receive_buffer,
         partial(check_sockets, environment),
-        check_round_trip,
-        check_running_robots,
+        *((check_round_trip, check_running_robots) if fault is None else ()),
         partial(check_timing, hardware=hardware),
         partial(check_disk_space, here),
         partial(check_disk_speed, here),
@@ -75,4 +76,5 @@ def diagnose(purpose: str | None = None, name: str | None = None) -> list[Findin
     if purpose != "sim":
         permissions = partial(check_permissions, devices_of(), hardware=hardware)
         checks += [check_clock, check_real_time, check_governor, permissions]
-    return [check() for check in checks] + files
+    first = [Finding("ROS", "wrong", fault.found, fault.fix)] if fault else []
+    return [*first, *(check() for check in checks), *files]

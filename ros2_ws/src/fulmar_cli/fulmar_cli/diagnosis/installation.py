@@ -42,6 +42,8 @@ def check_module(module: str, extra: str) -> Finding:
     except ImportError as error:
         fix = f"{install_command([extra], [module])}   # brings the extra '{extra}'"
         return Finding(module, "wrong", str(error), fix)
+    except OSError as error:  # such as Matplotlib's, where it may write nowhere
+        return Finding(module, "wrong", str(error), "export TMPDIR=DIR   # a folder that you may write")
     try:
         return Finding(module, "ok", version(module))
     except PackageNotFoundError:
