@@ -83,9 +83,8 @@ class LearningBar:
         self._bar.update(self._task, result=f"success {success:.3f}")
         if not self._console.is_terminal:
             rate = f"{self._speed.rate:,.0f} steps/s"
-            self._console.print(
-                f"learning {elapsed_s:5.0f} s  {rate}  success {success:.3f}", highlight=False
-            )
+            line = f"learning {elapsed_s:5.0f} s  {rate}  success {success:.3f}"
+            self._console.print(line, highlight=False, soft_wrap=True)
 
     def end(self) -> None:
         """Stop drawing."""
@@ -184,7 +183,7 @@ class JobBars:
         self._bars.update(task, completed=1.0, text=text)
         self._bars.stop_task(task)
         if not self._console.is_terminal:
-            self._console.print(f"{self._names[number]}: {text}")
+            self._console.print(f"{self._names[number]}: {text}", markup=False, soft_wrap=True)
 
 
 class WandbCurves(KVWriter):

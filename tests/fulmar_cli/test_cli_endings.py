@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -10,6 +11,7 @@ import sys
 import pytest
 
 from tests.fulmar_cli.command_line import EVALUATE, SHIPPED
+from tests.own_files import own_folder
 
 
 @pytest.mark.parametrize(
@@ -90,13 +92,74 @@ def test_a_ctrl_c_that_was_answered_does_not_end_the_process_by_a_signal_afterwa
     assert ended.returncode == 1
 
 
-@pytest.mark.parametrize("closed", [">&-", "2>&-", ">&- 2>&-"])
-def test_whoever_closes_the_output_gets_an_answer_and_no_traceback(closed):
-    """As cron and daemons do."""
-    command = f"exec {sys.executable} -m fulmar_cli.main --version {closed}"
-    done = subprocess.run(["sh", "-c", command], capture_output=True, text=True, timeout=60, check=False)
-    assert done.returncode == 0
-    assert "Traceback" not in done.stderr
-    if closed == ">&-":
-        assert done.stderr.startswith("fulmar: the standard output is closed")
-        assert done.stderr.count("\n") == 1
+@pytest.mark.parametrize("closed", [">&-", "<&- >&- 2>&-"])
+def test_closed_streams_lead_nowhere_and_no_file_takes_their_place(closed, tmp_path):
+    layout = tmp_path / "view.rviz"
+    command = f"{sys.executable} -m fulmar_cli.main layout turtlebot2 --out {layout} {closed}"
+    done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, timeout=30, check=False)
+    assert done.stdout == ""
+    assert done.stderr == "" or done.stderr.startswith("fulmar: standard output is closed")
+    assert (done.stderr == "") == ("2>" in closed)
+    assert "wrote" not in layout.read_text()
+
+
+def test_a_locale_without_a_character_gets_a_question_mark_in_its_place(tmp_path):
+    command = [sys.executable, "-m", "fulmar_cli.main", "list", "\u20ac\udcff"]
+    environment = {**os.environ, "LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+    done = subprocess.run(command, env=environment, capture_output=True, timeout=30, check=False)
+    assert done.returncode == 2
+    assert b"Traceback" not in done.stderr
+    assert done.stderr.count(b"\n") == 1
+
+
+PRINTS = """
+import os, subprocess, sys
+from fulmar_bringup.console import json_alone, print_json
+with json_alone():
+    print("a class of a user")
+    os.write(1, b"a library\\n")
+    subprocess.run([sys.executable, "-c", "print('a worker')"])
+    print_json({"a": 1}, indent=None)
+print("later")
+"""
+
+
+def test_nothing_but_json_goes_to_the_output_whoever_prints():
+    command = [sys.executable, "-c", PRINTS]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=30, check=True)
+    assert done.stdout == '{"a": 1}\nlater\n'
+    assert set(done.stderr.splitlines()) == {"a class of a user", "a library", "a worker"}
+
+
+PRINTING = """
+import numpy as np
+print("loaded")
+class Steer:
+    def __init__(self, robot, task, settings):
+        print("made")
+        self.count = len(robot.actuators.names)
+    def reset(self): print("reset")
+    def act(self, inputs):
+        print("acts")
+        return np.zeros((len(inputs.state.x), self.count))
+"""
+
+
+def test_json_of_an_evaluation_is_one_object_whatever_the_controller_prints(fulmar, tmp_path, monkeypatch):
+    with own_folder(tmp_path, monkeypatch):
+        (tmp_path / "own_printing.py").write_text(PRINTING)
+        asked = ("turtlebot2", "go_to_position", "--controller", "own_printing:Steer")
+        code, out, err = fulmar("evaluate", *asked, "--through", "batch", "--episodes", 2, "--json")
+    assert code == 0, err
+    assert json.loads(out)["episodes"] == 2
+    assert {"loaded", "made", "acts"} <= set(err.splitlines())
+
+
+def test_paths_of_results_are_never_folded(fulmar, tmp_path):
+    folder = tmp_path / ("a_long_name_" * 12)
+    code, out, _ = fulmar("export", "navion", "--to", "jsbsim", "--out", folder)
+    assert code == 0
+    assert [line.partition(":")[0] for line in out.splitlines()] == [
+        str(folder / "navion" / "navion.xml"),
+        str(folder / "still_planet.xml"),
+    ]

@@ -5,10 +5,11 @@ from __future__ import annotations
 import contextlib
 import json
 import logging
+import os
 import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TextIO, TypeVar
 
 from rich.console import Console
 from rich.text import Text
@@ -42,9 +43,46 @@ console = _PrintableConsole(stderr=True, highlight=False, emoji=False)
 output = _PrintableConsole(highlight=False, emoji=False)
 
 
-def print_json(value: dict[str, Any]) -> None:
+_results: list[TextIO] = []  # where JSON goes while standard output is kept free of all else
+
+
+@contextlib.contextmanager
+def json_alone() -> Iterator[None]:
+    """Keep standard output for `print_json`: what classes of users, libraries and workers print goes to the error."""
+    shown = sys.stdout
+    with contextlib.ExitStack() as ending:
+        if _is_descriptor(shown, 1):  # else it was replaced, by a test
+            shown.flush()
+            results: TextIO = os.fdopen(os.dup(1), "w", encoding=shown.encoding, errors=shown.errors)
+            ending.callback(_close, results)
+            os.dup2(2, 1)
+            ending.callback(os.dup2, results.fileno(), 1)
+            ending.callback(shown.flush)
+        else:
+            results = shown
+        ending.enter_context(contextlib.redirect_stdout(sys.stderr))
+        _results.append(results)
+        ending.callback(_results.pop)
+        yield
+
+
+def _is_descriptor(stream: TextIO, number: int) -> bool:
+    try:
+        return stream.fileno() == number
+    except (OSError, ValueError):
+        return False
+
+
+def _close(stream: TextIO) -> None:
+    with contextlib.suppress(OSError):  # its reader has ended, which was said before
+        stream.close()
+
+
+def print_json(value: dict[str, Any], *, indent: int | None = 2) -> None:
     """Print one JSON object and nothing else."""
-    sys.stdout.write(json.dumps(value, indent=2, allow_nan=False) + "\n")
+    stream = _results[-1] if _results else sys.stdout
+    stream.write(json.dumps(value, indent=indent, allow_nan=False) + "\n")
+    stream.flush()
 
 
 def print_result(result: Result, show: Callable[[Result], None], *, as_json: bool) -> None:

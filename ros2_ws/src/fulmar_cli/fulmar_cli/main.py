@@ -44,6 +44,7 @@ from fulmar_cli.commands.teleop import teleop
 from fulmar_cli.commands.train import train
 from fulmar_cli.commands.up import up
 from fulmar_cli.installation.extras import advice_for
+from fulmar_cli.surroundings import settle
 from fulmar_core.config.errors import (
     BAD_USAGE,
     DONE,
@@ -115,6 +116,7 @@ app.command()(install_stars)
 
 def main() -> None:
     """Run the command line; mistakes end with one line and exit code 2, failures with 1."""
+    settle()
     stops: list[str] = []
 
     def on_terminate(number: int, _frame: FrameType | None) -> None:
@@ -140,7 +142,6 @@ def main() -> None:
 
 
 def _run_and_exit(stops: list[str]) -> None:
-    closed = _open_nowhere()
     try:
         code = app(prog_name="fulmar", standalone_mode=False)
         sys.stdout.flush()  # here, where a closed pipe is handled
@@ -158,7 +159,7 @@ def _run_and_exit(stops: list[str]) -> None:
         sys.exit(FAILED)
     except OSError as error:  # a folder that cannot be written, a full disk
         sys.exit(_complain(f"{error.filename or 'the system'}: {error.strerror or error}.", FAILED))
-    except ModuleNotFoundError as error:
+    except ImportError as error:
         advice = advice_for(error)
         if advice is None:
             raise
@@ -170,24 +171,9 @@ def _run_and_exit(stops: list[str]) -> None:
         if hasattr(error, "format_message"):  # what typer raises for bad usage, whichever click is behind it
             sys.exit(_complain(f"{error.format_message()}{_hint(error)}", BAD_USAGE))
         raise
-    for name in closed:
-        _complain(f"the {name} is closed, and what stands there was not shown. Give it a file: > FILE", DONE)
     if code == INTERRUPTED:
         sys.exit(_complain(stops[0] if stops else "stopped by the user", FAILED))
     sys.exit(code if isinstance(code, int) else DONE)
-
-
-def _open_nowhere() -> list[str]:
-    """Open what whoever started us has closed, as cron and daemons do, so that no other file takes its place."""
-    closed = []
-    for number, name in ((1, "stdout"), (2, "stderr")):
-        if getattr(sys, name) is None:
-            file = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 - for as long as we run
-            if file.fileno() != number:
-                os.dup2(file.fileno(), number)
-            setattr(sys, name, file)
-            closed.append("standard output" if name == "stdout" else "standard error")
-    return closed
 
 
 def _complain(message: str, code: int) -> int:

@@ -168,7 +168,8 @@ def print_figures(figures: dict[str, Any], output: Console) -> None:
         output.print(line, markup=False, soft_wrap=True)
     for warning in f.get("warnings", []):
         output.print(f"warning: {warning}", markup=False, soft_wrap=True)
-    output.print(
+    line = (
         f"success {f['success_rate']:.3f} of {f['episodes']} episodes of {f['episode_s']:g} s "
         f"(seed {f['seed']}) through {f['through']}; {f['wall_s']:.1f} s, {f['steps_per_s']:,.0f} steps/s"
     )
+    output.print(line, markup=False, soft_wrap=True)

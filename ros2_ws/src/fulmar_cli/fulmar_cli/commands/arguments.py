@@ -13,7 +13,7 @@ from typing import Annotated, Any, TypeVar
 
 import typer
 
-from fulmar_bringup.console import warn
+from fulmar_bringup.console import json_alone, warn
 from fulmar_bringup.node_table import OPTIONS
 from fulmar_core.wires.robot_name import checked_name
 
@@ -25,9 +25,20 @@ def option(metavar: str, text: str, *names: str, **more: Any) -> Any:
     return typer.Option(*names, metavar=metavar, help=text, **more)
 
 
-def flag(name: str, text: str) -> Any:
-    """An option without a value."""
-    return typer.Option(name, help=text)
+def flag(name: str, text: str, **more: Any) -> Any:
+    """An option without a value; `more` goes to typer."""
+    return typer.Option(name, help=text, **more)
+
+
+def json_flag(text: str) -> Any:
+    """The flag `--json`: nothing but JSON goes to standard output then, whatever others print."""
+
+    def keep(context: typer.Context, value: bool) -> bool:
+        if value:
+            context.with_resource(json_alone())
+        return value
+
+    return flag("--json", text, callback=keep)
 
 
 def argument(metavar: str, text: str) -> Any:
@@ -101,7 +112,7 @@ JobsOption = Annotated[
 ]
 BagArgument = Annotated[Path, argument("BAG", "A bag folder, or the .mcap or .db3 file in it.")]
 OdometryOption = Annotated[str | None, option("TOPIC", "The odometry to use, where a bag has several.")]
-JsonOption = Annotated[bool, flag("--json", "Print one JSON object and nothing else.")]
+JsonOption = Annotated[bool, json_flag("Print one JSON object and nothing else.")]
 
 
 def with_node_options(*, standing: bool) -> Callable[[Callable[..., None]], Callable[..., None]]:

@@ -135,9 +135,9 @@ def _print(figures: dict[str, Any]) -> None:
 
 
 def _print_endurance(figures: dict[str, Any]) -> None:
-    output.print(
+    write_line(
         f"{figures['simulated_s']:g} s at {figures['rate']:g} times real time: "
         f"{figures['commands_lost']} of {figures['commands_answered']} commands are not in the bag"
     )
     for name, grown in figures["memory_growth_mb"].items():
-        output.print(f"{name}: {figures['memory_mb'][name]:.0f} MB, grown by {grown:.1f} MB")
+        write_line(f"{name}: {figures['memory_mb'][name]:.0f} MB, grown by {grown:.1f} MB")

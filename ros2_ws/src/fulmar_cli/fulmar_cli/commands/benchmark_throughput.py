@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated, Any
 
-from fulmar_bringup.console import console, output, print_result
+from fulmar_bringup.console import log_line, output, print_result
 from fulmar_bringup.progress import step_bar
 from fulmar_cli.commands.arguments import JsonOption, ScenarioOption, option
 from fulmar_cli.commands.values import read_names
@@ -124,7 +124,7 @@ def _fastest(device: str) -> str:
 
         if compiler_found():
             return "compiled"
-    console.print("note: without torch and g++ nothing is compiled; NumPy computes the batch.")
+    log_line("note: without torch and g++ nothing is compiled; NumPy computes the batch.")
     return "numpy"
 
 

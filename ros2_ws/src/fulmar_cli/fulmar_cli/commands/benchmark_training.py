@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from fulmar_bringup.console import output, print_result, write_line
+from fulmar_bringup.console import print_result, write_line
 from fulmar_cli.commands.arguments import JsonOption, dated_folder, option
 from fulmar_core.config.errors import FAILED
 
@@ -49,16 +49,14 @@ def _print_comparison(result: dict[str, Any]) -> None:
     for failure in result["failed"]:
         write_line(f"failed: {failure}")
     kinds = [kind for kind in ("stock", "fast") if kind in result]
-    output.print(
-        f"{result['robot']} · {result['task']}: success as lowest – median – highest", soft_wrap=True
-    )
-    output.print(f"{'':<14}" + "".join(f"{kind:^26}" for kind in kinds))
-    output.print(f"{'steps/s':<14}" + "".join(f"{result[kind]['steps_per_s']:^26,.0f}" for kind in kinds))
+    write_line(f"{result['robot']} · {result['task']}: success as lowest – median – highest")
+    write_line(f"{'':<14}" + "".join(f"{kind:^26}" for kind in kinds))
+    write_line(f"{'steps/s':<14}" + "".join(f"{result[kind]['steps_per_s']:^26,.0f}" for kind in kinds))
     arrivals = [result[kind]["time_to_0.9_s"] for kind in kinds]
     cells = ["never" if value is None else f"{value:.0f} s" for value in arrivals]
-    output.print(f"{'success 0.9':<14}" + "".join(f"{cell:^26}" for cell in cells))
+    write_line(f"{'success 0.9':<14}" + "".join(f"{cell:^26}" for cell in cells))
     for rows in zip(*(result[kind]["curve"] for kind in kinds), strict=True):
         cells = [f"{row['lowest']:.3f} – {row['success']:.3f} – {row['highest']:.3f}" for row in rows]
-        output.print(f"{rows[0]['wall_s']:>8.0f} s    " + "".join(f"{cell:^26}" for cell in cells))
+        write_line(f"{rows[0]['wall_s']:>8.0f} s    " + "".join(f"{cell:^26}" for cell in cells))
     if "speed_ratio" in result:
-        output.print(f"fast is {result['speed_ratio']:.1f} times as fast as stock")
+        write_line(f"fast is {result['speed_ratio']:.1f} times as fast as stock")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from fulmar_bringup.console import output
+from fulmar_bringup.console import write_line
 from fulmar_cli.commands.arguments import argument, flag, option
 from fulmar_core.config.errors import ConfigError, UnknownNameError
 
@@ -37,9 +37,8 @@ def export(
             raise UnknownNameError("format", to, (JSBSIM,))
         from sim_nodes.jsbsim_model import write_aircraft
 
-        output.print(
-            f"{write_aircraft(load_robot(str(run)), out)}: for JSBSim; {out / 'still_planet.xml'}: its planet"
-        )
+        write_line(f"{write_aircraft(load_robot(str(run)), out)}: for JSBSim")
+        write_line(f"{out / 'still_planet.xml'}: its planet")
         return
     from fulmar_core.tasks import load_task
     from policy_server.policy import Policy
@@ -47,6 +46,6 @@ def export(
 
     passport = write(run, out)
     Policy(out, load_robot(passport.robot), load_task(passport.task), control_hz=passport.control_hz)
-    output.print(
+    write_line(
         f"{out}: {passport.robot} · {passport.task} · {passport.control_hz:g} Hz · {passport.sha256[:12]}"
     )

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from fulmar_bringup.console import console, log_line, print_json, write_line
+from fulmar_bringup.console import log_line, print_json, write_line
 from fulmar_cli.commands.arguments import JsonOption, argument, flag, invoked_command, option
 from fulmar_core.config.errors import FAILED, ConfigError, did_you_mean
 
@@ -61,9 +61,7 @@ def policies(
     for job in jobs if anew else []:
         if aside := set_aside(job):
             log_line(f"{job.name}: the old one is in {aside}")
-    console.print(
-        f"{len(missing)} of {len(jobs)} policies to make, about {minutes:.0f} min and the evaluation"
-    )
+    log_line(f"{len(missing)} of {len(jobs)} policies to make, about {minutes:.0f} min and the evaluation")
     with JobBars([job.name for job in missing]) as bars:
         lines = make_policies(table, jobs, LocalExecutor(table.at_once), bars)
     if as_json:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from fulmar_bringup.console import console, log_line, output, print_json
+from fulmar_bringup.console import console, log_line, print_json, write_line
 from fulmar_cli.commands.arguments import JsonOption, argument, option
 from fulmar_core.config.errors import DONE, FAILED, ConfigError, UnknownNameError
 
@@ -87,13 +87,11 @@ def status(
 
 
 def _show(robot: RobotStatus, timeout_s: float) -> None:
-    output.print(f"{robot.name}  e-stop: {robot.estop}", markup=False)
+    write_line(f"{robot.name}  e-stop: {robot.estop}")
     width = max([11, *(len(node.node) + 1 for node in robot.nodes)])
     for node in robot.nodes:
         level = "?" if node.level in NO_REPORT else node.level
-        output.print(
-            f"  {node.node:<{width}}{level:<7}{_words(node, timeout_s)}", markup=False, soft_wrap=True
-        )
+        write_line(f"  {node.node:<{width}}{level:<7}{_words(node, timeout_s)}")
 
 
 def _words(node: NodeStatus, timeout_s: float) -> str:
