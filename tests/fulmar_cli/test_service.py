@@ -9,10 +9,12 @@ import subprocess
 
 import pytest
 
+from fulmar_bringup.service import trial
 from fulmar_bringup.service.device_rules import device_groups, device_rules
 from fulmar_bringup.service.unit import RT_LIMIT, Service, command_of, system_of_unit, unit_text
+from fulmar_cli.installation import service_plan
 from fulmar_core.config.errors import BAD_USAGE, DONE, FAILED
-from fulmar_core.config.paths import config_names
+from fulmar_core.config.paths import config_names, config_path
 from hardware_drivers.hardware import load_hardware
 from tests.own_files import own_folder
 
@@ -20,7 +22,15 @@ USER = "games"  # a user of every Debian, for whom systemd has no warning
 
 
 @pytest.fixture
-def service(fulmar, tmp_path):
+def untried(monkeypatch):
+    """What would be tried before an installation, in the place of trying it, which takes seconds."""
+    tried = []
+    monkeypatch.setattr(service_plan, "try_once", lambda *about, **_: tried.append(about))
+    return tried
+
+
+@pytest.fixture
+def service(fulmar, tmp_path, untried):
     """Function that runs `fulmar service` below a folder; returns exit code, output and messages."""
 
     def run(*arguments):
@@ -238,6 +248,81 @@ def test_a_service_finds_own_classes_in_the_folder_that_it_was_installed_from(se
     assert code == DONE, messages
     found = variables_of(unit_of(tmp_path, "mujoco_classical").read_text())
     assert found["PYTHONPATH"].split(":")[0] == str(own)
+
+
+SENSOR = """
+class Gauge:
+    message, topic, fields = "std_msgs/msg/Float64", "gauge", ("data",)
+    def __init__(self, settings): pass
+    def reset(self, rng): pass
+    def measure(self, truth, time_s): return (0.0,)
+"""
+
+
+def test_a_service_finds_the_class_of_a_sensor_of_its_robot(service, tmp_path, own, monkeypatch):
+    (own / "own_gauge.py").write_text(SENSOR)
+    (own / "own" / "robots").mkdir(parents=True)
+    monkeypatch.setenv("FULMAR_CONFIGS", "own")
+    robot = config_path("robots", "turtlebot2").read_text().replace("name: turtlebot2", "name: gauged")
+    own_sensors = "sensors:\n  own:\n    gauge: {sensor: 'own_gauge:Gauge'}\n"
+    (own / "own" / "robots" / "gauged.yaml").write_text(robot.replace("sensors:\n", own_sensors))
+    code, _, messages = service("install", "mujoco_classical", "--robot", "gauged", "--user", USER)
+    assert code == DONE, messages
+    found = variables_of(unit_of(tmp_path, "mujoco_classical").read_text())
+    assert found["PYTHONPATH"].split(":")[0] == str(own)
+
+
+def test_a_service_is_tried_with_its_own_environment_before_it_is_installed(service, own, untried):
+    chosen = ("--robot", "turtlebot2", "--task", "go_to_position", "--controller", "own_steer:Steer")
+    service("install", "mujoco_classical", *chosen, "--user", USER)
+    ((asked, variables),) = untried
+    assert asked.command[1:4] == ("up", "mujoco_classical", "--service")
+    assert variables["PYTHONPATH"].split(":")[0] == str(own)
+
+
+# Refuses to start beside files, with a variable of the shell, or without --dry-run.
+PROGRAM = """#!/bin/sh
+[ -z "$HIDDEN" ] && [ -z "$(ls)" ] && case "$*" in *--dry-run) exit {code};; esac
+echo "fulmar: $PWD: $*" >&2
+exit 2
+"""
+
+
+@pytest.mark.parametrize("code", [DONE, FAILED])
+def test_a_service_that_would_not_start_is_not_installed_and_says_why(service, tmp_path, monkeypatch, code):
+    monkeypatch.setattr(service_plan, "try_once", trial.try_once)
+    program = tmp_path / "fulmar"
+    program.write_text(PROGRAM.format(code=code))
+    program.chmod(0o755)
+    monkeypatch.setattr(service_plan, "_program", lambda: program)
+    monkeypatch.setenv("HIDDEN", "of this shell")
+    ended, printed, messages = service("install", "mujoco_lqr", "--user", USER)
+    assert unit_of(tmp_path, "mujoco_lqr").exists() == (code == DONE)
+    if code != DONE:
+        assert (ended, printed) == (BAD_USAGE, "")
+        assert "the service would not start, and nothing was written: as '" in messages
+        assert messages.endswith(f"it says: exit code {code}\n")
+
+
+def test_a_dry_run_of_a_system_finds_what_a_start_would_miss_and_starts_nothing(fulmar, own):
+    code, printed, messages = fulmar("up", "mujoco_lqr", "--service", "--dry-run")
+    assert (code, printed) == (DONE, ""), messages
+    assert "floating_platform: go_to_pose, lqr at " in messages
+    chosen = ("--robot", "turtlebot2", "--task", "go_to_position", "--controller", "own_missing:Steer")
+    code, _, messages = fulmar("up", "mujoco_classical", "--dry-run", *chosen)
+    assert code == BAD_USAGE
+    assert "there is no module 'own_missing'" in messages
+    assert not (own / "runs").exists()
+
+
+@pytest.mark.parametrize("name", ["random", "yaml"])
+def test_a_module_that_a_service_would_run_in_the_place_of_another_is_refused(service, tmp_path, own, name):
+    (own / f"{name}.py").write_text("raise SystemExit('run')\n")
+    chosen = ("--robot", "turtlebot2", "--task", "go_to_position", "--controller", "own_steer:Steer")
+    code, _, messages = service("install", "mujoco_classical", *chosen, "--user", USER)
+    assert code == BAD_USAGE
+    assert f"{own / name}: a service would run it in the place of the module '{name}'" in messages
+    assert not (tmp_path / "etc").exists()
 
 
 def test_a_service_finds_the_class_of_its_driver(service, tmp_path, own):

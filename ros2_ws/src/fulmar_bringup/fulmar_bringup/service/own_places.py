@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import importlib.util
 import os
+import pkgutil
+import sys
 from collections.abc import Iterable, Mapping
+from importlib.machinery import PathFinder
 from pathlib import Path
 
-from fulmar_core.config.own_class import SEPARATOR, search_current_folder
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.config.module_path import PYTHONPATH, search_current_folder
+from fulmar_core.config.own_class import SEPARATOR
 from fulmar_core.config.paths import OWN_FOLDERS
 
-PYTHONPATH = "PYTHONPATH"
 # Variables that hold a path, or several as in PATH.
 PATHS = (
     OWN_FOLDERS, "FULMAR_CALIBRATION", "FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE",
@@ -29,6 +33,10 @@ def module_path(modules: Iterable[str], environment: Mapping[str, str]) -> dict[
     Args:
         modules: Modules, or dotted paths of classes: of controllers, tasks, drivers and nodes.
         environment: Of the one who installs.
+
+    Raises:
+        ConfigError: The folder of an own module has others that would be run in the place of Python's or of installed
+            ones, for a service finds it by PYTHONPATH, which Python searches before those.
     """
     search_current_folder()
     given = [part for part in environment.get(PYTHONPATH, "").split(os.pathsep) if part]
@@ -37,7 +45,19 @@ def module_path(modules: Iterable[str], environment: Mapping[str, str]) -> dict[
     if not any(root in searched for root in roots):
         return {}
     own = [root for root in roots if root == searched[0]]
+    if own:
+        _check_places_taken(searched[0])
     return {PYTHONPATH: os.pathsep.join(dict.fromkeys([*own, *searched[1:]]))}
+
+
+def _check_places_taken(folder: str) -> None:
+    packages = [each for each in sys.path if Path(each).name in ("site-packages", "dist-packages")]
+    for _, name, _ in pkgutil.iter_modules([folder]):
+        if name in sys.stdlib_module_names or PathFinder.find_spec(name, packages):
+            raise ConfigError(
+                f"{Path(folder) / name}: a service would run it in the place of the module '{name}' that others need. "
+                "Rename it, or install from a folder that holds your classes alone."
+            )
 
 
 def _whole(paths: str) -> str:

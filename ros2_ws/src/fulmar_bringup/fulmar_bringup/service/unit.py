@@ -107,11 +107,7 @@ def unit_text(service: Service, environment: Mapping[str, str]) -> str:
         check_written("group", group, NAME)
     for word in service.command:
         check_written("command", word, LINE)
-    names = (*PASSED, *OF_SOURCED_ROS) if environment.get(OF_SOURCED_ROS[0]) else PASSED
-    passed = {name: check_written(name, environment[name], LINE) for name in names if environment.get(name)}
-    passed |= service.variables
-    for name, value in service.variables.items():
-        check_written(name, value, LINE)
+    passed = variables_of(service, environment)
     return UNIT.format(
         mark=MARK,
         system=service.system,
@@ -127,6 +123,13 @@ def unit_text(service: Service, environment: Mapping[str, str]) -> str:
         rtprio=RT_LIMIT,
         name=service.name,
     )
+
+
+def variables_of(service: Service, environment: Mapping[str, str]) -> dict[str, str]:
+    """The environment of a unit, beside what systemd gives; arguments and errors as in `unit_text`."""
+    names = (*PASSED, *OF_SOURCED_ROS) if environment.get(OF_SOURCED_ROS[0]) else PASSED
+    passed = {name: environment[name] for name in names if environment.get(name)} | dict(service.variables)
+    return {name: check_written(name, value, LINE) for name, value in passed.items()}
 
 
 def command_of(text: str) -> tuple[str, ...]:

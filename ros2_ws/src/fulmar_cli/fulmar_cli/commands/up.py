@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import sys
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -11,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from fulmar_bringup.console import log_line, write_line
+from fulmar_bringup.console import log_line, print_json, write_line
 from fulmar_bringup.progress import live_line
 from fulmar_cli.commands import arguments as cli
 from fulmar_cli.commands.arguments import argument, dated_folder, flag, option
@@ -55,8 +53,11 @@ def up(
     recording: Annotated[str | None, option("whole|ring|goals", RECORDING_HELP)] = None,
     service: Annotated[bool, flag("--service", SERVICE_HELP)] = False,
     only: Annotated[str | None, option("plant|controller", ONLY_HELP)] = None,
+    dry_run: Annotated[
+        bool, flag("--dry-run", "Check everything, say what would start, and start nothing.")
+    ] = False,
     as_json: Annotated[
-        bool, flag("--json", "Print one JSON object a line for each event, and nothing else.")
+        bool, cli.json_flag("Print one JSON object a line for each event, and nothing else.")
     ] = False,
     extras: tuple[str, ...] = (),
 ) -> None:
@@ -103,6 +104,8 @@ def up(
     plan = checked(completed(plan))
     check_plan(plan)
     log_line(plan.line)
+    if dry_run:
+        return
     report = _print_json if as_json else _print_words
     with live_line() as show:
         end = (keep_controller_up if only == CONTROLLER else keep_up)(plan, report, show)
@@ -114,8 +117,7 @@ def up(
 
 
 def _print_json(event: str, **fields: Any) -> None:
-    sys.stdout.write(json.dumps({"event": event, "wall_s": round(time.time(), 3), **fields}) + "\n")
-    sys.stdout.flush()
+    print_json({"event": event, "wall_s": round(time.time(), 3), **fields}, indent=None)
 
 
 def _print_words(event: str, **fields: Any) -> None:

@@ -24,7 +24,8 @@ from fulmar_bringup.service.installation import (
     write_files,
 )
 from fulmar_bringup.service.own_places import module_path, whole_paths
-from fulmar_bringup.service.unit import Service, known_groups, unit_text
+from fulmar_bringup.service.trial import try_once
+from fulmar_bringup.service.unit import Service, known_groups, unit_text, variables_of
 from fulmar_bringup.system_plan import system_plan
 from fulmar_cli.installation.extras import check_plan
 from fulmar_core.config.errors import ConfigError, FulmarError
@@ -57,9 +58,16 @@ class PlannedService:
 
     files: Files
     texts: dict[Path, str]  # content of each file
+    service: Service
+    variables: dict[str, str]  # of its environment
 
     def write(self) -> tuple[list[Path], bool]:
-        """Write the files, and start the service where systemd runs; returns the files, and whether it was started."""
+        """Try the service, write its files, and start it where systemd runs; returns them, and whether it was started.
+
+        Raises:
+            ConfigError: It would not start.
+        """
+        try_once(self.service, self.variables, as_user=self.files.root == Path("/"))
         written = write_files(self.files, self.texts)
         if not systemd_runs(self.files.root):
             return written, False
@@ -112,7 +120,10 @@ def plan_service(wanted: Wanted, root: Path, *, dry_run: bool) -> PlannedService
         )
     rules: tuple[str, ...] = ()
     groups: tuple[str, ...] = ()
-    own = [name for name in (plan.controller, plan.task) if is_own(name)]
+    robot = load_robot(plan.robot)
+    sensors = [sensor.sensor for sensor in robot.sensors.own.values()]
+    chosen = (plan.controller, plan.task, *plan.guards.files, *sensors)
+    own = [name for name in chosen if is_own(name)]
     own += [node.module for node in plan.nodes]
     if plan.hardware:
         file = load_hardware(plan.hardware)
@@ -121,8 +132,6 @@ def plan_service(wanted: Wanted, root: Path, *, dry_run: bool) -> PlannedService
         if root == Path("/"):
             _warn_of_absence(plan.hardware)
     user = _user(wanted.user, root)
-    if root == Path("/") and not dry_run:
-        _check_program(str(_program()), user)
     known = known_groups(groups, (group.gr_name for group in grp.getgrall()))
     for group in set(groups) - set(known):
         warn(
@@ -137,10 +146,11 @@ def plan_service(wanted: Wanted, root: Path, *, dry_run: bool) -> PlannedService
         user,
         known,
         whole_paths(os.environ) | module_path(own, os.environ),
-        lands=not load_robot(plan.robot).kind.rests,
+        lands=not robot.kind.rests,
     )
     files = Files(root, service.name)
-    return PlannedService(files, texts_of(files, unit_text(service, os.environ), rules))
+    texts = texts_of(files, unit_text(service, os.environ), rules)
+    return PlannedService(files, texts, service, variables_of(service, os.environ))
 
 
 def _options(wanted: Wanted, hardware: str | None, policy: Path | None) -> list[str]:
@@ -194,31 +204,6 @@ def _names_of_root(root: Path) -> set[str]:
         return set()
     entries = [line.split(":") for line in lines]
     return {entry[0] for entry in entries if len(entry) > 2 and entry[2] == "0"}
-
-
-def _check_program(program: str, user: str) -> None:
-    """Refuse a program that the user of the service may not run, such as one in the home of root.
-
-    Raises:
-        ConfigError: With what the attempt said.
-    """
-    about = pwd.getpwnam(user)
-    try:
-        done = subprocess.run(
-            [program, "--version"],
-            user=about.pw_uid,
-            group=about.pw_gid,
-            cwd="/",
-            capture_output=True,
-            check=False,
-        )
-        words = done.stderr.decode(errors="replace").strip().splitlines()[-1:] if done.returncode else []
-    except OSError as error:
-        words = [str(error)]
-    if words:
-        raise ConfigError(
-            f"'{user}' cannot run {program} ({words[0]}). Install Fulmar where that user may read it."
-        )
 
 
 def _warn_of_absence(hardware: str) -> None:
