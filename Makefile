@@ -71,6 +71,7 @@ help: ## Show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' Makefile
 	@echo
 	@echo "  PYTHON=python3.12    interpreter of .venv (3.11 to 3.14)"
+	@echo "  EXTRA='jsbsim gym'   extras that 'make with' adds: cluster datasets events gym jsbsim train wandb"
 	@echo "  PYTEST_ARGS='-k lqr' more arguments for pytest in 'make test'"
 
 .PHONY: setup
@@ -78,6 +79,10 @@ setup: $(RUN_STAMP) ## Install what a robot or a simulation needs (no torch; 0.9
 
 .PHONY: tf
 tf: $(RUN_STAMP) $(TF_STAMP) ## Build the message package of /tf, for RViz and Foxglove (needs a C++ compiler)
+
+.PHONY: with
+with: $(RUN_STAMP) ## Add an extra of pyproject.toml, without the rest of `make dev`: make with EXTRA=jsbsim
+	@$(BIN)/python -m fulmar_cli.installation.add_extra $(EXTRA)
 
 .PHONY: dev
 dev: $(DEV_STAMP) $(if $(HAS_ROS_WHEELS),$(TF_STAMP)) $(STARS_STAMP) ## Install everything, also for training and tests (7.2 GiB)

@@ -8,7 +8,12 @@ from __future__ import annotations
 
 from typing import Any
 
-import gymnasium
+try:
+    import gymnasium
+except ModuleNotFoundError as error:
+    raise ModuleNotFoundError(
+        "the tasks need gymnasium, which the extra 'gym' brings: make with EXTRA=gym", name=error.name
+    ) from error
 
 from fulmar_core.config.paths import config_names
 from fulmar_core.robots.robot import Robot

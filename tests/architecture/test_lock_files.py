@@ -17,7 +17,7 @@ RUN_LOCK, DEV_LOCK, PEERS_LOCK = "requirements.lock", "requirements-dev.lock", "
 LOCKS = [RUN_LOCK, DEV_LOCK, PEERS_LOCK]
 PYTHONS = ["3.11", "3.12", "3.13", "3.14"]
 RUN_EXTRAS = ["ros", "sim", "policy", "bags", "hardware", "view"]
-DEV_EXTRAS = ["events", "jsbsim", "datasets", "train", "cluster", "wandb"]
+DEV_EXTRAS = ["events", "jsbsim", "datasets", "gym", "train", "cluster", "wandb"]
 INSTALLED = [
     (RUN_LOCK, RUN_EXTRAS, ["build"]),
     (DEV_LOCK, [*RUN_EXTRAS, *DEV_EXTRAS], ["build", "dev"]),

@@ -12,6 +12,7 @@ import pytest
 TARGETS = {
     "help",
     "setup",
+    "with",
     "tf",
     "dev",
     "peers",
@@ -181,3 +182,9 @@ def test_an_old_interpreter_gets_one_clear_line(make, tmp_path):
 def test_the_makefile_has_no_absolute_path(repository):
     text = (repository / "Makefile").read_text()
     assert re.search(r"(?<![\w.)}/])/(home|usr|opt|root|tmp|work|var)\b", text) is None
+
+
+def test_an_extra_is_added_to_the_run_time_setup_alone(make, tmp_path):
+    assert make("with", "EXTRA=jsbsim gym").returncode == 0
+    assert installs(tmp_path) == ["requirements.lock"]
+    assert "-m fulmar_cli.installation.add_extra jsbsim gym" in (tmp_path / "calls.log").read_text()

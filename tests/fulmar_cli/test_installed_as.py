@@ -43,7 +43,10 @@ def checkout(tmp_path, installed, monkeypatch):
     return tmp_path
 
 
-@pytest.mark.parametrize(("extra", "target"), [("sim", "setup"), ("view", "setup"), ("train", "dev")])
+@pytest.mark.parametrize(
+    ("extra", "target"),
+    [("sim", "setup"), ("view", "setup"), ("train", "dev"), ("jsbsim", "with EXTRA=jsbsim")],
+)
 def test_in_a_checkout_make_adds_an_extra(extra, target, checkout, monkeypatch):
     assert install_command([extra], []) == f"make -C {checkout} {target}"
     monkeypatch.chdir(checkout)
@@ -53,6 +56,7 @@ def test_in_a_checkout_make_adds_an_extra(extra, target, checkout, monkeypatch):
 def test_in_a_checkout_one_target_adds_all_extras(checkout):
     assert install_command(["ros", "bags", "sim", "policy"], []).endswith(" setup")
     assert install_command(["sim", "train"], []).endswith(" dev")
+    assert install_command(["sim", "events", "gym"], []).endswith(" with EXTRA='events gym'")
 
 
 def test_in_another_environment_of_a_checkout_pip_adds_an_extra(tmp_path, installed):

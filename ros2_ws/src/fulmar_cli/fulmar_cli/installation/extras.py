@@ -35,13 +35,16 @@ EXTRAS: dict[str, tuple[str, ...]] = {
     "jsbsim": ("jsbsim",),
     "datasets": ("pyarrow",),
     "train": ("torch", "stable_baselines3", "sb3_contrib", "gymnasium", "onnx", "tensorboard"),
+    "gym": ("gymnasium",),  # which `train` brings, too
     "cluster": ("ray",),
     "wandb": ("wandb",),
 }
 
 
-def advice_for(error: ModuleNotFoundError) -> str | None:
-    """How to install a module that is missing; None if no extra brings it."""
+def advice_for(error: ImportError) -> str | None:
+    """What to do about a module that is missing or broken; None if no extra brings it."""
+    if not isinstance(error, ModuleNotFoundError):
+        return f"{str(error).partition(chr(10))[0]}. `fulmar doctor` says what is wrong here."
     missing = (error.name or "").partition(".")[0]
     return _advice([missing]) if _extra_of(missing) else None
 

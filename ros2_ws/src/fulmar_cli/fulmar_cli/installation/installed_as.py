@@ -108,9 +108,17 @@ def _for_a_workspace(extras: Sequence[str], modules: Sequence[str]) -> str:
 
 def _for_a_checkout(folder: Path, extras: Sequence[str]) -> str:
     if Path(sys.prefix).resolve() == (folder / ".venv").resolve():
-        target = "setup" if set(extras) <= {"run", *EXTRAS_OF_SETUP} else "dev"
+        target = _target(extras)
         return f"make {target}" if folder == Path.cwd() else f"make -C {shlex.quote(str(folder))} {target}"
     return f"{_pip()} -e {shlex.quote(str(folder) + _in_brackets(extras))}"
+
+
+def _target(extras: Sequence[str]) -> str:
+    """The target of make that brings extras: the smallest, but for training, which is most of `make dev` anyway."""
+    more = [extra for extra in extras if extra not in ("run", *EXTRAS_OF_SETUP)]
+    if not more:
+        return "setup"
+    return "dev" if "train" in more else f"with EXTRA={shlex.quote(' '.join(more))}"
 
 
 def _pip() -> str:
