@@ -13,7 +13,7 @@ from hardware_drivers.feedback import DeviceTime, Report
 
 MILLI_G = 9.80665e-3  # [m/s²]
 FRESH_MS = 200.0  # an attitude and a position further apart in time make no report
-UNKNOWN_MV = 65535  # of a battery that is not measured
+UNKNOWN_MV = 65535  # of a battery that is not measured; ArduPilot without a battery monitor sends 0
 
 
 class Telemetry:
@@ -49,7 +49,7 @@ class Telemetry:
             self._imu = ImuSample(MILLI_G * np.array([ahead, -right, -down]), turn)
         elif kind == "SYS_STATUS":
             millivolts = message.voltage_battery
-            self.voltage = "" if millivolts == UNKNOWN_MV else f"{1e-3 * millivolts:.1f}"
+            self.voltage = "" if millivolts in (0, UNKNOWN_MV) else f"{1e-3 * millivolts:.1f}"
         elif kind == "LOCAL_POSITION_NED" and self._attitude is not None:
             state = state_of(message, self._attitude)
             if state is not None:

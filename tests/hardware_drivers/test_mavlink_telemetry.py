@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -86,8 +87,9 @@ def test_spoilt_bytes_are_survived_and_the_next_message_is_found(chunks):
     assert telemetry.voltage == "15.8"
 
 
-def test_a_voltage_that_is_not_measured_is_not_known():
+@pytest.mark.parametrize("unknown", [UNKNOWN_MV, 0])
+def test_a_voltage_that_is_not_measured_is_not_known(unknown):
     telemetry, sender = Telemetry(), decoder()
     telemetry.take(sender.sys_status_encode(0, 0, 0, 100, 15800, -1, 80, 0, 0, 0, 0, 0, 0), NOW_NS)
-    telemetry.take(sender.sys_status_encode(0, 0, 0, 100, UNKNOWN_MV, -1, 80, 0, 0, 0, 0, 0, 0), NOW_NS)
+    telemetry.take(sender.sys_status_encode(0, 0, 0, 100, unknown, -1, 80, 0, 0, 0, 0, 0, 0), NOW_NS)
     assert telemetry.voltage == ""
