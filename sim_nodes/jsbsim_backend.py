@@ -19,7 +19,16 @@ from fulmar_core.robots.sensors.kind import Truth
 from fulmar_core.robots.sensors.simulated import SimulatedSensors
 from fulmar_core.simulation.backend import Sample
 from fulmar_core.simulation.episode import Episode
-from fulmar_core.states.attitude import Quaternion, euler_of, from_euler, minus, product, turn, turn_back
+from fulmar_core.states.attitude import (
+    Quaternion,
+    Vector,
+    euler_of,
+    from_euler,
+    minus,
+    product,
+    turn,
+    turn_back,
+)
 from fulmar_core.states.spatial import SpatialState
 from fulmar_core.states.state import RigidBodyState
 from fulmar_core.tasks import Task
@@ -81,6 +90,8 @@ class JsbsimBackend:
         self._world.begin_episode(episode)
         self._gust: Gust | None = None
         self._time_s, self._lost = 0.0, False
+        actuation = self._world.actuation
+        actuation.hold(self.craft.level(actuation.applied[:, 0])[:, None])
         self._begin(episode.start)
         self._truth = self._read()
         return self._sample(self._world.first_measurement(self._truth, seed=seed, number=number))
@@ -124,12 +135,12 @@ class JsbsimBackend:
         roll, pitch, yaw = (float(angle[0]) for angle in euler_of(state.quat))
         model = self._model
         self.craft.start(model)
-        model["ic/terrain-elevation-ft"] = 0.0
+        model["ic/terrain-elevation-ft"] = self._altitude / FOOT
         model["ic/lat-gc-rad"], model["ic/long-gc-rad"] = (
             float(state.y[0]) / RADIUS_M,
             float(state.x[0]) / RADIUS_M,
         )
-        model["ic/h-sl-ft"] = float(state.z[0]) / FOOT
+        model["ic/h-sl-ft"] = (self._altitude + float(state.z[0])) / FOOT
         model["ic/phi-rad"], model["ic/theta-rad"] = roll, -pitch
         model["ic/psi-true-rad"] = math.remainder(0.5 * math.pi - yaw, 2.0 * math.pi)
         velocity = flipped(turn_back(state.quat, state.velocity))
@@ -137,8 +148,15 @@ class JsbsimBackend:
             model[f"ic/{axis}-fps"] = float(part[0]) / FOOT
         for axis, part in zip("pqr", flipped(state.rate), strict=True):
             model[f"ic/{axis}-rad_sec"] = float(part[0])
-        self.make_safe()
+        self.craft.steer(model, self._world.actuation.applied[:, 0])
+        self._set_wind(self._mean_wind())
         model.run_ic()
+
+    @property
+    def _altitude(self) -> float:
+        """Of the ground above mean sea level [m]."""
+        world: Any = self._world.world
+        return float(world.altitude[0])
 
     def _in_its_axes(self, state: SpatialState) -> SpatialState:
         """A state of the robot's body, with attitude and turn rate of the model's axes."""
@@ -150,9 +168,16 @@ class JsbsimBackend:
         """Let the air move: wind, and the gusts along the craft's axes."""
         world: Any = self._world.world
         self._gust = self._dynamics.gust(state, self._world.actuation, world, dt)
-        wind = (world.wind[0], world.wind[1], world.wind[2])
+        wind = self._mean_wind()
         if self._gust is not None:
             wind = minus(wind, turn(state.quat, flipped(tuple(-part for part in self._gust[:3]))))
+        self._set_wind(wind)
+
+    def _mean_wind(self) -> Vector:
+        world: Any = self._world.world
+        return world.wind[0], world.wind[1], world.wind[2]
+
+    def _set_wind(self, wind: Vector) -> None:
         east, north, up = (float(part[0]) for part in wind)
         for name, value in (("north", north), ("east", east), ("down", -up)):
             self._model[f"atmosphere/wind-{name}-fps"] = value / FOOT
@@ -174,7 +199,7 @@ class JsbsimBackend:
             [
                 model["position/long-gc-rad"] * RADIUS_M,
                 model["position/lat-gc-rad"] * RADIUS_M,
-                model["position/h-sl-meters"],
+                model["position/h-sl-meters"] - self._altitude,
             ]
         )
         north, east, down = (model[f"velocities/v-{name}-fps"] * FOOT for name in ("north", "east", "down"))

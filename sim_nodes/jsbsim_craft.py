@@ -32,6 +32,10 @@ class JsbsimCraft(Protocol):
         """Make a model ready to fly from the state that its `ic/` properties are given next."""
         ...
 
+    def level(self, command: np.ndarray) -> np.ndarray:
+        """What level flight of the model takes, of what that of the robot takes, shape (n,)."""
+        ...
+
     def steer(self, model: jsbsim.FGFDMExec, applied: np.ndarray) -> None:
         """Pass deflections [rad] and thrust levels on, shape (n,)."""
         ...
@@ -90,6 +94,10 @@ class ExportedCraft:
 
     def start(self, model: jsbsim.FGFDMExec) -> None:
         """See `JsbsimCraft.start`: nothing has to."""
+
+    def level(self, command: np.ndarray) -> np.ndarray:
+        """See `JsbsimCraft.level`: the same."""
+        return command
 
     def steer(self, model: jsbsim.FGFDMExec, applied: np.ndarray) -> None:
         """See `JsbsimCraft.steer`."""

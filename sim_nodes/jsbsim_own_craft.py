@@ -89,6 +89,10 @@ class OwnCraft:
         for _ in range(self._steps(SPIN_UP_S)):
             model.run()
 
+    def level(self, command: np.ndarray) -> np.ndarray:
+        """See `JsbsimCraft.level`: surfaces are rigged for the robot's; the throttle is the model's own."""
+        return np.array([*command[: len(self.controls)], *[self.throttle] * self._motors])
+
     def steer(self, model: jsbsim.FGFDMExec, applied: np.ndarray) -> None:
         """See `JsbsimCraft.steer`."""
         for control, deflection in zip(self.controls, applied, strict=False):

@@ -41,12 +41,13 @@ class OneWorld:
     def begin_episode(self, episode: Episode) -> None:
         """Take the world of an episode, without a batch axis; actuators begin as its start has them."""
         self.world = episode.world.mapped(lambda part: np.asarray(part, dtype=float)[..., None])
+        command = self._safe if episode.command is None else np.asarray(episode.command, dtype=float)[:, None]
         response = self._robot.actuators.response
         opening_s = float(response.opening_delay_s + self.world.opening_delay[0])
         self.latest_s = float(response.delay_s + self.world.action_delay[0]) + opening_s
         self.actuation = actuation_of(
             self._robot,
-            self._safe,
+            command * self.world.alive,
             opens_late=opening_s > 0.0,
             latest_s=self.latest_s,
             step_s=self._robot.timing.physics_dt,  # in real time a command may come at every tick

@@ -34,7 +34,9 @@ BACKENDS = {
 @pytest.mark.parametrize("name", BACKENDS)
 def test_a_surface_follows_a_step_as_its_servo_does(name):
     backend = BACKENDS[name]()
-    backend.reset(draw_episode(ROBOT, TASK, EXACT, seed=4, number=0), seed=4)
+    episode = draw_episode(ROBOT, TASK, EXACT, seed=4, number=0)
+    began = episode.command
+    backend.reset(episode, seed=4)
     command = find_trim(ROBOT, 28.0, 1.0).command + np.array([0.05, 0.0, 0.0, 0.0, 0.0])
     found = [backend.step(command).readings["surfaces"].value for _ in range(30)]
     backend.close()
@@ -44,10 +46,10 @@ def test_a_surface_follows_a_step_as_its_servo_does(name):
     t = 0.01 * np.arange(1, 31)
     decay = np.exp(-damping * rate * t)
     answer = 1.0 - decay * (np.cos(swing * t) + damping * rate / swing * np.sin(swing * t))
-    np.testing.assert_allclose([each.positions[0] for each in found], command[0] * answer, rtol=0, atol=1e-9)
-    np.testing.assert_allclose(
-        [each.positions[3] for each in found], command[3] * (1.0 - np.exp(-t / 0.2)), rtol=0, atol=1e-9
-    )
+    elevator = began[0] + (command[0] - began[0]) * answer
+    np.testing.assert_allclose([each.positions[0] for each in found], elevator, rtol=0, atol=1e-9)
+    throttle = began[3] + (command[3] - began[3]) * (1.0 - np.exp(-t / 0.2))
+    np.testing.assert_allclose([each.positions[3] for each in found], throttle, rtol=0, atol=1e-9)
 
 
 def test_only_deflections_have_noise_and_steps():

@@ -238,7 +238,8 @@ class PlantNode(LifecycleNode):
         assert self._backend is not None
         sample = self._backend.reset(episode, seed=seed, number=number)
         with self.wires.lock:
-            self.guard.reset()  # actuators begin at rest, not where the episode before left them
+            self.guard.reset()  # actuators begin with the episode, not where the one before left them
+            self.guard.begin_with(episode.command)
         self._feedback.reset()
         self._lockstep.run(sample, steps, self._stop, on_step)
 
@@ -313,7 +314,11 @@ class PlantNode(LifecycleNode):
         try:
             self._wait_for_subscribers()
             self.health.mode = "running"
-            sample = backend.reset(first_episode(self.robot, self.settings), seed=self.settings.seed)
+            episode = first_episode(self.robot, self.settings)
+            sample = backend.reset(episode, seed=self.settings.seed)
+            if self._simulated:
+                with self.wires.lock:
+                    self.guard.begin_with(episode.command)
             if self.settings.lockstep:
                 steps = self._count(1.0 / self.settings.control_rate(self.robot))
                 self._lockstep.run(sample, steps, self._stop)

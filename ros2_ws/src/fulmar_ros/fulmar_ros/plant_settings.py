@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
 from fulmar_core.config.errors import ConfigError
-from fulmar_core.dynamics.flight_trim import flying_at
+from fulmar_core.dynamics.by_kind import begin_of
 from fulmar_core.robots.robot import Robot
 from fulmar_core.safety.watchdog import checked_timeout, default_timeout
 from fulmar_core.simulation.episode import Episode, draw_episode
@@ -97,7 +99,7 @@ class PlantSettings:
 
 
 def first_episode(robot: Robot, settings: PlantSettings) -> Episode:
-    """The seed's episode, begun at rest where the parameters say.
+    """The seed's episode, begun where the parameters say: at rest, or, of an aircraft, in level flight through its air.
 
     Raises:
         ConfigError: A name is unknown, a file is wrong, the task is of the other space, or six numbers are the start
@@ -112,6 +114,7 @@ def first_episode(robot: Robot, settings: PlantSettings) -> Episode:
     if task.state_type is not form:
         task.check(robot)
     episode = draw_episode(robot, task, scenario, seed=settings.seed, number=0)
-    pose = form.target_at(settings.start)
-    start = flying_at(robot, pose) if robot.flies else form.resting(pose)
-    return Episode(start, episode.goal, episode.world)
+    pose, begin = np.asarray(form.target_at(settings.start)), begin_of(robot)
+    worlds = episode.world.mapped(lambda part: np.asarray(part)[..., None])
+    starts, commands = begin.in_world(robot, begin.at(robot, pose)[None], worlds)
+    return Episode(starts[0], episode.goal, episode.world, commands[0])

@@ -5,7 +5,10 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
+
+import numpy as np
 
 from fulmar_core.dynamics.actuators.actuation import ActuationState
 from fulmar_core.dynamics.actuators.flight_actuation import FlightActuation
@@ -19,6 +22,7 @@ from fulmar_core.dynamics.batch_dynamics import (
     SpatialDynamics,
 )
 from fulmar_core.dynamics.flight_dynamics import FlightDynamics
+from fulmar_core.dynamics.flight_trim import flying_at, in_trim, level_command
 from fulmar_core.robots.actuators.families import row_of
 from fulmar_core.robots.actuators.family import Actuators
 from fulmar_core.robots.robot import Robot
@@ -61,6 +65,33 @@ ACTUATIONS: dict[str, Callable[..., ActuationState]] = {
     "reaction_wheels": WheelActuation,
     "control_surfaces": FlightActuation,
 }
+
+
+def _safe_at_rest(robot: Robot, state: Any) -> np.ndarray:
+    return np.tile(robot.actuators.safe_command, (len(state.like), 1))
+
+
+@dataclass(frozen=True)
+class Begin:
+    """How robots of a kind begin: at rest, in the safe state of their actuators, unless it says otherwise."""
+
+    # A robot, and a pose of 7 numbers: its state there in still air, shapes ().
+    at: Callable[[Robot, Array], Any] = lambda robot, pose: robot.state_type.resting(pose)
+    # A robot, starts as a task draws them, shapes (n,), and their worlds: starts, and what actuators do, shape (n, m).
+    in_world: Callable[[Robot, Any, Any], tuple[Any, np.ndarray]] = lambda robot, start, world: (
+        start,
+        _safe_at_rest(robot, start),
+    )
+    # A robot, and measured states, shapes (n,): what actuators do there before anything was commanded, shape (n, m).
+    command: Callable[[Robot, Any], np.ndarray] = _safe_at_rest
+
+
+BEGINS: dict[str, Begin] = defaultdict(Begin, aircraft=Begin(flying_at, in_trim, level_command))
+
+
+def begin_of(robot: Robot) -> Begin:
+    """How a robot begins."""
+    return BEGINS[robot.kind.name]
 
 
 def dynamics_of(robot: Robot, scenario: Scenario | None = None) -> Dynamics[Any, Any]:

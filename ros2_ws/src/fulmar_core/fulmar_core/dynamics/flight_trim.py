@@ -1,4 +1,4 @@
-"""Steady level flight: the attitude, the deflections and the throttle that leave no acceleration."""
+"""Steady level flight: the attitude, the deflections and the throttle that leave no acceleration; how flights begin."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ import numpy as np
 
 from fulmar_core.config.errors import ConfigError
 from fulmar_core.dynamics.flight_dynamics import FlightDynamics, FlightWorld
+from fulmar_core.dynamics.level_flight import NUDGE, LevelFlight
 from fulmar_core.dynamics.rigid_body import inertia_of, turn_acceleration
 from fulmar_core.robots.robot import Robot
-from fulmar_core.states.attitude import euler_of, from_euler, product, turn
+from fulmar_core.states.attitude import Quaternion, conjugate, euler_of, from_euler, plus, product, turn
 from fulmar_core.states.counter_rng import Draws
 from fulmar_core.states.gravity import GRAVITY
 from fulmar_core.states.spatial import SpatialState
@@ -106,12 +107,58 @@ def find_trim(robot: Robot, speed: float, height: float | None = None, altitude:
     return problem.trim(found.x, height, altitude)
 
 
+def nominal_flight(robot: Robot, height: np.ndarray) -> LevelFlight:
+    """Level flight of the robot as its file has it, over ground at sea level, at heights (n,) [m]."""
+    return LevelFlight(robot, still_air(robot, len(height)), height)
+
+
+def level_command(robot: Robot, state: SpatialState) -> np.ndarray:
+    """What actuators do in level flight at the heights of states, shapes (n,): shape (n, m)."""
+    return nominal_flight(robot, np.asarray(state.z, dtype=float)).command
+
+
+def in_trim(robot: Robot, start: SpatialState, world: FlightWorld) -> tuple[SpatialState, np.ndarray]:
+    """Starts that were drawn for still air at sea level, in the air of their worlds, and what actuators do there.
+
+    Wind carries a craft along: it flies through the air as it was drawn, and over the ground with the wind besides.
+
+    Args:
+        robot: An aircraft.
+        start: Velocities through the air, shapes (n,).
+        world: Of each.
+
+    Returns:
+        States, whose angle of attack is that of level flight where the drawn one was, and commands, shape (n, m).
+    """
+    own, usual = LevelFlight(robot, world, start.z), nominal_flight(robot, start.z)
+    columns = dict(
+        zip(
+            ("qx", "qy", "qz", "qw"),
+            product(start.quat, product(conjugate(usual.quat), own.quat)),
+            strict=True,
+        )
+    )
+    speeds = plus(start.velocity, (world.wind[0], world.wind[1], world.wind[2]))
+    return replace(start, **columns, **dict(zip(("vx", "vy", "vz"), speeds, strict=True))), own.command
+
+
 def flying_at(robot: Robot, pose: np.ndarray) -> SpatialState:
-    """An aircraft at cruising speed at a pose of 7 numbers, on a level path along its heading, shapes ()."""
-    state = SpatialState.resting(np.asarray(pose, dtype=float))
-    heading = float(euler_of(state.quat)[2])
-    ahead = robot.wings.speed * np.array([math.cos(heading), math.sin(heading)])
-    return replace(state, vx=np.asarray(ahead[0]), vy=np.asarray(ahead[1]))
+    """An aircraft in level flight through still air at a pose of 7 numbers, shapes ().
+
+    With wings and nose level it has the attitude of its trim along the heading. Another attitude is as it is written,
+    and the air meets it as in that trim.
+    """
+    written = SpatialState.resting(np.asarray(pose, dtype=float))
+    roll, pitch, yaw = euler_of(written.quat)
+    zero = 0.0 * yaw
+    flight = nominal_flight(robot, np.atleast_1d(written.z))
+    level: Quaternion = tuple(part[0] for part in flight.quat)  # type: ignore[assignment]
+    upset = from_euler(zero, zero, yaw)
+    if max(abs(float(roll)), abs(float(pitch))) > NUDGE:
+        upset = product(written.quat, conjugate(level))
+    quat, velocity = product(upset, level), turn(upset, (zero + robot.wings.speed, zero, zero))
+    rest = written.columns()
+    return SpatialState(*rest[:3], *quat, *velocity, *rest[10:]).mapped(np.asarray)
 
 
 class _Problem:

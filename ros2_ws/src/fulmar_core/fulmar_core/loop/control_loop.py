@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from fulmar_core.controllers.controller import Controller, Inputs, Readings
+from fulmar_core.dynamics.by_kind import begin_of
 from fulmar_core.estimators.actuator_health.actuator_estimator import ActuatorEstimate, ActuatorEstimator
 from fulmar_core.estimators.actuator_health.applied import Applied, AppliedHistory
 from fulmar_core.robots.robot import Robot
@@ -35,7 +36,8 @@ class ControlLoop:
 
     Attributes:
         goal: Of all robots, leading shape (n,); None before there is one.
-        previous: Command of the step before, after every limit, shape (n, m).
+        previous: Command of the step before, after every limit, shape (n, m); where no controller chose one, what
+            actuators do by themselves.
         answered_ns: Stamp of the measurement that this was the answer to; -1 before the first [ns].
         estimate: Of the controller's actuator estimator at the newest step; None without one.
     """
@@ -69,6 +71,7 @@ class ControlLoop:
         self.goal: Goal | None = None
         self._began_ns: int | None = None
         self.previous, self.answered_ns = self._safe, -1
+        self._chosen = False  # whether the controller chose the previous command
         self._estimator = self._estimator_for(controller)
         self.estimate: ActuatorEstimate | None = None
         self._estimated_ns = -1
@@ -113,9 +116,11 @@ class ControlLoop:
             The controller's inputs.
         """
         if stamp_ns - self.answered_ns > self._pause_ns:
-            self.previous = self._safe
+            self._chosen = False
             self.reset()
         state = measured.in_float64()
+        if not self._chosen:
+            self.previous = begin_of(self.robot).command(self.robot, state)
         goal = self._advanced(state, stamp_ns)
         self._estimate(state, stamp_ns)
         observation = np.asarray(self.observer(state, goal, self.previous), dtype=float)
@@ -147,12 +152,12 @@ class ControlLoop:
         command = self._safe
         if not refusal:
             command = slewed(self.robot.actuators.limited(action), inputs.previous, self.robot, self.dt)
-        self.previous, self.answered_ns = command, inputs.stamp_ns
+        self.previous, self.answered_ns, self._chosen = command, inputs.stamp_ns, not refusal
         return Step(inputs.observation, action, command, refusal)
 
     def rest(self, stamp_ns: int) -> None:
         """Answer a measurement with the safe command, without asking the controller [ns]."""
-        self.previous, self.answered_ns = self._safe, stamp_ns
+        self.previous, self.answered_ns, self._chosen = self._safe, stamp_ns, False
 
     def _advanced(self, state: State, stamp_ns: int) -> Goal:
         """The goal with those targets done that a measurement reaches."""

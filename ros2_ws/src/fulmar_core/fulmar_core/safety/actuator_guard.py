@@ -92,6 +92,11 @@ class ActuatorGuard:
         self._handed_over_ns: int | None = None  # since when the safe controller has the actuators for good
         self.watchdog.reset()
 
+    def begin_with(self, command: np.ndarray | None) -> None:
+        """Take what simulated actuators do when an episode begins for the last command, where none came yet, (n,)."""
+        if self._taken_ns is None and command is not None:
+            self.command = self._applied_last = np.asarray(command, dtype=float)
+
     @property
     def doing(self) -> str:
         """See the class."""

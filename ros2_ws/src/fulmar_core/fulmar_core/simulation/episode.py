@@ -11,7 +11,7 @@ from typing import Generic
 import numpy as np
 
 from fulmar_core.config.errors import ConfigError
-from fulmar_core.dynamics.by_kind import dynamics_of
+from fulmar_core.dynamics.by_kind import begin_of, dynamics_of
 from fulmar_core.robots.robot import Robot
 from fulmar_core.states.counter_rng import START, WORLD, Draws
 from fulmar_core.states.state import S
@@ -28,10 +28,14 @@ class Episode(Generic[S]):
     start: S
     goal: Goal
     world: World
+    command: np.ndarray | None = (
+        None  # that actuators begin with, shape (n,) or (episodes, n); None: the safe one
+    )
 
     def __getitem__(self, index: int) -> Episode:
         """One episode out of many."""
-        return Episode(self.start[index], self.goal[index], self.world[index])
+        command = None if self.command is None else self.command[index]
+        return Episode(self.start[index], self.goal[index], self.world[index], command)
 
 
 def episode_steps(task: Task, control_dt: float) -> int:
@@ -77,7 +81,8 @@ def draw_episodes(
     repeats = np.zeros_like(numbers) if repeats is None else repeats
     start, goal = task.draw(Draws(seed, numbers, repeats, START), robot, training=training)
     world = dynamics_of(robot).draw_world(scenario, Draws(seed, numbers, repeats, WORLD))
-    return Episode(start, goal, world)
+    start, command = begin_of(robot).in_world(robot, start, world)
+    return Episode(start, goal, world, command)
 
 
 def draw_episode(robot: Robot, task: Task, scenario: Scenario, *, seed: int, number: int) -> Episode:

@@ -23,6 +23,7 @@ class Beginning(Generic[S]):
     start: S
     goal: Goal
     world: World
+    command: Array  # that actuators begin with, shape (worlds, n)
     noise_keys: Keys  # of what actuators do wrong
     reading: FirstReading
 
@@ -31,6 +32,7 @@ class Beginning(Generic[S]):
         self.start.write(index, other.start)
         self.goal.write(index, other.goal)
         self.world.write(index, other.world)
+        self.command[index] = other.command
         write_keys(self.noise_keys, index, other.noise_keys)
         self.reading.write(index, other.reading)
 

@@ -103,14 +103,12 @@ class BatchSimulation(MutableState, Generic[S]):
             noisy=scenario.sensor_noise,
             blurred=scenario.sensing.blurred,
         )
-        safe = np.tile(robot.actuators.safe_command[:, None], (1, worlds))
-        self._safe = self._real(safe)
-        self.command: Array = self._safe.T
         self._upcoming = UpcomingEpisodes(self._draw, worlds)
-        self.truth, self.goal, self.world = self._draw_parts(np.arange(worlds), np.zeros(worlds, dtype=int))
+        drawn = self._draw_parts(np.arange(worlds), np.zeros(worlds, dtype=int))
+        self.truth, self.goal, self.world, self.command = drawn
         self._actuation = actuation_of(
             robot,
-            self._safe,
+            self._applied_at_start(self.command),
             opens_late=may_open_late(robot, scenario),
             latest_s=self._latest_s,
             step_s=self.control_dt,
@@ -144,9 +142,9 @@ class BatchSimulation(MutableState, Generic[S]):
         self.goal.write(index, coming.goal[index])
         self.world.adopt(index, coming.world)
         write_keys(self._noise_keys, index, keys_at(coming.noise_keys, index))
-        self._actuation.reset(index, self._safe[:, :1])
         self.command = self._xp.asarray(self.command, copy=True)
-        self.command[index] = self._safe[:, 0]
+        self.command[index] = coming.command[index]
+        self._actuation.reset(index, self._applied_at_start(self.command)[:, index])
         self.measured = self._odometer.restart(self.truth, index, coming.reading)
 
     def put(self, state: S, goal: Goal, command: Array) -> None:
@@ -243,12 +241,17 @@ class BatchSimulation(MutableState, Generic[S]):
 
     def _draw(self, worlds: np.ndarray, repeats: np.ndarray) -> Beginning:
         """How some worlds begin, in the simulation's own arrays."""
-        start, goal, world = self._draw_parts(worlds, repeats)
+        start, goal, world, command = self._draw_parts(worlds, repeats)
         numbers, repeated = self._whole(self._first + worlds), self._whole(repeats)
         reading = self._odometer.first(start, world, numbers, repeated)
-        return Beginning(start, goal, world, self._actuator_keys(numbers, repeated), reading)
+        keys = self._actuator_keys(numbers, repeated)
+        return Beginning(start, goal, world, command, keys, reading)
 
-    def _draw_parts(self, worlds: np.ndarray, repeats: np.ndarray) -> tuple[S, Goal, World]:
+    def _applied_at_start(self, command: Array) -> Array:
+        """What actuators do at the start, shape (n, worlds): their command, where they are alive."""
+        return self._xp.asarray(command.T, copy=True) * self.world.alive
+
+    def _draw_parts(self, worlds: np.ndarray, repeats: np.ndarray) -> tuple[S, Goal, World, Array]:
         drawn = draw_episodes(
             self.robot,
             self.task,
@@ -262,6 +265,7 @@ class BatchSimulation(MutableState, Generic[S]):
             drawn.start.mapped(self._real),
             drawn.goal.mapped(self._side_by_side),
             drawn.world.mapped(self._real).packed(),
+            self._real(drawn.command),
         )
 
     def _repeats_now(self) -> np.ndarray:

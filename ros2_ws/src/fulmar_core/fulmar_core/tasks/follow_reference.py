@@ -9,7 +9,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from fulmar_core.dynamics.flight_trim import find_trim
+from fulmar_core.dynamics.flight_trim import nominal_flight
 from fulmar_core.robots.kinds.aircraft import AIRCRAFT
 from fulmar_core.robots.robot import Robot
 from fulmar_core.states.arrays import array_namespace, clip
@@ -127,13 +127,11 @@ class FollowReference(FileTask[SpatialState]):
         xp = array_namespace(held)
         goal = self._goal(held, robot.wings.speed)
         first = goal.targets[:, 0]
-        mean = float(xp.mean(first[:, 2]))
-        trim = find_trim(robot, robot.wings.speed, max(mean, 0.1 * robot.wings.span)).state
         zero = xp.zeros_like(held)
-        level = trim.mapped(lambda part: zero + float(part))
         turned = exponential(scaled(math.pi / 180.0 * tilt, about))
         place = zero, first[:, 1] + aside, first[:, 2] + above
-        state = SpatialState(*place, *product(level.quat, turned), *level.velocity, zero, zero, zero)
+        quat = product(nominal_flight(robot, place[2]).quat, turned)
+        state = SpatialState(*place, *quat, zero + robot.wings.speed, *(zero for _ in range(5)))
         return state, goal
 
     def _goal(self, held: Array, speed: float) -> Goal:

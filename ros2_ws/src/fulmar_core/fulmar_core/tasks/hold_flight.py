@@ -9,7 +9,7 @@ from typing import ClassVar, Literal, Self
 
 import numpy as np
 
-from fulmar_core.dynamics.flight_trim import Trim, find_trim
+from fulmar_core.dynamics.flight_trim import Trim, find_trim, nominal_flight
 from fulmar_core.robots.kinds.aircraft import AIRCRAFT
 from fulmar_core.robots.robot import Robot
 from fulmar_core.states.arrays import array_namespace, clip
@@ -107,11 +107,11 @@ class _HoldFlight(FileTask[SpatialState]):
         tilt = math.pi / 180.0 * draws.uniform(*self.start.tilt_deg)
         about = uniform_direction(draws.uniform(0.0, 1.0), draws.uniform(0.0, 1.0))
         zero = 0.0 * height
-        level = trim.state.mapped(lambda part: zero + float(part))
         upset = exponential(scaled(tilt, about))
+        quat = product(upset, nominal_flight(robot, height).quat)
         # Angles of attack and sideslip are those of level flight: the velocity is turned with the craft.
         state = SpatialState(
-            zero, zero, height, *product(upset, level.quat), *turn(upset, level.velocity), zero, zero, zero
+            zero, zero, height, *quat, *turn(upset, (zero + trim.speed, zero, zero)), zero, zero, zero
         )
         return state, goals_at(np.asarray(self._targets(draws, trim, height)))
 
