@@ -209,15 +209,15 @@ def _add_forces(out: Node, frame: Airframe, craft: ControlSurfaces) -> None:
     density = _times(_get("atmosphere/rho-slugs_ft3"), _value(SLUG_FT3))
     push = _times(_value(0.5 * frame.area), density, speed, speed)
     out.append(_function("fulmar/push", push))
-    mirrored = -1.0 if frame.wind_axes == "mirrored" else 1.0
-    for name, kind, angle in (
-        ("ca", "cos", "alpha"),
-        ("sa", "sin", "alpha"),
-        ("cb", "cos", "beta"),
-        ("sb", "sin", "beta"),
+    slip = {"standard": 1.0, "mirrored": -1.0, "stability": 0.0}[frame.wind_axes]
+    for name, kind, angle, share in (
+        ("ca", "cos", "alpha", 1.0),
+        ("sa", "sin", "alpha", 1.0),
+        ("cb", "cos", "beta", slip),
+        ("sb", "sin", "beta", slip),
     ):
-        turned = _node(kind, _get(f"aero/{angle}-rad"))
-        out.append(_function(f"fulmar/{name}", _times(turned, _value(mirrored if name == "sb" else 1.0))))
+        turned = _node(kind, _times(_get(f"aero/{angle}-rad"), _value(share)))
+        out.append(_function(f"fulmar/{name}", turned))
     ca, sa, cb, sb = (_get(f"fulmar/{name}") for name in ("ca", "sa", "cb", "sb"))
     lift, drag, side = _get("fulmar/CL"), _get("fulmar/CD"), _get("fulmar/CY-free")
     along = _plus(_times(_value(-1.0), drag, cb), _times(_value(-1.0), side, sb))

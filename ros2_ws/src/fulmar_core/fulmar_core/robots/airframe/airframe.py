@@ -34,9 +34,11 @@ class Airframe:
     stall_deg: float  # angle of attack beyond which the coefficients say nothing [deg]
     aerodynamics: Coefficients
     ground_effect: GroundEffect | None = None  # None: free air at every height
-    # mirrored: lift and drag are turned into the body with the sign of the sideslip reversed, as PyFly and FALCON-S
-    # have it by mistake; for an aircraft whose flights are to be theirs.
-    wind_axes: Literal["standard", "mirrored"] = "standard"
+    # Axes that CD, CY and CL are along. standard: those of the wind. stability: turned by the angle of attack alone, as
+    # derivatives of textbooks are, so that CY is along the body's y and no drag of a sideslip is. mirrored: turned into
+    # the body with the sign of the sideslip reversed, as PyFly and FALCON-S have it by mistake; for an aircraft whose
+    # flights are to be theirs.
+    wind_axes: Literal["standard", "stability", "mirrored"] = "standard"
     estimated: bool = False  # True: the source has gaps, and numbers here are no figures to compare with
     jsbsim: tuple[str, ...] = ()  # models that come with JSBSim and may stand for the craft, as jsbsim:NAME
 
@@ -96,12 +98,14 @@ class Airframe:
         """Force [N] and moment about the centre of mass [N·m], x ahead, y to the right, z down.
 
         Lift and drag are along the wind's axes: rotation by the angle of attack and the sideslip (Stevens, Lewis and
-        Johnson, Aircraft Control and Simulation, 2016, §2.3).
+        Johnson, Aircraft Control and Simulation, 2016, §2.3), or along others, see `wind_axes`.
         """
         c, push = coefficients, 0.5 * density * air.speed * air.speed * self.area
         ca, sa, cb, sb = air.turned
         if self.wind_axes == "mirrored":
             sb = -sb
+        if self.wind_axes == "stability":
+            cb, sb = 1.0 + 0.0 * cb, 0.0 * sb
         along = -c["CD"] * cb - c["CY"] * sb
         force = (
             push * (along * ca + c["CL"] * sa),
