@@ -39,6 +39,7 @@ from fulmar_core.worlds.spatial_world import (
     SpatialWorld,
     draw_spatial_world,
     grown,
+    half_a_step_on,
     magnetic_field,
     orbit_torque,
     push_in_world,
@@ -263,10 +264,13 @@ class SpatialDynamics(Dynamics[SpatialWorld, SpatialState]):
     def outside(self, state: SpatialState, world: SpatialWorld, time_s: Array, control_dt: float) -> Push:
         """Force along the world's axes [N], and torque about the body's [N·m]; see `Dynamics.outside`.
 
-        The torque is that of an orbit, and left out where no world has one; the constant one of a world is not in it.
+        The torque is that of an orbit in the middle of the step, and left out where no world has one; the constant one
+        of a world is not in it.
         """
         force = push_in_world(world, time_s, control_dt)
-        return (*force, *orbit_torque(state, world, time_s)) if self._orbits else force
+        if not self._orbits:
+            return force
+        return *force, *orbit_torque(half_a_step_on(state, control_dt), world, time_s + 0.5 * control_dt)
 
     def push_is_constant(self, world: SpatialWorld) -> bool:
         """See `Dynamics.push_is_constant`."""
@@ -326,18 +330,19 @@ class GyrostatDynamics(SpatialDynamics):
         self._magnetic = unloading is not None and unloading.kind == "magnetic"
 
     def outside(self, state: SpatialState, world: SpatialWorld, time_s: Array, control_dt: float) -> Push:
-        """Ten numbers, held over a control step; see `Dynamics.outside`.
+        """Ten numbers, held over a control step, as in the middle of it; see `Dynamics.outside`.
 
         Force along the world's axes [N], torque about the body's [N·m] with the constant one, direction of the magnetic
         field in the world, and factor on the inertia.
         """
         growth = grown(world, time_s)
         steady: Vector = (world.torque[0], world.torque[1], world.torque[2])
+        amid, middle_s = half_a_step_on(state, control_dt), time_s + 0.5 * control_dt
         torque = plus(
-            plus(steady, solar_torque(state, world)), scaled(growth, orbit_torque(state, world, time_s))
+            plus(steady, solar_torque(amid, world)), scaled(growth, orbit_torque(amid, world, middle_s))
         )
         force = push_in_world(world, time_s, control_dt)
-        return (*force, *torque, *magnetic_field(world.orbit_rate, time_s), growth)
+        return (*force, *torque, *magnetic_field(world.orbit_rate, middle_s), growth)
 
     def push_is_constant(self, world: SpatialWorld) -> bool:
         """See `Dynamics.push_is_constant`."""

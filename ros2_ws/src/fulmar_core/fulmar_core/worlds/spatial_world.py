@@ -6,7 +6,7 @@ Of a scenario's parts a wave, a tether and a slope belong to robots on the floor
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.sensors.spatial_odometer import SENSED
@@ -15,7 +15,9 @@ from fulmar_core.states.attitude import (
     Tensor,
     Vector,
     cross,
+    exponential,
     length,
+    product,
     scaled,
     times,
     turn_back,
@@ -90,11 +92,20 @@ def push_in_world(world: SpatialWorld, time_s: Array, control_dt: float) -> Vect
     return x, y, z
 
 
+def half_a_step_on(state: SpatialState, control_dt: float) -> SpatialState:
+    """A state with the attitude that it has in the middle of a control step [s], where it goes on turning as it does.
+
+    A torque that is held over the step is right there to second order; that of its beginning would lag by half a step.
+    """
+    turned = product(state.quat, exponential(scaled(0.5 * control_dt, state.rate)))
+    return replace(state, **dict(zip(("qx", "qy", "qz", "qw"), turned, strict=True)))
+
+
 def orbit_torque(state: SpatialState, world: SpatialWorld, time_s: Array) -> Vector:
-    """Torque of the gravity gradient, held over a control step, about the body's axes [N·m].
+    """Torque of the gravity gradient about the body's axes [N·m].
 
     It is 3 n² u × J u, with n = √(μ/r³) the mean motion, u the way from the planet and J the inertia; see
-    `gravity_gradient_torque`. How the body turns in a control step is left aside.
+    `gravity_gradient_torque`.
 
     Args:
         state: Of the body, shapes (...,).
