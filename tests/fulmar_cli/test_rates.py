@@ -24,6 +24,7 @@ from fulmar_bags.wire_reader import WireReader
 from fulmar_cli.main import app
 from fulmar_core.config.errors import BagError, ConfigError
 from fulmar_core.dynamics.sky.events import Events, joined
+from fulmar_core.estimators.kinds import load_estimator
 from fulmar_core.robots.topics import EVENTS
 from tests.fulmar_cli.bag_commands import POLICY
 
@@ -236,3 +237,19 @@ def test_recordings_that_do_not_overlap_in_time_are_refused(later_us, dsec, tmp_
     done = fulmar("rates", dsec, right, "--size", "320x240", cwd=tmp_path)
     assert isinstance(done.error, BagError)
     assert "do not overlap in time: 'events' ends" in done.stderr
+
+
+def test_times_count_from_the_first_event_and_the_length_has_every_packet(tmp_path, recorded):
+    said = json.loads(fulmar("rates", AEDAT4, "--fov", 8.5, "--json", cwd=tmp_path).stdout)
+    lasts = int(recorded.t[-1] - recorded.t[0]) / 1e9
+    assert lasts <= said["seconds"] < lasts + 0.05
+    window = load_estimator("event_rate").window_s
+    assert said["rates"][0]["t_s"] == pytest.approx(0.5 * window, abs=0.025)
+
+
+def test_a_bag_has_the_times_of_its_recording(tmp_path):
+    kept = fulmar("rates", AEDAT4, "--fov", 8.5, "--to-bag", "night", "--json", cwd=tmp_path)
+    again = fulmar("rates", "night", "--fov", 8.5, "--json", cwd=tmp_path)
+    first, second = json.loads(kept.stdout), json.loads(again.stdout)
+    assert first["seconds"] == second["seconds"]
+    assert [rate["t_s"] for rate in first["rates"]] == [rate["t_s"] for rate in second["rates"]]

@@ -37,10 +37,10 @@ Packet = tuple[int, str, Events]  # end [ns], name of the reading, events
 class Rates:
     """Turn rates of windows."""
 
-    times_s: np.ndarray  # middles of windows from the first packet's end, shape (n,) [s]
+    times_s: np.ndarray  # middles of windows since the recording began, shape (n,) [s]
     rates: np.ndarray  # about the body's axes, shape (n, 3) [rad/s]
     stds: np.ndarray  # shape (n, 3) [rad/s]
-    seconds: float  # of the recording [s]
+    seconds: float  # of the recording, from its first event to the end of its last packet [s]
     events: int
     words: Counter[str]  # why other packets brought no rate, and refusals
 
@@ -132,34 +132,38 @@ def rates_of(
     estimator = EventRateEstimator(its, cameras)
     found: list[tuple[int, np.ndarray, np.ndarray]] = []
     words: Counter[str] = Counter()
-    first_ns = end_ns = -1
+    begun_ns = end_ns = -1
     events = 0
     spans: dict[str, tuple[int, int]] = {}  # first and last end of a packet of each camera [ns]
     for packet in packets:
         each(packet)
         end_ns, name, some = packet
-        first_ns = end_ns if first_ns < 0 else first_ns
         events += len(some)
+        begin_ns = int(some.t[0]) if len(some) else end_ns
         spans[name] = spans.get(name, (end_ns, end_ns))[0], end_ns
         _refuse_apart(spans, LONGEST_PAUSE_S)
         before = estimator.problem
         refusal = estimator.take(name, Reading(some, end_ns))
         if refusal is not None:
             words[refusal] += 1
+        elif begun_ns < 0 or begin_ns < begun_ns:
+            begun_ns = (
+                begin_ns  # of two cameras the packet that ends first need not be the one that begins first
+            )
         estimate = estimator.estimate()
         if estimate is not None and (not found or estimate.stamp_ns > found[-1][0]):
             found.append((estimate.stamp_ns, estimate.value, np.sqrt(np.diag(estimate.covariance))))
         elif estimator.problem and estimator.problem != before:
             words[estimator.problem] += 1
     _refuse_apart(spans, 0.0)
-    if first_ns < 0:
+    if end_ns < 0:
         raise BagError("there is no event in it.")
     if not found and not words:
         words[f"shorter than a window of {its.window_s:g} s"] += 1
-    times = np.array([(stamp - first_ns) / 1e9 for stamp, _, _ in found])
+    times = np.array([(stamp - begun_ns) / 1e9 for stamp, _, _ in found])
     rates = np.array([rate for _, rate, _ in found]).reshape(-1, 3)
     stds = np.array([std for _, _, std in found]).reshape(-1, 3)
-    return Rates(times, rates, stds, (end_ns - first_ns) / 1e9, events, words)
+    return Rates(times, rates, stds, (end_ns - begun_ns) / 1e9 if begun_ns >= 0 else 0.0, events, words)
 
 
 def _refuse_apart(spans: Mapping[str, tuple[int, int]], pause_s: float) -> None:
