@@ -12,6 +12,8 @@ from pathlib import Path
 import pytest
 import yaml
 from mcap.reader import NonSeekingReader, make_reader
+from mcap.records import Channel, DataEnd, Schema
+from mcap.stream_reader import StreamReader
 from mcap.writer import Writer
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
@@ -324,3 +326,43 @@ def test_recovery_states_of_a_quality_of_service_that_cannot_be_read(tmp_path, q
 def test_metadata_that_cannot_be_read_states_nothing(tmp_path, text):
     (tmp_path / "metadata.yaml").write_text(text)
     assert read_information(tmp_path) == {}
+
+
+def definitions_in(path: Path) -> list[tuple[type, int]]:
+    """Kind and number of each definition in the data of a file, chunks unpacked, in the order of the file."""
+    found = []
+    with path.open("rb") as stream:
+        for record in StreamReader(stream).records:
+            if isinstance(record, DataEnd):  # the summary after it repeats them all
+                break
+            if isinstance(record, Schema | Channel):
+                found.append((type(record), record.id))
+    return found
+
+
+@pytest.mark.parametrize("finished", [True, False])
+def test_each_definition_stands_once_whenever_its_topic_is_announced(tmp_path, finished):
+    bag = open_bag(tmp_path / "bag")
+    bag.add_topic("/robot/silent", "nav_msgs/msg/Odometry", "sensor")
+    write_words(bag, 0, 3)
+    bag.add_topic("/robot/late", "geometry_msgs/msg/Twist", "latched")  # into a chunk that has messages
+    bag.flush()
+    bag.add_topic("/robot/later", TYPE, "latched")
+    bag.flush()
+    write_words(bag, 3, 3)
+    bag.close() if finished else bag.flush()
+    found = definitions_in(file_of(tmp_path / "bag"))
+    assert len(found) == len(set(found)) == 3 + 4
+    with file_of(tmp_path / "bag").open("rb") as stream:
+        topics = {record.topic for record in StreamReader(stream).records if isinstance(record, Channel)}
+    assert topics == {TOPIC, "/robot/silent", "/robot/late", "/robot/later"}
+    assert words_by_mcap(tmp_path / "bag") == [f"word {number}" for number in range(6)]
+
+
+def test_a_recovered_file_has_each_definition_once_too(tmp_path):
+    bag = open_bag(tmp_path / "bag")
+    write_words(bag, 0, 3)
+    bag.flush()
+    recover(tmp_path / "bag")
+    found = definitions_in(file_of(tmp_path / "bag"))
+    assert len(found) == len(set(found)) == 2

@@ -198,7 +198,9 @@ class BagPart:
     def add_topic(self, topic: Topic) -> None:
         """Announce a topic; its definition is written with the next flush, even without a message."""
         kind, definition = topic.type, topic.type.definition.encode()
-        builder = RecordBuilder()
+        # The writer puts definitions into its chunk, which reaches the disk only with a message in it.
+        chunk = getattr(self._mcap, "_Writer__chunk_builder")  # noqa: B009 - a private name of another class
+        alone, builder = not chunk.num_messages, RecordBuilder()
         if kind.name not in self._schemas:
             number = self._mcap.register_schema(kind.name, SchemaEncoding.ROS2, definition)
             self._schemas[kind.name] = number
@@ -217,8 +219,9 @@ class BagPart:
             metadata=about,
             schema_id=schema,
         ).write(builder)
-        # The writer keeps its own copies for the first chunk, and a chunk without messages is never written.
-        self._file.write(builder.end())
+        if alone:
+            chunk.reset()
+            self._file.write(builder.end())
 
     def add(self, topic: str, data: bytes, *, log_ns: int, publish_ns: int, sequence: int) -> None:
         """Add a message; times since the epoch [ns], log times never backwards."""
