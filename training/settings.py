@@ -8,11 +8,10 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Literal
 
-import yaml
-
 from fulmar_core.config.errors import ConfigError
 from fulmar_core.config.paths import config_names, config_path
 from fulmar_core.config.strict_yaml import at_least_1, load_config, positive, shares
+from fulmar_core.config.yaml_text import dump
 from fulmar_core.robots.robot import Robot
 from fulmar_core.simulation.symmetry import Symmetry
 from fulmar_core.tasks import Task
@@ -318,4 +317,4 @@ def load_training_settings(robot: Robot, task: Task, name: str | None = None) ->
 def write_training_settings(settings: TrainingSettings, path: Path) -> None:
     """Write settings as a YAML file that `load_training_settings` reads."""
     plain = json.loads(json.dumps(asdict(settings)))  # tuples become lists
-    path.write_text(yaml.safe_dump(plain, sort_keys=False), encoding="utf-8")
+    path.write_text(dump(plain), encoding="utf-8")

@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from fulmar_core.config.bounded_file import WEIGHTS_BYTES, read_bounded
 from fulmar_core.config.errors import BagError, ConfigError
 from fulmar_core.config.recording import Recording
+from fulmar_core.config.yaml_text import dump
 from fulmar_core.wires.wire import Wire
 
 
@@ -71,7 +70,7 @@ class RecorderSettings(Recording):
 
 def _content(what: str | dict[str, Any]) -> bytes:
     if isinstance(what, dict):
-        return yaml.safe_dump(what, sort_keys=False).encode()
+        return dump(what).encode()
     return read_bounded(Path(what), WEIGHTS_BYTES)
 
 

@@ -11,8 +11,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from fulmar_bringup.commissioning.by_kind import PULSED
 from fulmar_bringup.commissioning.hardware_file import Wire, wires_of
 from fulmar_bringup.commissioning.match import left_over
@@ -25,6 +23,7 @@ from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.system import Guards
 from fulmar_bringup.system_rows import system_rows
 from fulmar_core.config.errors import ConfigError
+from fulmar_core.config.yaml_text import dump, load
 from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_ros.runtime import ros_node
@@ -205,10 +204,10 @@ def _silent_valves(hardware: Hardware, outcome: Outcome) -> bool:
 
 def _other_level(path: Path, folder: Path) -> Path:
     """A copy of a hardware file whose lines are active at the other level."""
-    document = yaml.safe_load(path.read_text(encoding="utf-8"))
+    document = load(path.read_text(encoding="utf-8"))
     document["driver"]["active_low"] = not document["driver"].get("active_low", True)
     copy = folder / "other_level.yaml"
-    copy.write_text(yaml.safe_dump(document), encoding="utf-8")
+    copy.write_text(dump(document), encoding="utf-8")
     return copy
 
 

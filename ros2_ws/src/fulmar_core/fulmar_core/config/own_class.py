@@ -123,7 +123,7 @@ def settings_beside(cls: type[Any]) -> dict[str, Any]:
     if not path.exists():
         return {}
     try:
-        values = load(read_bounded(path, CONFIG_BYTES).decode("utf-8"))
+        values = load(read_bounded(path, CONFIG_BYTES).decode("utf-8"), ours=True)
     except YamlError as error:
         raise ConfigError(f"{path}:{error.line}: {error}.") from error
     except (OSError, UnicodeDecodeError) as error:

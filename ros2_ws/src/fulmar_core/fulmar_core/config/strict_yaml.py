@@ -12,7 +12,6 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
-import re
 import types
 import typing
 from collections.abc import Mapping, Sequence
@@ -24,7 +23,7 @@ from yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 from fulmar_core.config.bounded_file import CONFIG_BYTES, read_bounded
 from fulmar_core.config.errors import ConfigError, ImplausibleError, did_you_mean
 from fulmar_core.config.own_class import EXAMPLE, SEPARATOR
-from fulmar_core.config.yaml_text import YamlError, compose, plain
+from fulmar_core.config.yaml_text import SWITCHES, YamlError, check_keys, compose, plain, unclear
 
 T = TypeVar("T")
 MOST_VALUES = 100_000  # of a file; anything beyond is no configuration
@@ -159,18 +158,22 @@ class _Builder:
             self.fail(
                 node, f"{where} = {node.value!r} must be text, a number, true or false; quote it for text."
             )
+        if isinstance(node, ScalarNode) and (why := unclear(node)):
+            self.fail(node, f"{where} = {node.value} {why}, or quote it for text.")
+        if isinstance(value, float) and not math.isfinite(value):
+            self.fail(node, f"{where} = {value!r} must be a finite number.")
         return value
 
     def _pairs(self, node: Node, where: str) -> list[tuple[str, Node, Node]]:
         if not isinstance(node, MappingNode):
             self.fail(node, f"{where} must be a mapping of keys to values.")
-        seen: set[str] = set()
         for key_node, _ in node.value:
             if not isinstance(key_node, ScalarNode):
                 self.fail(key_node, f"a key of {where} must be a single word.")
-            if key_node.value in seen:
-                self.fail(key_node, f"key '{key_node.value}' is written twice.")
-            seen.add(key_node.value)
+        try:
+            check_keys(node)
+        except YamlError as error:
+            raise ConfigError(f"{self.path}:{error.line}: {error}.") from None
         return [(str(key.value), key, value) for key, value in node.value]
 
     def _dataclass(self, cls: type, node: Node, where: str) -> Any:
@@ -248,17 +251,17 @@ class _Builder:
                 value = float(value)
             except OverflowError:
                 value = math.inf
-        if kind is float and isinstance(value, str) and _YAML_1_2_NUMBER.fullmatch(value):
-            value = float(value)
-        if not isinstance(value, kind) or (kind is int and isinstance(value, bool)):
-            self.fail(node, f"{where} = {value!r} must be {_PLAIN_NAME.get(kind, kind)}.")
+        if kind is bool and not node.style and isinstance(value, str):
+            value = SWITCHES.get(value.lower(), value)
+        if not isinstance(value, kind) or (kind in (int, float) and isinstance(value, bool)):
+            why = unclear(node) if kind in (int, float) else ""
+            more = f"; {node.value} {why}" if why else ""
+            self.fail(node, f"{where} = {value!r} must be {_PLAIN_NAME.get(kind, kind)}{more}.")
         if isinstance(value, float) and not math.isfinite(value):
             self.fail(node, f"{where} = {value!r} must be a finite number.")
         return value
 
 
-# PyYAML follows YAML 1.1, which reads 1e-3 and -.5 as text.
-_YAML_1_2_NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)[eE][-+]?[0-9]+|[-+]\.[0-9]+")
 _PLAIN_NAME = {float: "a number", int: "a whole number", bool: "true or false", str: "text"}
 
 

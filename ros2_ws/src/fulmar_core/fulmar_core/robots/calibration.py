@@ -12,10 +12,9 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from fulmar_core.config.errors import ConfigError
 from fulmar_core.config.strict_yaml import load_config
+from fulmar_core.config.yaml_text import dump
 from fulmar_core.robots.actuators.thrusters import Thrusters
 from fulmar_core.robots.robot import Robot
 
@@ -87,7 +86,7 @@ def save_calibration(calibration: Calibration, path: Path) -> None:
         document[name] = {part: float(f"{getattr(found, part):.7g}") for part in ("value", "low", "high")}
     path.parent.mkdir(parents=True, exist_ok=True)
     head = "# Made by `fulmar identify`; use it with --calibration. SI units, intervals of 95 % confidence.\n"
-    path.write_text(head + yaml.safe_dump(document, sort_keys=False, allow_unicode=True), encoding="utf-8")
+    path.write_text(head + dump(document), encoding="utf-8")
 
 
 def calibration_path() -> Path | None:

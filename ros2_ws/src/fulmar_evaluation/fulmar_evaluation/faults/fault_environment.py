@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import yaml
 from geometry_msgs.msg import PoseStamped, QuaternionStamped, TwistStamped
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
@@ -21,6 +20,7 @@ from fulmar_bringup.plan_checks import checked
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.system import Guards
 from fulmar_core.config.process import CONTROL_PRIORITY, take_priority_with_helpers
+from fulmar_core.config.yaml_text import dump
 from fulmar_core.dynamics.flight_trim import find_trim
 from fulmar_core.estimators.kinds import default_estimator
 from fulmar_core.robots.kinds.aircraft import AIRCRAFT
@@ -241,7 +241,7 @@ def _goals_file(folder: Path, robot: Robot, task: Task) -> str:
     )
     places = [place if kind == "poses" else place[: robot.state_type.AXES] for place in (far, corner)]
     path = folder / "goals.yaml"
-    path.write_text(yaml.safe_dump({"kind": kind, "title": "far away", kind: places}))
+    path.write_text(dump({"kind": kind, "title": "far away", kind: places}))
     return str(path)
 
 

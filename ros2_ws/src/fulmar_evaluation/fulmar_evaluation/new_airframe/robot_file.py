@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
 from fulmar_core.config.atomic_write import write_whole
 from fulmar_core.config.errors import ConfigError
 from fulmar_core.config.paths import config_path
+from fulmar_core.config.yaml_text import dump, load
 from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.robot_file import load_robot, load_robot_file
 from fulmar_evaluation.new_airframe.coefficient_set import Terms
@@ -40,7 +40,7 @@ def write_robot(
     like = load_robot(shape.like)
     if not like.flies:
         raise ConfigError(f"'like: {shape.like}' is no aircraft. `fulmar list robots` shows others.")
-    robot: dict[str, Any] = yaml.safe_load(config_path("robots", shape.like).read_text(encoding="utf-8"))
+    robot: dict[str, Any] = load(config_path("robots", shape.like).read_text(encoding="utf-8"))
     wing, inertia = shape.wing, list(shape.inertia)
     robot |= {"name": shape.name, "title": shape.title}
     robot["body"].pop("as_printed", None)  # of the other's inertia
@@ -71,7 +71,7 @@ def write_robot(
         f"# {source}\n# What a geometry does not say, such as servos and sensors, is of {shape.like}; motors,\n"
         "# performance and limits are its own, scaled by weight, span and speed.\n"
     )
-    content = (head + yaml.safe_dump(robot, sort_keys=False, allow_unicode=True)).encode()
+    content = (head + dump(robot)).encode()
     with tempfile.TemporaryDirectory(
         prefix="fulmar-"
     ) as folder:  # what no robot can be leaves no file behind
