@@ -66,3 +66,4 @@ def test_each_speed_that_was_tried_is_listed_with_whether_it_trims():
     assert found.findings is not None
     texts = dict(found.findings.lines())
     assert texts["80.47 m/s, free air"].startswith("no trim: 'cessna_182' has no trim at 80.472 m/s")
+    assert texts["67.06 m/s, free air"].startswith("trims: α -0.7")

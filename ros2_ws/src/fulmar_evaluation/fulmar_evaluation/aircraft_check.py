@@ -142,7 +142,7 @@ class AircraftCheck:
             lines.append(
                 (
                     at.where,
-                    f"α {math.degrees(trim.alpha):.2f}°, elevator {math.degrees(trim.elevator):.2f}°, throttle "
+                    f"trims: α {math.degrees(trim.alpha):.2f}°, elevator {math.degrees(trim.elevator):.2f}°, throttle "
                     f"{trim.throttle:.3f}, thrust {trim.thrust:.4g} N",
                 )
             )
