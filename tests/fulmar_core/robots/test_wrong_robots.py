@@ -181,6 +181,13 @@ def test_a_tensor_that_is_none_of_this_mass_and_radius_is_named_by_an_axis(tmp_p
         load_robot_file(path)
 
 
+@pytest.mark.parametrize("case", [("turtlebot2", "response", {}), ("leatherback", "response.slew", [])])
+def test_a_robot_without_what_a_range_is_for_loads(tmp_path, case):
+    robot, key, nothing = case
+    path, _ = altered(tmp_path, robot, {f"actuators.{key}": nothing})
+    assert load_robot_file(path).actuators.response.slew == ()
+
+
 @pytest.mark.parametrize("name", ["my-bot", "2bot", "Bot", "", "a b", "x" * 65])
 def test_a_robot_that_no_node_can_be_called_after_is_refused(tmp_path, name):
     path, _ = altered(tmp_path, "spacecraft_16", {"name": name})

@@ -65,8 +65,8 @@ def _values(
         return
     key, rest = keys[0], keys[1:]
     if isinstance(config, tuple):
-        chosen = range(len(config)) if key == "*" else [int(key)]
-        for index in chosen:
+        every = range(len(config))
+        for index in every if key == "*" else {int(key)}.intersection(every):
             yield from _values(config[index], rest, (*before, str(index)))
     elif is_dataclass(config) and key in {field.name for field in fields(config)}:
         yield from _values(getattr(config, key), rest, (*before, key))
