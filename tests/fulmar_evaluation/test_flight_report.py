@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import warnings
 from types import SimpleNamespace
 
 import numpy as np
@@ -22,9 +23,15 @@ from fulmar_core.tasks import load_task
 from fulmar_core.tasks.references.flight_paths import PATHS
 from fulmar_core.worlds.scenario import Scenario
 from fulmar_evaluation.report.bag_report import _drawings
-from fulmar_evaluation.report.flight_plot import draw_flight, draw_surfaces, reference_places
+from fulmar_evaluation.report.flight_plot import (
+    draw_flight,
+    draw_flight_motion,
+    draw_surfaces,
+    flight_rows,
+    reference_places,
+)
 from fulmar_evaluation.report.run_report import write_report
-from fulmar_evaluation.report.run_view import views
+from fulmar_evaluation.report.run_view import result_of, views
 from sim_nodes.mock_backend import MockBackend
 from tests.fulmar_evaluation.test_report import Page
 from tests.synthetic_run import EPOCH_NS, NS, RunMessages
@@ -43,14 +50,18 @@ INFO = {
 }
 
 
-def write_flight(folder):
+def write_flight(folder, name="fly_f"):
     """Two seconds of a flight in the core's dynamics, as the nodes would publish it."""
     robot = load_robot("airship_v7")
-    task = load_task("fly_f").fitted(robot)
+    task = load_task(name).fitted(robot)
     exact = Scenario("exact", sensor_noise=False, body="nominal")
     episode = draw_episode(robot, task, exact, seed=3, number=0)
-    backend, law, bag = MockBackend(robot), load_classical(robot, task), RunMessages(folder, robot, INFO)
-    bag.goal("goal_path", episode.goal, EPOCH_NS)
+    backend, law, bag = (
+        MockBackend(robot),
+        load_classical(robot, task),
+        RunMessages(folder, robot, INFO | {"task": name}),
+    )
+    bag.goal(task.goal_topic, episode.goal, EPOCH_NS)
     sample, command = backend.reset(episode, seed=3), robot.actuators.safe_command
     law.reset()
     goal = task.begun(episode.goal, episode.start)
@@ -142,3 +153,33 @@ def test_the_reference_rests_where_it_is_level_and_climbs_between_places():
     assert np.isnan(places[-1]).all(), "beyond the last place it is not known, rather than at rest"
     level = (times > 10.2) & (times < 29.9)
     assert np.ptp(places[level, 2]) == 0.0
+
+
+def test_a_flight_without_a_reference_has_no_empty_panel(flight, tmp_path):
+    runs = views([read_run(write_flight(tmp_path / "flight", "fly_attitude"))])
+    assert (flight_rows(views([flight])), flight_rows(runs)) == (3, 2)
+    axes = Figure().subplots(2, 1)
+    draw_flight(axes, runs)
+    assert all(each.lines for each in axes)
+
+
+def test_a_page_of_a_flight_raises_no_warning_of_python(flight, tmp_path):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        write_report([flight], tmp_path / "sheet.png")
+
+
+def test_speed_attitude_and_turn_rates_of_a_flight_are_drawn(flight):
+    axes = Figure().subplots(3, 1)
+    draw_flight_motion(axes, views([flight]))
+    labels = [[line.get_label() for line in each.lines] for each in axes]
+    assert labels[0] == ["over the ground"]
+    assert labels[1][:2] == ["roll, right wing down", "pitch, nose up"]
+    assert labels[2] == ["about x", "about y", "about z"]
+
+
+def test_an_aircraft_touches_no_obstacle_but_the_water_or_the_ground(flight):
+    (run,) = views([flight])
+    figures = run.result.figures | {"collided": 1.0}
+    touched = dataclasses.replace(run, result=dataclasses.replace(run.result, figures=figures))
+    assert "touched the water or the ground" in result_of(touched)[1]

@@ -23,6 +23,7 @@ from fulmar_evaluation.report.flight_plot import (
     draw_flight_motion,
     draw_flight_path,
     draw_surfaces,
+    flight_rows,
     flight_table,
 )
 from fulmar_evaluation.report.motion_plot import MOTION_ROWS, draw_motion
@@ -51,11 +52,12 @@ def _draw_space(figure: SubFigure, runs: Sequence[View]) -> None:
 
 def _draw_flight(figure: SubFigure, runs: Sequence[View]) -> None:
     """Path, height and energy of flights, below one another."""
-    path, flight = figure.subfigures(2, 1, height_ratios=(PATH_ROWS, FLIGHT_ROWS))
+    count = flight_rows(runs)
+    path, flight = figure.subfigures(2, 1, height_ratios=(PATH_ROWS, count))
     rows = path.subplots(PATH_ROWS, 1)
     draw_flight_path(rows, runs)
     legend(rows[0], loc="best", ncols=1 + len(runs))
-    draw_flight(flight.subplots(FLIGHT_ROWS, 1), runs)
+    draw_flight(flight.subplots(count, 1), runs)
 
 
 def _draw_actuators(figure: SubFigure, runs: Sequence[View]) -> None:

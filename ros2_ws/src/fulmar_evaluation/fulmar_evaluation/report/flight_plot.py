@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 
 from fulmar_core.robots.actuators.control_surfaces import is_throttle
 from fulmar_core.states.attitude import euler_of
+from fulmar_core.states.spatial import quat_of
 from fulmar_core.tasks.follow_reference import FollowReference
 from fulmar_evaluation.report.run_view import Row, View, evaluated
 from fulmar_evaluation.report.style import BODY_AXES, DASHED, INK, PARTS, STROKES, legend_over, quiet_grid
@@ -38,19 +39,20 @@ def draw_flight_path(rows: Sequence[Axes] | np.ndarray, runs: Sequence[View]) ->
 
 
 def draw_flight(rows: Sequence[Axes] | np.ndarray, runs: Sequence[View]) -> None:
-    """Height, its error, and energy over time."""
-    height, off, energy = rows
+    """Height, where there is a reference its error, and energy over time, in `flight_rows` rows."""
+    height, energy = rows[0], rows[-1]
     for order, (run, result) in enumerate(evaluated(runs)):
         place, aims = run.record.motion.position[result.samples], reference_places(result)
         look = {"color": run.colour, "linewidth": 1.2}
         height.plot(result.time_s, place[:, 2], label=run.label, **look)
         energy.plot(result.time_s, _energy(result), **look)
         if aims is not None:
-            off.plot(result.time_s, place[:, 2] - aims[:, 2], **look)
+            rows[1].plot(result.time_s, place[:, 2] - aims[:, 2], **look)
             if order == 0:
                 height.plot(result.time_s, aims[:, 2], **REFERENCE)
     _at_least(height)
-    for axes, label in zip(rows, ("height [m]", "height error [m]", "full throttle [s]"), strict=True):
+    labels = ("height [m]", *(["height error [m]"] if len(rows) == FLIGHT_ROWS else []), "full throttle [s]")
+    for axes, label in zip(rows, labels, strict=True):
         quiet_grid(axes)
         axes.set_xlim(0.0, max((result.duration_s for _, result in evaluated(runs)), default=1.0))
         axes.set_ylabel(label)
@@ -58,6 +60,12 @@ def draw_flight(rows: Sequence[Axes] | np.ndarray, runs: Sequence[View]) -> None
     for axes in rows[:-1]:
         axes.tick_params(labelbottom=False)
     energy.set_xlabel("time [s]")
+
+
+def flight_rows(runs: Sequence[View]) -> int:
+    """Rows of `draw_flight`."""
+    follows = any(reference_places(result) is not None for _, result in evaluated(runs))
+    return FLIGHT_ROWS if follows else FLIGHT_ROWS - 1
 
 
 def draw_flight_motion(rows: Sequence[Axes] | np.ndarray, runs: Sequence[View]) -> None:
@@ -78,6 +86,10 @@ def draw_flight_motion(rows: Sequence[Axes] | np.ndarray, runs: Sequence[View]) 
         speed.plot(result.time_s, result.run.speed[0], label=f"{before}over the ground", **over)
         x, y, z, w = motion.quat_xyzw[result.samples].T
         roll, pitch, _ = np.rad2deg(np.stack(euler_of((x, y, z, w))))
+        if result.task.tolerance.attitude_deg > 0.0:
+            wanted, nose, _ = np.rad2deg(np.stack(euler_of(quat_of(result.aims))))
+            for values, colour in ((wanted, BODY_AXES[0]), (-nose, BODY_AXES[1])):
+                attitude.plot(result.time_s, values, color=colour, linestyle=DASHED, linewidth=0.9)
         turning = np.rad2deg(motion.angular_velocity_in_body[result.samples]).T
         lines = [
             (attitude, roll, "roll, right wing down", BODY_AXES[0]),

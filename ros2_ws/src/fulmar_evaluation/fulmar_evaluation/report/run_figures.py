@@ -11,12 +11,12 @@ from fulmar_evaluation.report.control_plot import actuators_height, draw_actuato
 from fulmar_evaluation.report.error_plot import counting, draw_progress, strips
 from fulmar_evaluation.report.flight_plot import (
     FLIGHT_MOTION_ROWS,
-    FLIGHT_ROWS,
     PATH_ROWS,
     draw_flight,
     draw_flight_motion,
     draw_flight_path,
     draw_surfaces,
+    flight_rows,
 )
 from fulmar_evaluation.report.motion_plot import MOTION_ROWS, draw_motion
 from fulmar_evaluation.report.page import Plot
@@ -100,13 +100,14 @@ def flight_path(runs: Sequence[View]) -> Plot:
 
 def flight(runs: Sequence[View]) -> Plot:
     """Height and energy of a flight."""
-    figure = Figure(figsize=(WIDTH, 0.5 + 1.5 * FLIGHT_ROWS), layout="constrained")
-    rows = figure.subplots(FLIGHT_ROWS, 1, sharex=True)
+    count = flight_rows(runs)
+    figure = Figure(figsize=(WIDTH, 0.5 + 1.5 * count), layout="constrained")
+    rows = figure.subplots(count, 1, sharex=True)
     draw_flight(rows, runs)
     legend(rows[0], loc="upper right", ncols=len(runs))
     caption = """
-    The dashed line is the reference. Energy is the mean square of the throttles, added up: so many seconds at full
-    throttle would cost as much."""
+    The dashed line is the reference, where there is one. Energy is the mean square of the throttles, added up: so many
+    seconds at full throttle would cost as much."""
     return Plot("Height and energy", caption, figure)
 
 
@@ -115,8 +116,9 @@ def flight_motion(runs: Sequence[View]) -> Plot:
     figure = Figure(figsize=(WIDTH, 0.5 + 1.6 * FLIGHT_MOTION_ROWS), layout="constrained")
     draw_flight_motion(figure.subplots(FLIGHT_MOTION_ROWS, 1, sharex=True), runs)
     caption = """
-    Speed through the air as the probe measures it, speed over the ground, roll, pitch and turn rates as they truly
-    are; turn rates about the body's axes: x ahead, y to the left, z up."""
+    Speed through the air as the probe measures it, speed over the ground, and roll, pitch and turn rates as they truly
+    are. Dashed are the roll and pitch that are wanted. Turn rates are about the body's axes: x ahead, y to the left, z
+    up."""
     return Plot("How it flew", caption, figure)
 
 

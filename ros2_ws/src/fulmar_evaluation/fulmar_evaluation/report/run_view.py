@@ -82,11 +82,11 @@ def result_of(run: View) -> tuple[str, str]:
     result = run.result
     if result is None:
         return "No result", "The bag holds fewer than two states, so there is nothing to evaluate."
+    touched = f" It touched {result.robot.kind.obstacle}." if result.figures["collided"] else ""
     if not run.strives:
         return "Moved", "The controller moved the robot to show its parameters; there was no goal to meet."
     if not result.long_enough:
-        return "Missed", f"The run ended after {result.duration_s:.1f} s, too early to evaluate."
-    touched = f" It touched {result.robot.kind.obstacle}." if result.figures["collided"] else ""
+        return "Missed", f"The run ended after {result.duration_s:.1f} s, too early to evaluate.{touched}"
     if result.progress is not None:
         path = run.summary["path_error_m"]
         way = "" if path is None else f" On average the robot was {_length(path)} from the path."
@@ -111,15 +111,17 @@ def result_of(run: View) -> tuple[str, str]:
     turned = _known(run, "final_heading_error_deg", "final_attitude_error_deg")
     parts = [] if place is None else [_length(place)]
     parts += [] if turned is None else [degrees_text(turned)]
-    error = " and ".join(parts) or "–"
+    at_end = (
+        f"was {' and '.join(parts)} away" if place is not None else f"was {''.join(parts)} off in attitude"
+    )
     if result.success:
         return "Reached", (
             f"The goal was reached after {result.figure('time_to_target_s'):.1f} s and held to the end. "
-            f"At the end of {result.duration_s:.0f} s {what} was {error} away."
+            f"At the end of {result.duration_s:.0f} s {what} {at_end}."
         )
     return "Missed", (
         f"{what.capitalize()} was not within the tolerance for all of the last {result.task.tolerance.hold_s:g} s. "
-        f"At the end of {result.duration_s:.0f} s it was {error} away.{touched}"
+        f"At the end of {result.duration_s:.0f} s it {at_end}.{touched}"
     )
 
 
