@@ -1,4 +1,4 @@
-"""README: short, with every robot and task, make targets and folders that exist, and small pictures.
+"""README: short, with every robot and task, make targets and folders that exist, and small images.
 
 test_docs.py checks its commands and links.
 """
@@ -11,7 +11,8 @@ import pytest
 
 from fulmar_core.config.paths import config_names
 
-LARGEST = 150_000  # of a picture [bytes]
+LARGEST = 150_000  # of an image [bytes]
+IMAGES = "docs/pictures/"
 
 
 @pytest.fixture
@@ -50,13 +51,18 @@ def test_the_table_of_tasks_has_every_task_and_no_other(readme):
     assert named(readme, "| Tasks |") == set(config_names("tasks"))
 
 
-def test_pictures_are_small(readme, repository):
-    pictures = re.findall(r"\]\((docs/pictures/[a-z]+\.png)\)", readme)
-    assert len(pictures) == 3
-    for picture in (*pictures, "docs/pictures/satellite.png"):
-        assert (repository / picture).stat().st_size < LARGEST, picture
+def images_of(readme: str) -> list[str]:
+    """Names of its images, without folder and ending."""
+    return re.findall(rf"\]\({IMAGES}([a-z]+)\.png\)", readme)
 
 
-def test_each_picture_has_the_command_that_makes_it(readme):
-    for name in re.findall(r"\]\(docs/pictures/([a-z]+)\.png\)", readme):
+def test_images_are_small(readme, repository):
+    names = images_of(readme)
+    assert len(names) == 3
+    for name in (*names, "satellite"):
+        assert (repository / IMAGES / f"{name}.png").stat().st_size < LARGEST, name
+
+
+def test_each_image_has_the_command_that_makes_it(readme):
+    for name in images_of(readme):
         assert f"--record runs/{name}\n" in readme
