@@ -220,6 +220,7 @@ def test_no_label_of_an_error_is_taller_than_its_axis_and_no_unit_stands_twice(f
     assert "1 cm" in [tick.get_text() for tick in errors["distance"].get_yticklabels()]
 
 
+@pytest.mark.filterwarnings("error")  # also where nothing lies on the scale
 @pytest.mark.parametrize(("least", "lowest"), [(0.05, 2e-3), (5e-4, 4e-4), (1e-12, 1e-4), (0.0, 2e-3)])
 def test_the_scale_of_distances_goes_as_low_as_they_do(flown, least, lowest):
     (view,) = views([read_run(flown)])

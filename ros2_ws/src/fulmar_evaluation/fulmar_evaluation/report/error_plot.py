@@ -145,11 +145,11 @@ def _top(axes: Axes, strip: Strip, bottom: float, limits: list[float]) -> float:
 
 
 def _errors(axes: Axes, runs: Sequence[View], strip: Strip) -> None:
+    log_scale(axes.yaxis, strip.marks)  # before the curves: one that is zero throughout has no place on it
     for run, result in evaluated(runs):
         axes.plot(result.time_s, strip.values(result), color=run.colour, linewidth=1.2, label=run.label)
     quiet_grid(axes)
     _span(axes, runs)
-    log_scale(axes.yaxis, strip.marks)
     limits = [strip.tolerance(result.task.tolerance) for _, result in evaluated(runs)[:1]]
     bottom = _bottom(runs, strip)
     axes.set_ylim(bottom, _top(axes, strip, bottom, limits))
