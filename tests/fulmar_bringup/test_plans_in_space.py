@@ -98,12 +98,12 @@ def test_what_cannot_be_is_refused(change, words, plan):
 
 
 def test_an_estimator_in_space_is_refused_in_the_plane_with_the_one_to_use(plan):
-    with pytest.raises(ConfigError, match=r"in the plane\. Use 'mocap_imu' of configs/estimators"):
+    with pytest.raises(ConfigError, match=r"over a floor or water\. Use 'mocap_imu' of configs/estimators"):
         plan(guards={"estimator": "mocap_imu_3d"})
 
 
 def test_a_box_in_the_plane_is_refused(plan):
-    with pytest.raises(ConfigError, match="moves in the plane, where an area has 4 sides"):
+    with pytest.raises(ConfigError, match="moves in two dimensions, where an area has 4 sides"):
         plan(guards={"area": (-1.0, 1.0, -1.0, 1.0, -1.0, 1.0)})
 
 

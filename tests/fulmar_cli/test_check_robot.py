@@ -154,7 +154,7 @@ def test_mass_properties_of_space_in_the_plane_are_one_problem(fulmar, tmp_path,
     assert (code, found["passed"], found["wrench"]) == (1, False, None)
     (problem,) = found["problems"]
     assert str(path) in problem
-    assert "a robot in the plane has xx, yy, zz and x, y" in problem
+    assert "a robot on a floor or on water has xx, yy, zz and x, y" in problem
 
 
 def test_a_gyroscope_that_cannot_see_what_the_gates_reject_is_one_problem(fulmar, tmp_path):

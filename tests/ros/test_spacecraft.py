@@ -150,7 +150,7 @@ def test_a_run_through_sixteen_emulated_valves_meets_its_goal_by_motion_capture_
     ("command", "words"),
     [
         ("run spacecraft_16 --task go_to_pose --lockstep", "pushed in space. Did you mean 'go_to_pose_3d'?"),
-        ("run floating_platform --task go_to_pose_3d", "in the plane. Did you mean 'go_to_pose'?"),
+        ("run floating_platform --task go_to_pose_3d", "over a floor or water. Did you mean 'go_to_pose'?"),
         ("evaluate spacecraft_16 go_to_pose", "pushed in space. Did you mean 'go_to_pose_3d'?"),
         (
             "evaluate spacecraft_16 push_block --controller lqr",
@@ -174,7 +174,7 @@ def test_a_run_through_sixteen_emulated_valves_meets_its_goal_by_motion_capture_
         ),
         (
             "goals --robot floating_platform --pose 1,2,3,4,5,6",
-            "moves in the plane: 2 (x,y) or 3 (x,y,deg) are needed",
+            "moves in two dimensions: 2 (x,y) or 3 (x,y,deg) are needed",
         ),
         ("up mujoco_lqr --start 1,2,3,4,5,6", "--start = '1,2,3,4,5,6' has 6 numbers"),
     ],

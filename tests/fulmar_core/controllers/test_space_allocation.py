@@ -98,7 +98,7 @@ def test_fans_are_the_bounded_least_squares_of_scipy(size):
 
 
 def test_openings_by_degrees_on_one_line_are_refused_in_space():
-    with pytest.raises(ValueError, match="in the plane only; in space use on/off valves"):
+    with pytest.raises(ValueError, match="for robots on a floor or on water; in space use on/off valves"):
         allocation_of(replace(VALVES, continuous=True), weight=WEIGHT, cost=0.0)
 
 

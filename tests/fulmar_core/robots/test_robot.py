@@ -46,7 +46,7 @@ def test_a_flat_disc_is_a_body():
 )
 def test_a_robot_in_the_plane_has_no_mass_properties_of_space(name, change, words):
     robot = load_robot(name)
-    with pytest.raises(ValueError, match=f"{words}; a robot in the plane has xx, yy, zz and x, y"):
+    with pytest.raises(ValueError, match=f"{words}; a robot on a floor or on water has xx, yy, zz and x, y"):
         replace(robot, body=replace(robot.body, **change))
 
 

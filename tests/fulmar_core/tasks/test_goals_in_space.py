@@ -92,9 +92,11 @@ def test_velocities_follow_the_clock_and_end_in_standstill():
 
 
 def test_goals_of_the_other_space_are_refused_by_both_robots():
-    with pytest.raises(ConfigError, match="is in space, and robot 'floating_platform' moves in the plane"):
+    with pytest.raises(
+        ConfigError, match="is in space, and robot 'floating_platform' moves in two dimensions"
+    ):
         goal_sequence(POSES, load_robot("floating_platform"))
-    with pytest.raises(ConfigError, match="is in the plane, and robot 'spacecraft_16' moves in space"):
+    with pytest.raises(ConfigError, match="is in two dimensions, and robot 'spacecraft_16' moves in space"):
         goal_sequence(single_goal((1.0, 2.0, 90.0)), CRAFT)
 
 
@@ -129,7 +131,7 @@ def test_a_task_in_space_of_any_name_is_not_proposed_for_itself(tmp_path, monkey
     (tmp_path / "tasks" / "arrive.yaml").write_text(text.replace("name: go_to_pose_3d", "name: arrive"))
     monkeypatch.setenv("FULMAR_CONFIGS", str(tmp_path))
     with pytest.raises(
-        ConfigError, match=r"in the plane\. `fulmar list tasks` shows others, such as go_to_pose\.$"
+        ConfigError, match=r"over a floor or water\. `fulmar list tasks` shows others, such as go_to_pose\.$"
     ):
         load_task("arrive").check(load_robot("floating_platform"))
     with pytest.raises(

@@ -91,7 +91,9 @@ def test_the_sequence_goes_by_the_clock_and_ends():
 
 
 def test_the_plane_has_no_such_targets():
-    with pytest.raises(ConfigError, match="is in space, and robot 'floating_platform' moves in the plane"):
+    with pytest.raises(
+        ConfigError, match="is in space, and robot 'floating_platform' moves in two dimensions"
+    ):
         goal_sequence(load_goals("helix"), load_robot("floating_platform"))
     with pytest.raises(ConfigError, match="only positions and poses can be a path"):
         goal_sequence(CIRCLE, CRAFT, as_path=True)

@@ -34,7 +34,7 @@ class PlanarState(State):
     yaw_rate: Array  # [rad/s]
 
     COLUMNS: ClassVar[tuple[str, ...]] = ("x", "y", "yaw", "vx", "vy", "yaw_rate")
-    WORLD: ClassVar[str] = "the plane"
+    WORLD: ClassVar[str] = "two dimensions"
     NUMBERS: ClassVar[tuple[str, ...]] = ("x", "y", "deg")
     AXES: ClassVar[int] = 2
     SUFFIX: ClassVar[str] = ""
