@@ -24,19 +24,22 @@ def write_foreign(
     compression: CompressionMode = CompressionMode.NONE,
     stamped: bool = True,
     commands: bool = False,
+    velocity: str = "/cmd_vel",
+    more: tuple[str, ...] = (),
 ) -> Path:
     """A circle of half a metre at 0.5 m/s and 50 Hz, in frames `map` and `base_footprint`, with a text beside it.
 
-    With commands, a Twist of a tenth of its number and 1 rad/s comes 5 ms after each odometry.
+    With commands, a Twist of a tenth of its number and 1 rad/s comes 5 ms after each odometry, on the topic `velocity`.
+    Each topic of `more` has the same odometry.
     """
     store = type_store()
     new = store.types
     writer = Writer(folder, version=9, storage_plugin=storage)
     writer.set_compression(compression, CompressionFormat.ZSTD)
     with writer:
-        odometry = writer.add_connection(topic, ODOMETRY, typestore=store)
+        odometries = [writer.add_connection(name, ODOMETRY, typestore=store) for name in (topic, *more)]
         words = writer.add_connection("/words", "std_msgs/msg/String", typestore=store)
-        velocity = writer.add_connection("/cmd_vel", TWIST, typestore=store) if commands else None
+        velocity = writer.add_connection(velocity, TWIST, typestore=store) if commands else None
         for i in range(count):
             time_ns, angle = 5 * NS + i * 20_000_000, 0.02 * i
             message = new[ODOMETRY](
@@ -65,7 +68,8 @@ def write_foreign(
                 ),
             )
             log_ns = 1_700_000_000 * NS + time_ns + (i % 5) * 100_000
-            writer.write(odometry, log_ns, store.serialize_cdr(message, ODOMETRY))
+            for odometry in odometries:
+                writer.write(odometry, log_ns, store.serialize_cdr(message, ODOMETRY))
             if commands:
                 zero = dict.fromkeys("xyz", 0.0)
                 twist = new["geometry_msgs/msg/Twist"](

@@ -47,6 +47,7 @@ def test_arrays_at_once_are_what_message_by_message_gives():
 
 def test_a_message_with_other_names_goes_the_slow_way_and_is_left_out():
     topic = open_bag(POLICY).of(ACTION)
+    topic.data = list(topic.data)
     topic.data[3] = topic.data[3].replace(b"thruster_1", b"thruster_9", 1)
     found = joint_vectors(topic, "effort")
     assert found.left_out == 1

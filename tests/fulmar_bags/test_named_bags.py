@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from fulmar_bags.bag_reading import BagReading
 from fulmar_bags.comparison import differing
 from fulmar_bags.contents import Topic, open_bag
 from fulmar_bags.control_steps import control_steps_of
@@ -80,7 +81,7 @@ def test_a_name_that_only_the_topics_know_makes_the_frames_known(alpha: Path):
     bag = replace(open_bag(alpha), info=None)
     assert bag.frames.plain("alpha/odom") == "odom"
     assert differing(bag, bag)["same"]
-    assert not read_any_run(alpha, task="go_to_pose").warnings
+    assert not read_any_run(alpha, BagReading(task="go_to_pose")).warnings
 
 
 def test_what_another_robot_says_of_itself_is_not_taken_for_the_own(tmp_path: Path):

@@ -153,7 +153,7 @@ def test_a_bag_keeps_when_a_message_was_sent_and_says_when_it_was_received_where
     bag.close()
     sent = publish_times(tmp_path / "bag")
     assert sent == {"word 0": START_NS - 7, "word 1": START_NS, "word 2": START_NS}
-    assert open_recorded(tmp_path / "bag").topics[TOPIC].publish_ns == list(sent.values())
+    assert list(open_recorded(tmp_path / "bag").topics[TOPIC].publish_ns) == list(sent.values())
 
 
 def test_the_thread_passes_on_when_a_message_was_sent(tmp_path):

@@ -9,6 +9,7 @@ import pytest
 from rosbags.rosbag2 import Writer
 from rosbags.rosbag2.enums import StoragePlugin
 
+from fulmar_bags.bag_reading import BagReading
 from fulmar_bags.contents import open_bag
 from fulmar_bags.message_types import type_store
 from fulmar_bags.run_record import read_any_run
@@ -85,12 +86,12 @@ def test_a_bag_without_a_task_is_shown_as_far_as_it_goes_and_evaluated_with_task
 def test_a_robot_under_another_name_needs_robot(hand_started):
     bag = hand_started(space="platform_3")
     with pytest.raises(BagError, match=r"names no robot.*--robot"):
-        evaluate_run(read_any_run(bag, task="go_to_pose"))
-    assert evaluate_run(read_any_run(bag, task="go_to_pose", robot="floating_platform")).success
+        evaluate_run(read_any_run(bag, BagReading(task="go_to_pose")))
+    assert evaluate_run(read_any_run(bag, BagReading("floating_platform", "go_to_pose"))).success
 
 
 def test_a_bag_without_a_goal_says_so(hand_started):
-    record = read_any_run(hand_started("goal_pose"), task="go_to_pose")
+    record = read_any_run(hand_started("goal_pose"), BagReading(task="go_to_pose"))
     with pytest.raises(BagError, match="holds no goal on goal_pose"):
         evaluate_run(record)
 

@@ -37,6 +37,7 @@ def copied(folder: Path, *, info: dict | None = None, said: tuple[str, ...] = ()
     for topic in source.topics.values():
         bag.add_topic(topic.name, topic.type, "stream")
     odometry = source.of(ODOMETRY)
+    odometry.data = list(odometry.data)
     for index, (_, message) in enumerate(messages(odometry)):
         if index >= len(odometry) - spoilt:
             message.pose.pose.position.x = float("nan")

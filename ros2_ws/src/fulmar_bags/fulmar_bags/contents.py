@@ -1,68 +1,23 @@
-"""One bag in memory, as far as it can be read: any rosbag2 folder with MCAP or sqlite3, or one such file."""
+"""One bag, as far as it can be read: any rosbag2 folder with MCAP or sqlite3, a bag of ROS 1, or one such file."""
 
 from __future__ import annotations
 
-import contextlib
 import json
-import tempfile
-from collections import Counter
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from mcap.records import Attachment, Channel, Message, Metadata, Schema
-
-from fulmar_bags.mcap_records import (
-    PACKED,
-    ZSTD_MAGIC,
-    custom_text,
-    file_bytes,
-    files_of,
-    missing_files,
-    read_records,
-    storage_of,
-    unpack,
-)
-from fulmar_bags.message_types import unreadable
-from fulmar_bags.metadata import metadata_refusal
+from fulmar_bags.bag_reading import AS_IT_IS, BagReading
+from fulmar_bags.gathered import Gathered, Topic, json_object
+from fulmar_bags.mcap_records import custom_text, files_of, left_out_files, missing_files, storage_of
+from fulmar_bags.metadata import metadata_refusal, read_information
 from fulmar_bags.ring import FAULTS
-from fulmar_bags.writer import RUN_KEY, RUN_RECORD
+from fulmar_bags.writer import RUN_RECORD
 from fulmar_bags.writer_thread import RECORDING
 from fulmar_core.config.errors import BagError, UnknownNameError
 from fulmar_core.robots.topics import ODOMETRY, TRUTH, WIRES, Wire
 from fulmar_core.wires.robot_name import PLAIN, Frames, namespace_of
-
-
-@dataclass
-class Topic:
-    """The messages of one topic, in the order of the file."""
-
-    name: str
-    type: str  # such as `nav_msgs/msg/Odometry`
-    data: list[bytes] = field(default_factory=list)  # in CDR
-    log_ns: list[int] = field(default_factory=list)  # when each was received, since the epoch [ns]
-    publish_ns: list[int] = field(default_factory=list)  # when each was sent; where unknown, as `log_ns` [ns]
-    sequence: list[int] = field(default_factory=list)  # number of each, counted by its recorder; 0: not known
-    unreadable: list[int] = field(default_factory=list)  # indices of those that are not what the type says
-
-    def __len__(self) -> int:
-        """Number of messages."""
-        return len(self.data)
-
-    def readable(self) -> Topic:
-        """The messages that are what the type says."""
-        if not self.unreadable:
-            return self
-        kept = sorted(set(range(len(self))).difference(self.unreadable))
-        return Topic(
-            self.name,
-            self.type,
-            [self.data[i] for i in kept],
-            [self.log_ns[i] for i in kept],
-            [self.publish_ns[i] for i in kept],
-            [self.sequence[i] for i in kept],
-        )
 
 
 @dataclass(frozen=True)
@@ -75,10 +30,10 @@ class Fault:
 
 @dataclass(frozen=True)
 class Bag:
-    """One bag in memory."""
+    """One bag; messages that are large, or too many, stay in their file until they are looked at."""
 
     path: Path
-    storage: str  # `mcap` or `sqlite3`
+    storage: str  # `mcap`, `sqlite3` or `rosbag1`
     files: tuple[Path, ...]
     topics: dict[str, Topic]  # by absolute name, sorted
     info: dict[str, Any] | None  # what kind of run this is; None: Fulmar did not record it
@@ -86,6 +41,7 @@ class Bag:
     faults: tuple[Fault, ...]  # that a ring was written for
     attachments: dict[str, bytes]
     warnings: tuple[str, ...]  # what could not be read
+    reading: BagReading = AS_IT_IS  # what was said about it
 
     @property
     def size(self) -> int:
@@ -140,6 +96,8 @@ class Bag:
 
     def topic_name(self, wire: Wire) -> str:
         """Absolute name of a wire's topic; the wire's own name where that is unknown."""
+        if wire.name in self.reading.topics:
+            return self.reading.topics[wire.name]
         if wire.name.startswith("/"):
             return wire.name
         if self.prefix:
@@ -158,7 +116,7 @@ class Bag:
             BagError: There is none, or several to choose from.
             ConfigError: There is no such topic.
         """
-        kind = ODOMETRY.type
+        kind, chosen = ODOMETRY.type, chosen or self.reading.topics.get(ODOMETRY.name)
         known = {n: t for n, t in self.topics.items() if t.type == kind and len(t) > len(t.unreadable)}
         if chosen is not None:
             if chosen not in known:
@@ -175,7 +133,7 @@ class Bag:
             has = f"It has: {', '.join(self.topics) or 'nothing'}."
             raise BagError(" ".join([f"{self.path}: holds no {kind}. {has}", *self.warnings]))
         raise BagError(
-            f"{self.path}: holds several odometries ({', '.join(known)}). Choose one: --odometry TOPIC."
+            f"{self.path}: holds several odometries ({', '.join(known)}). Choose one: --topics odom=TOPIC."
         )
 
 
@@ -190,21 +148,23 @@ def is_of_wire(topic: str, wire: Wire) -> bool:
     return bool(ends) and max(ends, key=len) == wire.name
 
 
-def open_bag(path: Path) -> Bag:
+def open_bag(path: Path, reading: BagReading = AS_IT_IS) -> Bag:
     """Read a bag.
 
     Args:
         path: Bag folder, or a file in it.
+        reading: What the bag does not say itself.
 
     Returns:
         The bag. What is damaged is left out and named in `warnings`.
 
     Raises:
         BagError: There is no bag, or nothing of it can be read.
+        ConfigError: It has not the topics of `reading`.
     """
     path = Path(path)
     files = files_of(path)
-    gathered = _Gathered()
+    gathered = Gathered()
     problems: list[str] = []
     for file in files:
         try:
@@ -213,7 +173,7 @@ def open_bag(path: Path) -> Bag:
             problems.append(str(error))
     if len(problems) == len(files):
         raise BagError(problems[0])
-    gathered.check_types()
+    gathered.finish()
     beside = json_object(custom_text(path, RUN_RECORD))
     info = gathered.info or beside
     if info and beside and json.dumps(info, sort_keys=True) != json.dumps(beside, sort_keys=True):
@@ -221,7 +181,11 @@ def open_bag(path: Path) -> Bag:
         problems.append(f"the record '{RUN_RECORD}' and metadata.yaml differ: one of them is damaged.")
     problems += [refusal] if (refusal := metadata_refusal(path if path.is_dir() else path.parent)) else []
     problems += [f"{name}: the file is missing; metadata.yaml lists it." for name in missing_files(path)]
+    problems += [f"{name} is left out: {why}." for name, why in left_out_files(path, files)]
+    problems += _fewer_than_listed(path, gathered) if not problems else []
+    reading.check(path, {topic.name: topic.type for topic in gathered.topics.values()})
     return Bag(
+        reading=reading,
         path=path,
         storage=storage_of(files[0]) or "",
         files=files,
@@ -234,106 +198,13 @@ def open_bag(path: Path) -> Bag:
     )
 
 
-class _Gathered:
-    """Content of the files of one bag, together."""
-
-    def __init__(self) -> None:
-        self.topics: dict[str, Topic] = {}
-        self.info: dict[str, Any] | None = None
-        self.faults = ""  # JSON
-        self.attachments: dict[str, bytes] = {}
-        self.warnings: list[str] = []
-
-    def read(self, file: Path) -> None:
-        (self._read_sqlite3 if storage_of(file) == "sqlite3" else self._read_mcap)(file)
-
-    def check_types(self) -> None:
-        """Find the messages that do not fit the type of their topic."""
-        for topic in self.topics.values():
-            topic.unreadable = unreadable(topic.type, topic.data)
-            if topic.unreadable:
-                count = f"{len(topic.unreadable)} of {len(topic)} messages"
-                self.warnings.append(f"{count} of {topic.name} are no {topic.type}.")
-
-    def _topic(self, name: str, kind: str) -> Topic:
-        """The topic of a name; one with another type gets a name with its type."""
-        topic = self.topics.setdefault(name, Topic(name, kind))
-        if topic.type == kind:
-            return topic
-        return self.topics.setdefault(f"{name} ({kind})", Topic(name, kind))
-
-    @staticmethod
-    def _add(topic: Topic, data: bytes, log_ns: int, publish_ns: int, sequence: int) -> None:
-        # Where bags are compressed message by message, nothing in an MCAP file says so; CDR begins with a zero.
-        topic.data.append(unpack(data) if data.startswith(ZSTD_MAGIC) else data)
-        topic.log_ns.append(log_ns)
-        topic.publish_ns.append(publish_ns or log_ns)
-        topic.sequence.append(sequence)
-
-    def _read_mcap(self, file: Path) -> None:
-        schemas: dict[int, str] = {}
-        channels: dict[int, Topic] = {}
-        lost: Counter[str] = Counter()
-        for record in read_records(file, self.warnings):
-            if isinstance(record, Message):
-                topic = channels.get(record.channel_id)
-                if topic is None:
-                    lost["messages of channels that are not announced"] += 1
-                    continue
-                self._add(topic, record.data, record.log_time, record.publish_time, record.sequence)
-            elif isinstance(record, Schema):
-                schemas[record.id] = record.name
-            elif isinstance(record, Channel):
-                # The index at the end of a file announces every channel once more.
-                channels[record.id] = self._topic(record.topic, schemas.get(record.schema_id, ""))
-                if record.message_encoding != "cdr":
-                    lost[f"'{record.message_encoding}' as encoding of {record.topic}, only cdr is read"] = 1
-            elif isinstance(record, Metadata) and record.name == RUN_RECORD:
-                self.info = json_object(record.metadata.get(RUN_KEY, "")) or self.info
-            elif isinstance(record, Metadata) and record.name == FAULTS:
-                self.faults = record.metadata.get(FAULTS, "")
-            elif isinstance(record, Attachment):
-                self.attachments[record.name] = record.data
-        self.warnings += [f"{file.name}: {count} {what}." for what, count in lost.items()]
-
-    def _read_sqlite3(self, file: Path) -> None:
-        from rosbags.rosbag2 import Reader
-
-        try:
-            with _plain(file, self.warnings) as plain, Reader(plain) as reader:
-                topics = {each.id: self._topic(each.topic, each.msgtype) for each in reader.connections}
-                try:
-                    for connection, log_ns, data in reader.messages():
-                        self._add(topics[connection.id], bytes(data), log_ns, 0, 0)
-                except Exception as error:  # noqa: BLE001 - damage raises whatever it pleases, from sqlite3 or rosbags
-                    self.warnings.append(f"{file.name}: the rest is damaged ({_first_line(error)}).")
-        except Exception as error:
-            raise BagError(f"{file}: this sqlite3 bag cannot be read: {_first_line(error)}.") from error
-
-
-@contextlib.contextmanager
-def _plain(file: Path, damage: list[str]) -> Iterator[Path]:
-    """The file itself, or, where it is packed as a whole, what is in it."""
-    if file.suffix != PACKED:
-        yield file
-        return
-    with tempfile.TemporaryDirectory() as folder:
-        plain = Path(folder) / file.stem
-        plain.write_bytes(file_bytes(file, damage))
-        yield plain
-
-
-def _first_line(error: Exception) -> str:
-    return (str(error).splitlines() or [""])[0].rstrip(".") or type(error).__name__
-
-
-def json_object(text: str) -> dict[str, Any] | None:
-    """A JSON object, or None where the text is none."""
-    try:
-        value = json.loads(text)
-    except (ValueError, RecursionError):
-        return None
-    return value if isinstance(value, dict) else None
+def _fewer_than_listed(path: Path, gathered: Gathered) -> list[str]:
+    """A line where nothing else says why messages are missing that metadata.yaml counts."""
+    listed = read_information(path).get("message_count") if path.is_dir() else None
+    found = sum(len(topic) for topic in gathered.topics.values())
+    if gathered.warnings or not isinstance(listed, int) or found >= listed:
+        return []
+    return [f"metadata.yaml counts {listed} messages, {found} are in the files."]
 
 
 def recorded_faults(text: str) -> tuple[Fault, ...]:

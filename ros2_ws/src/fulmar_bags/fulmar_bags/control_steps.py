@@ -123,6 +123,7 @@ def control_steps_of(
         ConfigError: Unknown name.
     """
     the_robot = load_robot(_name(bag, "robot", robot))
+    task = task or bag.reading.task
     the_task = load_task(task) if task else load_recorded_task(_name(bag, "task", None), bag.path)
     the_task.check(the_robot)
     reader = WireReader(bag)
@@ -139,7 +140,7 @@ def control_steps_of(
     by_time = unmatched and bool(len(seen)) and not len(observations)
     steps = [] if by_time else _steps(observations, commands)
     if not steps:
-        seen = _timed(seen, reader.warnings)
+        seen = reader.with_times(seen)
         steps = _even_steps(seen, settings.control_rate(the_robot))
     if not steps:
         raise BagError(f"{bag.path}: holds neither observations nor odometry; there is nothing to run again.")
@@ -231,7 +232,7 @@ def _changes(reader: WireReader) -> tuple[Received, ...]:
 
 
 def _name(bag: Bag, key: str, given: str | None) -> str:
-    value = given or (bag.info or {}).get(key)
+    value = given or bag.reading.named.get(key) or (bag.info or {}).get(key)
     if not isinstance(value, str) or not value:
         raise ConfigError(f"{bag.path}: the bag does not say its {key}. Give --{key}.")
     return value
@@ -287,14 +288,6 @@ def _steps(observations: Vectors, commands: Vectors) -> list[tuple[int, int, int
             known.add(stamp)
             steps.append((stamp, int(commands.log_ns[index]), ABSENT, index))
     return sorted(steps, key=lambda step: step[1])
-
-
-def _timed(seen: Odometries, warnings: list[str]) -> Odometries:
-    """Odometry with its times of recording in the place of stamps that never change."""
-    if len(seen) < 2 or np.ptp(seen.stamp_ns) > 0:
-        return seen
-    warnings.append("the stamps of the odometry do not advance: the times of recording stand in for them.")
-    return replace(seen, stamp_ns=seen.log_ns)
 
 
 def _even_steps(seen: Odometries, control_hz: float) -> list[tuple[int, int, int, int]]:

@@ -7,18 +7,21 @@ change. Such a topic is decoded at once; a topic whose layout changes goes throu
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Sequence
+import sys
+from array import array
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from fulmar_bags.contents import Topic
+from fulmar_bags.bag_reading import TWIST
+from fulmar_bags.gathered import Topic
 from fulmar_bags.message_types import ENCAPSULATION, LITTLE_ENDIAN, Walk, type_store
+from fulmar_bags.stored_bytes import blocks, heads_of, lengths_of
 from fulmar_core.robots.topics import TRANSFORMS
 
 NS = 1_000_000_000
-TWIST = "geometry_msgs/msg/Twist"
 STAMP = slice(ENCAPSULATION, ENCAPSULATION + 8)  # of a message that begins with a header
 FIRST_STAMP = slice(STAMP.start + 4, STAMP.stop + 4)  # of the first transform, behind their number
 
@@ -59,18 +62,18 @@ class Odometries:
 
 def messages(topic: Topic) -> list[tuple[int, Any]]:
     """Time of recording [ns] and message, of those that can be read."""
-    return [(log_ns, message) for log_ns, _, message in _timed(topic)]
+    return [(log_ns, message) for log_ns, _, message in timed_messages(topic)]
 
 
-def _timed(topic: Topic) -> list[tuple[int, int, Any]]:
-    """Times of receiving and of sending [ns] and message, of those that can be read."""
-    store, found = type_store(), []
+def timed_messages(topic: Topic) -> Iterator[tuple[int, int, Any]]:
+    """Times of receiving and of sending [ns] and message, one after the other, of those that can be read."""
+    store = type_store()
     for log_ns, publish_ns, data in zip(topic.log_ns, topic.publish_ns, topic.data, strict=True):
         try:
-            found.append((log_ns, publish_ns, store.deserialize_cdr(data, topic.type)))
+            message = store.deserialize_cdr(data, topic.type)
         except Exception:  # noqa: BLE001 - foreign bytes raise whatever they please; `open_bag` counts them
             continue
-    return found
+        yield log_ns, publish_ns, message
 
 
 def has_header(kind: str) -> bool:
@@ -86,11 +89,13 @@ def stamps_ns(topic: Topic) -> np.ndarray | None:
     """
     transforms = topic.type == TRANSFORMS.type
     place = FIRST_STAMP if transforms else STAMP
-    if not (transforms or has_header(topic.type)) or any(len(data) < place.stop for data in topic.data):
+    if not (transforms or has_header(topic.type)) or (lengths_of(topic.data) < place.stop).any():
         return None
-    little = all(data[1] & LITTLE_ENDIAN for data in topic.data)
-    raw = np.frombuffer(b"".join(data[place] for data in topic.data), dtype="<u4" if little else ">u4")
-    pairs = raw.reshape(-1, 2).astype(np.int64)
+    heads = heads_of(topic.data)
+    raw = heads[:, place].copy().view("<u4")
+    big = heads[:, 1] & LITTLE_ENDIAN == 0
+    raw[big] = raw[big].byteswap()
+    pairs = raw.astype(np.int64)
     return pairs[:, 0] * NS + pairs[:, 1]
 
 
@@ -112,16 +117,18 @@ def joint_vectors(topic: Topic, field: str) -> Vectors:
     fast = _alike(topic, lambda walk: walk.joint_state(field))
     if fast is not None:
         return Vectors(fast.texts, *_times(topic), fast.numbers, 0)
-    found = _timed(topic)
-    names = tuple(found[0][2].name) if found else ()
-    alike = [
-        each for each in found if tuple(each[2].name) == names and len(getattr(each[2], field)) == len(names)
-    ]
+    names: tuple[str, ...] | None = None
+    times, values, count = array("q"), array("d"), 0
+    for log_ns, publish_ns, message in timed_messages(topic):
+        names = tuple(message.name) if names is None else names
+        numbers = getattr(message, field)
+        if tuple(message.name) == names and len(numbers) == len(names):
+            times.extend((stamp_of(message), log_ns, publish_ns))
+            values.extend(numbers)
+            count += 1
+    names = names or ()
     return Vectors(
-        names,
-        *_times_of(alike),
-        np.array([getattr(m, field) for *_, m in alike], dtype=float).reshape(len(alike), len(names)),
-        len(topic) - len(alike),
+        names, *_columns(times, 3, np.int64), np.array(values).reshape(count, len(names)), len(topic) - count
     )
 
 
@@ -130,18 +137,14 @@ def twist_vectors(topic: Topic) -> Vectors:
 
     Those without a stamp, as most drivers of others take them, count from when they were recorded.
     """
-    found, plain = _timed(topic), topic.type == TWIST
-    twists = [message if plain else message.twist for *_, message in found]
-    logs, published = np.array([each[:2] for each in found], dtype=np.int64).reshape(-1, 2).T
-    stamps = logs if plain else np.array([stamp_of(message) for *_, message in found], dtype=np.int64)
-    return Vectors(
-        ("speed", "yaw_rate"),
-        stamps,
-        logs,
-        published,
-        np.array([(twist.linear.x, twist.angular.z) for twist in twists], dtype=float).reshape(-1, 2),
-        len(topic) - len(found),
-    )
+    plain = topic.type == TWIST
+    times, values = array("q"), array("d")
+    for log_ns, publish_ns, message in timed_messages(topic):
+        twist = message if plain else message.twist
+        times.extend((log_ns if plain else stamp_of(message), log_ns, publish_ns))
+        values.extend((twist.linear.x, twist.angular.z))
+    found = np.array(values).reshape(-1, 2)
+    return Vectors(("speed", "yaw_rate"), *_columns(times, 3, np.int64), found, len(topic) - len(found))
 
 
 def odometries(topic: Topic) -> Odometries:
@@ -158,25 +161,22 @@ def odometries(topic: Topic) -> Odometries:
             fast.numbers[:, 7:],
             0,
         )
-    found = _timed(topic)
-
-    def column(read: Callable[[Any], Sequence[float]], width: int) -> np.ndarray:
-        return np.array([read(m) for *_, m in found], dtype=float).reshape(-1, width)
-
+    frames, times, numbers = list[tuple[str, str]](), array("q"), array("d")
+    for log_ns, publish_ns, m in timed_messages(topic):
+        frames.append((sys.intern(m.header.frame_id), sys.intern(m.child_frame_id)))
+        times.extend((stamp_of(m), log_ns, publish_ns))
+        numbers.extend(
+            (*_xyz(m.pose.pose.position), *_xyz(m.pose.pose.orientation), m.pose.pose.orientation.w)
+        )
+        numbers.extend((*_xyz(m.twist.twist.linear), *_xyz(m.twist.twist.angular)))
+    table = np.array(numbers).reshape(-1, 13)
     return Odometries(
-        *_times_of(found),
-        tuple(m.header.frame_id for *_, m in found),
-        tuple(m.child_frame_id for *_, m in found),
-        column(
-            lambda m: [
-                *_xyz(m.pose.pose.position),
-                *_xyz(m.pose.pose.orientation),
-                m.pose.pose.orientation.w,
-            ],
-            7,
-        ),
-        column(lambda m: [*_xyz(m.twist.twist.linear), *_xyz(m.twist.twist.angular)], 6),
-        len(topic) - len(found),
+        *_columns(times, 3, np.int64),
+        tuple(frame for frame, _ in frames),
+        tuple(child for _, child in frames),
+        table[:, :7],
+        table[:, 7:],
+        len(topic) - len(frames),
     )
 
 
@@ -191,11 +191,9 @@ def _times(topic: Topic) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return found, np.array(topic.log_ns, dtype=np.int64), np.array(topic.publish_ns, dtype=np.int64)
 
 
-def _times_of(found: list[tuple[int, int, Any]]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """As `_times`, of messages with a header."""
-    table = [(stamp_of(message), log_ns, publish_ns) for log_ns, publish_ns, message in found]
-    stamps, logs, published = np.array(table, dtype=np.int64).reshape(-1, 3).T
-    return stamps, logs, published
+def _columns(values: array[int], width: int, kind: Any) -> np.ndarray:
+    """Columns of a table of so many, shape (width, n)."""
+    return np.array(values, dtype=kind).reshape(-1, width).T
 
 
 @dataclass(frozen=True)
@@ -220,17 +218,22 @@ def _alike(
         texts, offsets = walk_through(walk)
     except (struct.error, UnicodeDecodeError):
         return None
-    if any(len(data) != len(first) for data in topic.data) or (offsets and offsets[-1] + 8 > len(first)):
+    if (lengths_of(topic.data) != len(first)).any() or (offsets and offsets[-1] + 8 > len(first)):
         return None
-    table = np.frombuffer(b"".join(topic.data), dtype=np.uint8).reshape(len(topic), len(first))
     fixed = np.zeros(len(first), dtype=bool)
     fixed[:ENCAPSULATION] = True
     for begin, end in walk.fixed:
         fixed[begin:end] = True
-    if not (table[:, fixed] == table[0, fixed]).all():
-        return None
-    columns = [table[:, offset : offset + 8].copy().view("<f8") for offset in offsets]
-    numbers = np.concatenate(columns, axis=1) if columns else np.zeros((len(topic), 0))
+    layout = np.frombuffer(first, dtype=np.uint8)[fixed]
+    numbers = np.zeros((len(topic), len(offsets)))
+    for begin, some in blocks(topic.data):
+        table = np.frombuffer(b"".join(some), dtype=np.uint8).reshape(len(some), len(first))
+        if not (table[:, fixed] == layout).all():
+            return None
+        for column, offset in enumerate(offsets):
+            numbers[begin : begin + len(some), column] = (
+                table[:, offset : offset + 8].copy().view("<f8")[:, 0]
+            )
     return _Decoded(texts, numbers)
 
 

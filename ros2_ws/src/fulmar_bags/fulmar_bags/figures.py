@@ -10,6 +10,7 @@ import numpy as np
 
 from fulmar_bags.contents import Bag, Topic, json_object, span_ns
 from fulmar_bags.decode import messages, stamps_ns
+from fulmar_bags.stored_bytes import lengths_of
 from fulmar_core.config.errors import ConfigError
 from fulmar_core.config.paths import config_path
 from fulmar_core.config.provenance import MADE_BY, PATCH
@@ -49,7 +50,7 @@ def provenance(bag: Bag) -> dict[str, Any]:
     keys = ("robot", "task", "controller", "backend", "scenario", "seed", "control_hz", "lockstep", "command")
     return {
         "recorded_by_fulmar": bag.info is not None,
-        **{key: info.get(key) for key in keys},
+        **{key: bag.reading.named.get(key) or info.get(key) for key in keys},
         "name": bag.name or None,
         "fulmar_version": info.get("fulmar_version"),
         "git_revision": info.get("git_revision"),
@@ -113,7 +114,7 @@ def _of_topic(topic: Topic, bag: Bag) -> dict[str, Any]:
         "name": topic.name,
         "type": topic.type,
         "count": len(topic),
-        "bytes": sum(map(len, topic.data)),
+        "bytes": int(lengths_of(topic.data).sum()),
         "rate_hz": NS / period_ns if period_ns else None,
         "by": "stamp" if by_stamp else "record",
         "unstamped": unstamped,

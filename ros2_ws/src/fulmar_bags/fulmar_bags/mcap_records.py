@@ -5,14 +5,16 @@ Needs no index and no footer: damage costs the chunk it is in, and a torn end co
 
 from __future__ import annotations
 
-import mmap
+import io
 import os
 import struct
+import tempfile
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
+from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import IO, Any
 
 import zstandard
 from mcap.data_stream import ReadDataStream
@@ -23,28 +25,28 @@ from mcap.writer import MCAP0_MAGIC
 
 from fulmar_bags.mcap_file import BEGUN
 from fulmar_bags.metadata import read_custom, read_information
-from fulmar_core.config.bounded_file import ENDLESS, bounded_file
+from fulmar_bags.stored_bytes import PACKED, WHOLE, FileBytes, Piece, skip, unpack_into, unpacks_to
 from fulmar_core.config.errors import BagError
 
 Record = Schema | Channel | Message | Metadata | Attachment
 
-PACKED = ".zstd"  # ending of files that rosbag2 compressed as a whole
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
-UNPACK_BYTES = 1 << 20  # at once
-# Recorded messages shrink to a tenth, and a camera in the dark to a hundredth: beyond this it is a trap.
-UNPACK_RATIO, UNPACK_LEAST = 500, 1 << 26
+MOST_RECORD = 100_000_000  # bytes of a message or an attachment
+MOST_CHUNK = 1 << 24  # bytes that are looked at in memory
+MOST_NAME = 32  # bytes of the name of a compression
 INVALID = 0  # opcode that no record has (MCAP specification, "Records")
 
 _HEAD = struct.Struct("<BQ")  # opcode and length of every record
+_CHUNK = struct.Struct("<QQQII")  # times, size, checksum and length of the name of the compression
+_LENGTH = struct.Struct("<Q")
 _CHECKSUM = struct.Struct("<I")  # at the end of an attachment
 _MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time and publish time, before the content
-_READERS: dict[int, Callable[[ReadDataStream, int], Record | Chunk]] = {
+_READERS: dict[int, Callable[[ReadDataStream, int], Record]] = {
     Opcode.SCHEMA: lambda stream, _: Schema.read(stream),
     Opcode.CHANNEL: lambda stream, _: Channel.read(stream),
     Opcode.MESSAGE: Message.read,
     Opcode.METADATA: lambda stream, _: Metadata.read(stream),
     Opcode.ATTACHMENT: lambda stream, length: _attachment(stream.read(length)),
-    Opcode.CHUNK: lambda stream, _: Chunk.read(stream),
 }
 
 
@@ -77,6 +79,14 @@ def plain_name(path: Path) -> Path:
     return path.with_name(path.name.removesuffix(PACKED).removesuffix(BEGUN))
 
 
+@dataclass
+class PlacedMessage(Message):
+    """A message, and where its content lies: see `McapFile.read`."""
+
+    outer: int
+    at: int
+
+
 def read_records(path: Path, damage: list[str]) -> Iterator[Record]:
     """Schemas, channels, messages, metadata and attachments of an MCAP file, in their order.
 
@@ -85,70 +95,134 @@ def read_records(path: Path, damage: list[str]) -> Iterator[Record]:
     Raises:
         BagError: The file cannot be opened, is empty, or is no MCAP file at all.
     """
-    data = memoryview(file_bytes(path, damage))
-    if not data:
-        raise BagError(f"{path}: the file is empty. Was the recorder stopped before it wrote anything?")
-    if bytes(data[: len(MCAP0_MAGIC)]) != MCAP0_MAGIC:
-        raise BagError(f"{path}: this is no MCAP file.")
-    offset = len(MCAP0_MAGIC)
-    while offset < len(data):
-        if len(data) - offset < _HEAD.size:
-            damage.append(f"{path.name}: {len(data) - offset} bytes at the end are torn off.")
-            return
-        opcode, length = _HEAD.unpack_from(data, offset)
-        start, offset = offset, offset + _HEAD.size + length
-        if opcode == Opcode.DATA_END:
-            return
-        if offset > len(data) or opcode == INVALID:
-            damage.append(
-                f"{path.name}: the record at byte {start} is torn off or damaged; nothing after it counts."
-            )
-            return
-        if opcode in _READERS:
-            body = bytes(data[start + _HEAD.size : offset])
-            yield from _parse(opcode, body, f"{path.name}: the record at byte {start}", damage)
+    return McapFile(path).records(damage)
 
 
-def file_bytes(path: Path, damage: list[str]) -> bytes | mmap.mmap:
-    """Bytes of a file, unpacked if it is packed as a whole; `damage` grows by a line where that fails on the way.
+class McapFile:
+    """An MCAP file, read from front to back and piece by piece; its messages also by their places."""
 
-    What is not packed stays on the disk until it is looked at.
+    def __init__(self, path: Path) -> None:
+        """Look at a file.
 
-    Raises:
-        BagError: It cannot be opened, or unpacks to more than bags do.
-    """
-    try:
-        with bounded_file(path, ENDLESS) as file:
-            if path.suffix == PACKED:
-                return _unpacked(file, path, damage)
-            size = os.fstat(file.fileno()).st_size
-            return mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) if size else b""
-    except OSError as error:
-        raise BagError(f"{path}: {error.strerror}.") from error
+        Raises:
+            BagError: It cannot be opened.
+        """
+        self.path, self._bytes = path, FileBytes(path)
+        self._unpacked: tuple[int, bytes] = (WHOLE, b"")  # the chunk that was looked at last
+        self._spools: dict[int, IO[bytes]] = {}  # contents of chunks that are too large for memory
 
-
-def _unpacked(file: BinaryIO, path: Path, damage: list[str]) -> bytes:
-    """The content of a file that is packed as a whole, as far as bags unpack."""
-    most = unpacks_to(os.fstat(file.fileno()).st_size)
-    pieces, length = list[bytes](), 0
-    reader = zstandard.ZstdDecompressor().stream_reader(file, read_across_frames=True)
-    try:
-        while piece := reader.read(UNPACK_BYTES):
-            length += len(piece)
-            if length > most:
+    def records(self, damage: list[str]) -> Iterator[Record]:
+        """As `read_records`."""
+        with self._bytes.opened(damage) as stream:
+            magic = stream.read(len(MCAP0_MAGIC))
+            if not magic:
                 raise BagError(
-                    f"{path}: unpacks to more than {most} bytes, {UNPACK_RATIO} times its size, which no bag does. "
-                    "If you trust it, unpack it by `zstd -d`."
+                    f"{self.path}: the file is empty. Was the recorder stopped before it wrote anything?"
                 )
-            pieces.append(piece)
-    except zstandard.ZstdError as error:
-        damage.append(f"{path.name}: the rest cannot be unpacked ({error}).")
-    return b"".join(pieces)
+            if magic != MCAP0_MAGIC:
+                raise BagError(f"{self.path}: this is no MCAP file.")
+            yield from self._region(stream, len(magic), self._bytes.size, WHOLE, damage)
 
+    def read(self, outer: int, at: int, length: int) -> bytes:
+        """The content of a message.
 
-def unpacks_to(packed: int) -> int:
-    """How much so many packed bytes unpack to at most [bytes]."""
-    return max(UNPACK_LEAST, UNPACK_RATIO * packed)
+        Args:
+            outer: Where the record of the chunk is that is packed around it; `WHOLE` where it lies in the file itself.
+            at: Where it begins, in the file or in the content of that chunk.
+            length: How long it is [bytes].
+        """
+        if outer == WHOLE:
+            return self._bytes.read(WHOLE, at, length)
+        if outer in self._spools:
+            return os.pread(self._spools[outer].fileno(), length, at)
+        if self._unpacked[0] != outer:
+            _, size = _HEAD.unpack(self._bytes.read(WHOLE, outer, _HEAD.size))
+            body = self._bytes.read(WHOLE, outer + _HEAD.size, size)
+            self._unpacked = (outer, _content(Chunk.read(ReadDataStream(BytesIO(body)))))
+        return self._unpacked[1][at : at + length]
+
+    def _region(
+        self, stream: IO[bytes], at: int, end: int | None, outer: int, damage: list[str]
+    ) -> Iterator[Record]:
+        """Records one after the other, of the file or of a large chunk; without an `end` to the end of the stream."""
+        name = self.path.name
+        while head := stream.read(_HEAD.size if end is None else min(_HEAD.size, end - at)):
+            if len(head) < _HEAD.size:
+                damage.append(f"{name}: {len(head)} bytes at the end are torn off.")
+                return
+            opcode, length = _HEAD.unpack(head)
+            start, at = at, at + _HEAD.size + length
+            where = f"{name}: the record at byte {start}"
+            if opcode == Opcode.DATA_END:
+                return
+            whole = opcode != INVALID and (end is None or at <= end)
+            if whole and opcode == Opcode.CHUNK:
+                whole = yield from self._chunk(stream, start, length, damage)
+            elif whole and opcode not in _READERS:
+                skip(stream, length)
+            elif whole and length > MOST_RECORD:
+                damage.append(f"{where} has {length} bytes and was left out; at most {MOST_RECORD} are read.")
+                skip(stream, length)
+            elif whole:
+                body = stream.read(length)
+                whole = len(body) == length
+                if whole:
+                    yield from _parse(
+                        opcode, body, where, damage, (outer, start + _HEAD.size + _MESSAGE.size)
+                    )
+            if not whole:
+                damage.append(f"{where} is torn off or damaged; nothing after it counts.")
+                return
+
+    def _chunk(
+        self, stream: IO[bytes], start: int, length: int, damage: list[str]
+    ) -> Generator[Record, None, bool]:
+        """Records of a chunk; returns whether it is there to its end."""
+        where = f"{self.path.name}: the record at byte {start}"
+        head = stream.read(min(length, _CHUNK.size))
+        try:
+            begin_ns, end_ns, size, crc, name_length = _CHUNK.unpack(head)
+            about = stream.read(min(name_length, MOST_NAME) + _LENGTH.size)
+            inner = length - len(head) - len(about)
+            if name_length > MOST_NAME or _LENGTH.unpack(about[name_length:])[0] != inner:
+                raise ValueError("its lengths differ")
+            chunk = Chunk(about[:name_length].decode(), b"", end_ns, begin_ns, crc, size)
+        except (struct.error, UnicodeDecodeError, ValueError) as error:
+            damage.append(f"{where} is damaged and was left out ({type(error).__name__}).")
+            skip(stream, length - len(head) - (len(about) if len(head) == _CHUNK.size else 0))
+            return True
+        if max(inner, size) > MOST_CHUNK:
+            yield from self._large_chunk(stream, chunk, start, inner, damage)
+            return True
+        chunk.data = stream.read(inner)
+        if len(chunk.data) < inner:
+            return False
+        # What is not packed lies in the file itself, at the end of its record.
+        place = (start, 0) if chunk.compression else (WHOLE, start + _HEAD.size + length - inner)
+        yield from _parse(Opcode.CHUNK, chunk, where, damage, place)
+        return True
+
+    def _large_chunk(
+        self, stream: IO[bytes], chunk: Chunk, start: int, inner: int, damage: list[str]
+    ) -> Iterator[Record]:
+        """Records of a chunk that is too large for memory: it is unpacked into a file without a name."""
+        spool = tempfile.TemporaryFile()  # noqa: SIM115 - lives as long as its messages are looked at
+        content = Piece(stream, inner)
+        try:
+            size = unpack_into(spool, io.BufferedReader(content), chunk, unpacks_to(inner))
+        except OSError as error:
+            raise BagError(
+                f"{self.path}: no room to unpack it in {tempfile.gettempdir()}: {error}."
+            ) from error
+        except Exception as error:  # noqa: BLE001 - as in `_parse`
+            where = f"{self.path.name}: the record at byte {start}"
+            damage.append(f"{where} is damaged and was left out ({type(error).__name__}).")
+            skip(stream, content.left)
+            return
+        skip(stream, content.left)
+        self._spools[start] = spool
+        spool.seek(0)
+        yield from self._region(spool, 0, size, start, damage)
 
 
 def unpack(data: bytes) -> bytes:
@@ -170,10 +244,19 @@ def _attachment(body: bytes) -> Attachment:
     return record
 
 
-def _parse(opcode: int, body: bytes, where: str, damage: list[str]) -> list[Any]:
+def _parse(
+    opcode: int, body: bytes | Chunk, where: str, damage: list[str], place: tuple[int, int]
+) -> list[Any]:
+    """The records of one; `place` is that of a message's content, or of the first byte in a chunk."""
     try:
+        if isinstance(body, Chunk):
+            return _records_of(body, *place)
         record = _READERS[opcode](ReadDataStream(BytesIO(body)), len(body))
-        return _records_of(record) if isinstance(record, Chunk) else [record]
+        return (
+            [PlacedMessage(**vars(record), outer=place[0], at=place[1])]
+            if isinstance(record, Message)
+            else [record]
+        )
     except BagError as error:
         damage.append(f"{where}, {error}, is damaged and was left out (its checksum differs).")
         return []
@@ -182,14 +265,19 @@ def _parse(opcode: int, body: bytes, where: str, damage: list[str]) -> list[Any]
         return []
 
 
-def _records_of(chunk: Chunk) -> list[Any]:
-    """What `mcap.stream_reader.breakup_chunk` gives, several times as fast: most of a bag are messages."""
+def _content(chunk: Chunk) -> bytes:
     if chunk.compression == "zstd":
         said = zstandard.frame_content_size(chunk.data)
         if max(said, chunk.uncompressed_size) > unpacks_to(len(chunk.data)):
             raise ValueError(f"unpacks to {max(said, chunk.uncompressed_size)} bytes.")
     stream, size = get_chunk_data_stream(chunk, validate_crc=True)
-    data = stream.read(size)
+    return bytes(stream.read(size))
+
+
+def _records_of(chunk: Chunk, outer: int, begin: int) -> list[Any]:
+    """What `mcap.stream_reader.breakup_chunk` gives, several times as fast: most of a bag are messages."""
+    data = _content(chunk)
+    size = len(data)
     records: list[Any] = []
     offset = 0
     while offset < size:
@@ -199,19 +287,21 @@ def _records_of(chunk: Chunk) -> list[Any]:
             raise ValueError(f"a record of {length} bytes does not fit.")
         if opcode == Opcode.MESSAGE:
             channel, sequence, log_ns, publish_ns = _MESSAGE.unpack_from(data, start)
-            content = data[start + _MESSAGE.size : offset]
-            records.append(Message(channel, log_ns, content, publish_ns, sequence))
+            at = start + _MESSAGE.size
+            records.append(
+                PlacedMessage(channel, log_ns, data[at:offset], publish_ns, sequence, outer, begin + at)
+            )
         elif opcode in _READERS:
             records.append(_READERS[opcode](ReadDataStream(BytesIO(data[start:offset])), length))
     return records
 
 
-ENDINGS = {".mcap": "mcap", ".db3": "sqlite3"}
-GIVE = "Give a bag folder, or the .mcap or .db3 file in it."
+ENDINGS = {".mcap": "mcap", ".db3": "sqlite3", ".bag": "rosbag1"}
+GIVE = "Give a bag folder, the .mcap or .db3 file in it, or a .bag of ROS 1."
 
 
 def storage_of(file: Path) -> str | None:
-    """`mcap` or `sqlite3`, also where the file is packed as a whole; None if neither."""
+    """`mcap`, `sqlite3` or `rosbag1`, also where the file is packed as a whole; None if neither."""
     return ENDINGS.get(plain_name(file).suffix)
 
 
@@ -227,10 +317,8 @@ def files_of(path: Path) -> tuple[Path, ...]:
         return (path,)
     if not path.is_dir():
         raise BagError(f"{path}: there is no such bag. {GIVE}")
-    there = [
-        file for file in path.iterdir() if file.is_file() and (file.suffix != BEGUN or file.stat().st_size)
-    ]
-    for storage in ENDINGS.values():
+    there = [file for file in _there(path) if not _is_there_unpacked(file)]
+    for storage in _storages(path):
         files = [file for file in there if storage_of(file) == storage]
         if files:
             return tuple(sorted(files, key=place_in_bag))
@@ -238,6 +326,38 @@ def files_of(path: Path) -> tuple[Path, ...]:
     raise BagError(
         f"{path}: has no .mcap and no .db3 file{f', only {found}' if found else ': it is empty'}. {GIVE}"
     )
+
+
+def _there(folder: Path) -> list[Path]:
+    """Files of a folder that hold something."""
+    return [
+        file for file in folder.iterdir() if file.is_file() and (file.suffix != BEGUN or file.stat().st_size)
+    ]
+
+
+def _storages(folder: Path) -> list[str]:
+    """Storages in the order in which they are looked for: that of `metadata.yaml` first."""
+    said = read_information(folder).get("storage_identifier")
+    return sorted(ENDINGS.values(), key=lambda storage: storage != said)
+
+
+def _is_there_unpacked(file: Path) -> bool:
+    return file.suffix == PACKED and file.with_name(file.name.removesuffix(PACKED)).is_file()
+
+
+def left_out_files(path: Path, files: tuple[Path, ...]) -> list[tuple[str, str]]:
+    """Names of bag files in a folder that are not among those of the bag, and why."""
+    others = sorted(set(_there(path)) - set(files)) if path.is_dir() else []
+    return [
+        (
+            file.name,
+            "it is there unpacked, too"
+            if _is_there_unpacked(file)
+            else f"the folder holds {storage_of(files[0])} and {storage_of(file)}. It can be given by itself",
+        )
+        for file in others
+        if storage_of(file)
+    ]
 
 
 def missing_files(path: Path) -> tuple[str, ...]:

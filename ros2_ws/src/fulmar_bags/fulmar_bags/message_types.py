@@ -89,6 +89,8 @@ def unreadable(kind: str, data: Sequence[bytes]) -> list[int]:
     if kind not in type_store().fielddefs or not data:
         return []
     walk = _walk_through(kind, data[0])
+    if walk and len(data) == 1:
+        return []
     alike = _alike(walk, data) if walk else np.zeros(len(data), dtype=bool)
     return [i for i in np.flatnonzero(~alike).tolist() if not _readable(kind, data[i])]
 

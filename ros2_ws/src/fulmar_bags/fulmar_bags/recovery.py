@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from array import array
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
@@ -13,6 +14,7 @@ from mcap.well_known import Profile
 from fulmar_bags.mcap_file import BagFile, mcap_writer
 from fulmar_bags.mcap_records import bag_files, plain_name, read_records
 from fulmar_bags.metadata import BagSpan, TopicCount, read_custom, write_metadata
+from fulmar_bags.stored_bytes import PIECE
 from fulmar_core.config import yaml_text
 from fulmar_core.config.atomic_write import sync_folder
 from fulmar_core.config.errors import BagError
@@ -100,7 +102,7 @@ class _Copy:
         self._channels: dict[int, tuple[int, str, Channel]] = {}
         self._old, self._damage = old, damage
         self._counts: Counter[int] = Counter()
-        self._times: list[int] = []
+        self._times = array("Q")
 
     def add(self, record: Schema | Channel | Message | Metadata | Attachment) -> None:
         if isinstance(record, Schema):
@@ -148,6 +150,8 @@ class _Copy:
             )
             self._counts[message.channel_id] += 1
             self._times.append(message.log_time)
+            if self._file.waiting > PIECE:
+                self._file.flush()
 
     def finish(self) -> None:
         self._mcap.finish()

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from fulmar_bags.bag_reading import AS_IT_IS, BagReading
 from fulmar_bags.contents import Bag, json_object, open_bag
 from fulmar_bags.decode import NS, Odometries, Vectors, odometries
 from fulmar_bags.figures import controller_of
@@ -203,20 +204,20 @@ def read_run(path: Path) -> RunRecord:
     return _record(bag, bag.info)
 
 
-def read_any_run(path: Path, *, task: str | None = None, robot: str | None = None) -> RunRecord:
+def read_any_run(path: Path, reading: BagReading = AS_IT_IS) -> RunRecord:
     """Read a run that Fulmar need not have recorded; its `info` lacks `task` or `robot` where nothing names them.
 
     Args:
         path: Bag folder, or a file in it.
-        task: Task of the run; by default that of the bag or its controller.
-        robot: Robot of the run; by default that of the bag or its controller, or the namespace of the odometry.
+        reading: Task and robot of the run; by default those of the bag or its controller, or the namespace of the
+            odometry.
 
     Raises:
         BagError: There is no bag, or nothing of it can be read.
+        ConfigError: It has not the topics of `reading`.
     """
-    bag = open_bag(Path(path))
-    asked = {"task": task, "robot": robot}
-    return _record(bag, {**_named(bag), **{key: name for key, name in asked.items() if name}})
+    bag = open_bag(Path(path), reading)
+    return _record(bag, {**_named(bag), **reading.named})
 
 
 def _named(bag: Bag) -> dict[str, Any]:
@@ -237,16 +238,16 @@ def _record(bag: Bag, info: dict[str, Any]) -> RunRecord:
         reader.warnings.append(f"{bag.files[0].name}: holds no message.")
     texts = [json_object(message.data) for _, message in reader.messages(METADATA)]
     obstacles = reader.obstacles()
-    command = VELOCITY_COMMAND if len(bag.of(VELOCITY_COMMAND)) else COMMAND
+    odom = reader.with_times(_measured(reader))
     things = reader.things(task)
     surfaces = reader.vectors(SENSOR_WIRES["surfaces"], "position")
     return RunRecord(
         path=bag.path,
         info=info,
         truth=_motion(reader.odometry(TRUTH)),
-        odom=_motion(_measured(reader)),
+        odom=_motion(odom),
         applied=_actuation(reader.vectors(ACTUATORS_STATE)),
-        commanded=_actuation(reader.vectors(command)),
+        commanded=_actuation(_commands(reader, odom)),
         goals=tuple(GivenGoal(g.stamp_ns / NS, g.log_ns / NS, g.value) for g in reader.goals(task)),
         obstacles=obstacles[-1].value if obstacles else np.zeros((0, 3)),
         things={name: _places(poses) for name, poses in things.items() if poses},
@@ -261,6 +262,16 @@ def _record(bag: Bag, info: dict[str, Any]) -> RunRecord:
         inertia=inertias(reader),
         actions=series(reader, ACTION, "effort") if is_own(str(info.get("controller", ""))) else NO_SERIES,
     )
+
+
+def _commands(reader: WireReader, odom: Odometries) -> Vectors:
+    """Commands; those of speed without a stamp get one on the clock of the odometry, from when they were recorded."""
+    command = VELOCITY_COMMAND if len(reader.bag.of(VELOCITY_COMMAND)) else COMMAND
+    found = reader.vectors(command)
+    plain = None if len(found) else reader.unstamped_commands()
+    if plain is None or not len(odom):
+        return found
+    return replace(plain, stamp_ns=plain.stamp_ns + int(np.median(odom.stamp_ns - odom.log_ns)))
 
 
 def _task_of(name: object, path: Path) -> Task | None:

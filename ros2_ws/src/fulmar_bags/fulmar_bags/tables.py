@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import csv
+import itertools
+import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from fulmar_bags.column_store import ColumnStore
 from fulmar_bags.contents import Bag, Topic
-from fulmar_bags.decode import has_header, messages, stamp_of
+from fulmar_bags.decode import has_header, stamp_of, timed_messages
 from fulmar_core.config.errors import BagError
 
 MOST_ENTRIES = 64  # of one array in columns of their own; what is longer stays together
@@ -23,11 +26,15 @@ def rows(topic: Topic) -> tuple[list[int], list[int], list[Row]]:
     Returns:
         Times of recording [ns], stamps [ns] (equal to the former where there are none), and fields by path.
     """
+    found = list(rows_of(topic))
+    return [log for log, _, _ in found], [stamp for _, stamp, _ in found], [row for _, _, row in found]
+
+
+def rows_of(topic: Topic) -> Iterator[tuple[int, int, Row]]:
+    """The same, message by message: time of recording, stamp and fields of each."""
     stamped = has_header(topic.type)
-    found = messages(topic)
-    logs = [log for log, _ in found]
-    stamps = [stamp_of(message) if stamped else log for log, message in found]
-    return logs, stamps, [dict(_fields(message, "")) for _, message in found]
+    for log, _, message in timed_messages(topic):
+        yield log, stamp_of(message) if stamped else log, dict(_fields(message, ""))
 
 
 def _fields(value: Any, path: str) -> Iterator[tuple[str, Any]]:
@@ -86,18 +93,44 @@ def write_csv(bag: Bag, folder: Path) -> tuple[list[Path], list[str]]:
 
 
 def _write_table(topic: Topic, path: Path, left_out: list[str]) -> Path:
-    logs, stamps, found = _rows(topic, left_out)
-    names = columns(found)
-    long = [name for name in names if any(isinstance(row.get(name), np.ndarray) for row in found)]
+    names, long = _columns_of(itertools.islice(rows_of(topic), 1))
+    count = _filled(topic, path, names, long)
+    if count is None:  # not all messages have the fields of the first
+        names, long = _columns_of(rows_of(topic))
+        count = _filled(topic, path, names, long)
     if long:
         left_out.append(f"{topic.name}: {', '.join(long)}: too long for a table. Use --to npz.")
-        names = [name for name in names if name not in long]
+    _note_unreadable(topic, count or 0, left_out)
+    return path
+
+
+def _columns_of(found: Iterator[tuple[int, int, Row]]) -> tuple[list[str], list[str]]:
+    """Paths in the order in which they first come, and those of long arrays, which have no column."""
+    kinds: dict[str, bool] = {}
+    for _, _, row in found:
+        for name, value in row.items():
+            kinds[name] = kinds.get(name, False) or isinstance(value, np.ndarray)
+    return [name for name, is_long in kinds.items() if not is_long], [n for n, long in kinds.items() if long]
+
+
+def _filled(topic: Topic, path: Path, names: list[str], long: list[str]) -> int | None:
+    """Write a table row by row; None as soon as one has other fields, else how many there are."""
+    known, count = {*names, *long}, 0
     with path.open("w", newline="", encoding="utf-8") as stream:
         table = csv.writer(stream)
         table.writerow([*TIMES, *names])
-        for log, stamp, row in zip(logs, stamps, found, strict=True):
-            table.writerow([log, stamp, *(row.get(name, "") for name in names)])
-    return path
+        for log, stamp, row in rows_of(topic):
+            values = [row.get(name, "") for name in names]
+            if not row.keys() <= known or any(isinstance(value, np.ndarray) for value in values):
+                return None
+            table.writerow([log, stamp, *values])
+            count += 1
+    return count
+
+
+def _note_unreadable(topic: Topic, count: int, left_out: list[str]) -> None:
+    if count < len(topic):
+        left_out.append(f"{topic.name}: {len(topic) - count} messages cannot be read as {topic.type}.")
 
 
 def write_npz(bag: Bag, path: Path) -> tuple[Path, list[str]]:
@@ -113,38 +146,18 @@ def write_npz(bag: Bag, path: Path) -> tuple[Path, list[str]]:
         BagError: The bag has no messages.
         OSError: It cannot be written.
     """
-    arrays: dict[str, Any] = {}
     left_out: list[str] = []
-    for topic in _full(bag):
-        logs, stamps, found = _rows(topic, left_out)
-        name = topic.name.strip("/")
-        arrays[f"{name}/log_ns"] = np.array(logs, dtype=np.int64)
-        arrays[f"{name}/stamp_ns"] = np.array(stamps, dtype=np.int64)
-        for column in columns(found):
-            values: list[Any] = [row.get(column) for row in found]
-            arrays_among = any(isinstance(value, np.ndarray) for value in values)
-            if arrays_among and len({np.shape(value) for value in values}) > 1:
-                left_out.append(f"{topic.name}: {column}: its length changes.")
-                continue
-            arrays[f"{name}/{column}"] = _array(values)
+    topics = _full(bag)
     path.parent.mkdir(parents=True, exist_ok=True)
-    np.savez_compressed(path, allow_pickle=False, **arrays)
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        for topic in topics:
+            with ColumnStore() as store:
+                for log, stamp, row in rows_of(topic):
+                    store.add({"log_ns": log, "stamp_ns": stamp, **row})
+                _note_unreadable(topic, store.count, left_out)
+                uneven = store.write(archive, topic.name.strip("/"))
+                left_out += [f"{topic.name}: {column}: its length changes." for column in uneven]
     return path, left_out
-
-
-def _rows(topic: Topic, left_out: list[str]) -> tuple[list[int], list[int], list[Row]]:
-    logs, stamps, found = rows(topic)
-    if len(found) < len(topic):
-        left_out.append(f"{topic.name}: {len(topic) - len(found)} messages cannot be read as {topic.type}.")
-    return logs, stamps, found
-
-
-def _array(values: list[Any]) -> np.ndarray:
-    if isinstance(values[0], np.ndarray):
-        return np.stack(values)
-    if any(isinstance(value, str) for value in values):
-        return np.array(["" if value is None else str(value) for value in values])
-    return np.array([np.nan if value is None else value for value in values])
 
 
 def _full(bag: Bag) -> list[Topic]:

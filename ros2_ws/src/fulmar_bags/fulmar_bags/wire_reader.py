@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
+from fulmar_bags.bag_reading import types_of
 from fulmar_bags.contents import Bag, Topic
 from fulmar_bags.decode import (
     TWIST,
@@ -68,12 +71,24 @@ class WireReader:
             )
         return found
 
+    def with_times(self, seen: Odometries) -> Odometries:
+        """Odometry with its times of recording in the place of stamps that never change."""
+        if len(seen) < 2 or np.ptp(seen.stamp_ns) > 0:
+            return seen
+        self.warnings.append(
+            "the stamps of the odometry do not advance: the times of recording stand in for them."
+        )
+        return replace(seen, stamp_ns=seen.log_ns)
+
     def unstamped_commands(self) -> Vectors | None:
         """The only `cmd_vel` without stamps that has messages; None where there is none, or several."""
+        said = self.bag.reading.topics.get(VELOCITY_COMMAND.name)
         found = [
             topic
             for topic in self.bag.topics.values()
-            if topic.type == TWIST and len(topic) and topic.name.split("/")[-1] == VELOCITY_COMMAND.name
+            if topic.type == TWIST
+            and len(topic)
+            and (topic.name == said or (not said and topic.name.split("/")[-1] == VELOCITY_COMMAND.name))
         ]
         return twist_vectors(found[0]) if len(found) == 1 else None
 
@@ -123,7 +138,7 @@ class WireReader:
     def _topic(self, wire: Wire) -> Topic:
         """The topic of a wire; messages under its name that are of another type are a warning."""
         name = self.bag.topic_name(wire)
-        known = {wire.type, TWIST} if wire is VELOCITY_COMMAND else {wire.type}  # see `unstamped_commands`
+        known = types_of(wire)
         others = sum(len(t) for t in self.bag.topics.values() if t.name == name and t.type not in known)
         if others:
             self.warnings.append(f"{others} messages of {name} have another type.")

@@ -159,6 +159,10 @@ def _run_and_exit(stops: list[str]) -> None:
         sys.exit(FAILED)
     except OSError as error:  # a folder that cannot be written, a full disk
         sys.exit(_complain(f"{error.filename or 'the system'}: {error.strerror or error}.", FAILED))
+    except MemoryError:
+        sys.exit(
+            _complain("the memory of this computer, or of its limit (`ulimit -v`), does not suffice.", FAILED)
+        )
     except ImportError as error:
         advice = advice_for(error)
         if advice is None:

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from fulmar_bags.bag_reading import AS_IT_IS, BagReading
 from fulmar_bags.contents import Bag, open_bag
 from fulmar_bags.event_files import EventFile, is_event_file, open_event_file
 from fulmar_bags.event_packets import events_of_cloud
@@ -62,7 +63,12 @@ class Rates:
 
 
 def cameras_of(
-    robot: Robot, sources: Sequence[Path], *, size: tuple[int, int] | None, fov_deg: float | None
+    robot: Robot,
+    sources: Sequence[Path],
+    *,
+    size: tuple[int, int] | None,
+    fov_deg: float | None,
+    reading: BagReading = AS_IT_IS,
 ) -> tuple[StarCamera, ...]:
     """Cameras that a bag or recordings are from: mounted as the robot's, of the size that a file says, or was given.
 
@@ -83,7 +89,7 @@ def cameras_of(
         opened = [open_event_file(path, size) for path in files]
         known = [(file.width, file.height, camera.fov_deg) for file, camera in zip(opened, its, strict=False)]
     else:
-        bag = open_bag(sources[0])
+        bag = open_bag(sources[0], reading)
         count = 2 if len(bag.of(EVENTS_2)) else 1
         known = [(camera.width, camera.height, camera.fov_deg) for camera in its[:count]]
         known = [tuple(each) for each in (bag.info or {}).get(CAMERAS, known)]
@@ -94,7 +100,9 @@ def cameras_of(
     )
 
 
-def packets_of(sources: Sequence[Path], cameras: Sequence[StarCamera]) -> Iterator[Packet]:
+def packets_of(
+    sources: Sequence[Path], cameras: Sequence[StarCamera], reading: BagReading = AS_IT_IS
+) -> Iterator[Packet]:
     """Packets of one bag, or of a file for each camera, by time.
 
     Raises:
@@ -109,7 +117,7 @@ def packets_of(sources: Sequence[Path], cameras: Sequence[StarCamera]) -> Iterat
         return heapq.merge(*streams, key=lambda packet: packet[:2])
     if len(sources) != 1:
         raise ConfigError("give one bag, or one recording for each camera.")
-    return iter(_of_bag(open_bag(sources[0]), sources[0]))
+    return iter(_of_bag(open_bag(sources[0], reading), sources[0]))
 
 
 def rates_of(

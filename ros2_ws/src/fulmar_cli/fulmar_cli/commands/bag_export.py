@@ -5,14 +5,17 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
+from fulmar_bags.bag_reading import BagReading
 from fulmar_bringup.console import print_json, warn, write_line
 from fulmar_cli.commands.arguments import JsonOption, argument, option
+from fulmar_cli.commands.bag_reading import with_bag_options
 from fulmar_cli.commands.damage import finish, open_and_warn
 from fulmar_core.config.errors import BagError, ConfigError, UnknownNameError
 
 FORMATS = ("csv", "npz", "lerobot")
 
 
+@with_bag_options()
 def export(
     bags: Annotated[list[Path], argument("BAG...", "Bags; several only for lerobot.")],
     to: Annotated[
@@ -27,10 +30,9 @@ def export(
     out: Annotated[
         Path | None, option("PATH", "Folder, or the .npz file; beside the bag by default.")
     ] = None,
-    task: Annotated[
-        str | None, option("T", "Task of the bags, for a dataset, where it is a class of your own.")
-    ] = None,
     as_json: JsonOption = False,
+    *,
+    reading: BagReading,
 ) -> None:
     """Write what is in a bag as CSV, as NumPy arrays, or as a dataset to learn from.
 
@@ -44,7 +46,7 @@ def export(
         raise UnknownNameError("--to", to, FORMATS)
     if len(bags) > 1 and to != "lerobot":
         raise ConfigError(f"--to {to} takes one bag, {len(bags)} were given. Export them one by one.")
-    opened = [open_and_warn(bag) for bag in bags]
+    opened = [open_and_warn(bag, reading) for bag in bags]
     beside = bags[0] if bags[0].is_dir() else bags[0].parent
     if to == "csv":
         files, left_out = write_csv(opened[0], out or beside / "csv")
@@ -63,7 +65,7 @@ def export(
                     f"{bag.path}: others recorded it, without the observations of a controller. Use --to csv or npz."
                 )
         with knowing_what_it_carries(*opened):
-            records = [control_steps_of(bag, task=task) for bag in opened]
+            records = [control_steps_of(bag) for bag in opened]
             titles = [record.task.title for record in records]
             folder, notes = write_lerobot(records, titles, out or beside / "lerobot")
         files, left_out = [folder], []

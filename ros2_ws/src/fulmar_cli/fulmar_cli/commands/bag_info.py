@@ -7,8 +7,10 @@ from typing import Any
 
 import typer
 
+from fulmar_bags.bag_reading import BagReading
 from fulmar_bringup.console import print_result, write_line
 from fulmar_cli.commands.arguments import BagArgument, JsonOption
+from fulmar_cli.commands.bag_reading import with_bag_options
 from fulmar_core.config.errors import DONE, FAILED
 
 HEAD = ("topic", "type", "count", "rate [Hz]", "gaps", "longest [s]", "late", "dropped")
@@ -27,7 +29,8 @@ ORIGIN = (
 )
 
 
-def info(bag: BagArgument, as_json: JsonOption = False) -> None:
+@with_bag_options()
+def info(bag: BagArgument, as_json: JsonOption = False, *, reading: BagReading) -> None:
     """Show what is in a bag: topics, types, counts, rates, gaps, late and dropped messages, provenance.
 
     Rates and gaps go by the stamps in the messages where they have any, else by when they were recorded. A gap is 2.5
@@ -40,7 +43,7 @@ def info(bag: BagArgument, as_json: JsonOption = False) -> None:
     from fulmar_bags.contents import open_bag
     from fulmar_bags.figures import describe
 
-    found = describe(open_bag(bag))
+    found = describe(open_bag(bag, reading))
     print_result(found, _show, as_json=as_json)
     raise typer.Exit(FAILED if found["damage"] else DONE)
 

@@ -5,14 +5,17 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any
 
+from fulmar_bags.bag_reading import BagReading
 from fulmar_bringup.console import print_result, warn, write_line
 from fulmar_cli.commands.arguments import BagArgument, JsonOption, OdometryOption, PolicyOption, option
+from fulmar_cli.commands.bag_reading import with_bag_options
 from fulmar_cli.commands.damage import finish
 from fulmar_cli.commands.values import read_pose
 
 SHOWN = 12  # lines of fields that differ
 
 
+@with_bag_options()
 def rerun(
     bag: BagArgument,
     controller: Annotated[
@@ -38,8 +41,6 @@ def rerun(
             "action, command; 0, the same bits, by default. May be repeated.",
         ),
     ] = None,
-    robot: Annotated[str | None, option("R", "Whose bag it is, if it does not say.")] = None,
-    task: Annotated[str | None, option("T", "What was to be done, if it does not say.")] = None,
     goal: Annotated[
         str | None, option("x,y,deg", "The goal, for a bag that holds none; in space x,y,z,roll,pitch,yaw.")
     ] = None,
@@ -49,6 +50,8 @@ def rerun(
     odometry: OdometryOption = None,
     out: Annotated[Path | None, option("FILE", "Write the answers, step by step: .csv or .npz.")] = None,
     as_json: JsonOption = False,
+    *,
+    reading: BagReading,
 ) -> None:
     """Let a controller answer a recorded run, and compare its answers with the recorded ones, field by field.
 
@@ -68,10 +71,10 @@ def rerun(
 
     pose = read_pose(goal, "--goal")
     request = RerunRequest(
-        controller, policy, source, through, robot, task, pose, control_hz, odometry, out
+        controller, policy, source, through, reading.robot, reading.task, pose, control_hz, odometry, out
     )  # fmt: skip
     tolerances = read_tolerances(tolerance or [], FIELDS)
-    opened = open_bag(bag)
+    opened = open_bag(bag, reading)
     request.check(foreign=opened.info is None)
     result: dict[str, Any] = {"bag": str(bag), **rerun_bag(opened, request, tolerances, warn)}
     sums = result.pop("sums")

@@ -11,18 +11,20 @@ from fulmar_bringup.console import warn
 from fulmar_core.config.errors import DONE, FAILED
 
 if TYPE_CHECKING:
+    from fulmar_bags.bag_reading import BagReading
     from fulmar_bags.contents import Bag
 
 
-def open_and_warn(path: Path) -> Bag:
+def open_and_warn(path: Path, reading: BagReading | None = None) -> Bag:
     """Open a bag, and warn of parts that could not be read.
 
     Raises:
         BagError: As `open_bag`.
     """
+    from fulmar_bags.bag_reading import AS_IT_IS
     from fulmar_bags.contents import open_bag
 
-    bag = open_bag(path)
+    bag = open_bag(path, reading or AS_IT_IS)
     warn(bag.warnings)
     return bag
 

@@ -6,8 +6,10 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from fulmar_bags.bag_reading import BagReading
 from fulmar_bringup.console import log_line, new_table, output, print_result, warn, write_line
 from fulmar_cli.commands.arguments import JsonOption, argument, option
+from fulmar_cli.commands.bag_reading import with_bag_options
 from fulmar_core.config.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -18,6 +20,7 @@ _NUMBER = r"[0-9]*\.?[0-9]+(?:[eE][-+]?[0-9]+)?"
 _QUANTITY = re.compile(rf"(?P<value>{_NUMBER})(?:(?:\+-|±)(?P<error>{_NUMBER}))?(?:\s*(?:kg|N|s|m|kg·m²))?")
 
 
+@with_bag_options()
 def identify(
     bags: Annotated[list[Path], argument("BAG...", "Driven runs of one robot.")],
     known: Annotated[
@@ -31,6 +34,8 @@ def identify(
         Path | None, option("FILE", "Write a calibration for --calibration of run, evaluate, train.")
     ] = None,
     as_json: JsonOption = False,
+    *,
+    reading: BagReading,
 ) -> None:
     """Estimate mass, inertia, thrust, drag, wheel scale and delay from runs, with intervals of 95 % confidence.
 
@@ -46,6 +51,10 @@ def identify(
 
     fulmar identify runs/bare runs/heavy --ballast runs/heavy=2.000+-0.005
 
+    A bag of another program needs --robot, poses (nav_msgs/Odometry) and commands; --topics says how those are called:
+
+    fulmar identify theirs --robot turtlebot2 --topics odom=/base/odometry,cmd_vel=/base/velocity
+
     Of a satellite the inertia is estimated from gyroscope and wheels, by three methods; there is no calibration of it.
     """
     from fulmar_cli.commands.identify_satellite import print_satellite
@@ -55,14 +64,12 @@ def identify(
     from fulmar_evaluation.identification.identify import identify as estimate
     from fulmar_evaluation.identification.model import Known
 
-    if print_satellite(bags, given=bool(known or ballast or out), as_json=as_json):
+    if print_satellite(bags, reading, given=bool(known or ballast or out), as_json=as_json):
         return
-    known_values = []
-    for text in known or []:
-        name, value, error = _read(text, "--known", "mass=5.32+-0.02")
-        known_values.append(Known(name, value, max(error / SIGMAS, 1e-6 * value)))
+    read = [_read(text, "--known", "mass=5.32+-0.02") for text in known or []]
+    known_values = [Known(name, value, max(error / SIGMAS, 1e-6 * value)) for name, value, error in read]
     loads, ballasts = _loads(bags, ballast or [])
-    runs = [driven_run(bag, load=load) for bag, load in zip(bags, loads, strict=True)]
+    runs = [driven_run(bag, reading, load=load) for bag, load in zip(bags, loads, strict=True)]
     warn(f"{bag}: {line}" for bag, (_, _, lines) in zip(bags, runs, strict=True) for line in lines)
     names = sorted({robot.name for robot, _, _ in runs})
     if len(names) > 1:
@@ -75,8 +82,8 @@ def identify(
         save_calibration(calibration, out)
     document = _document(robot, bags, sum(drive.duration_s for _, drive, _ in runs), found, out)
     if found.undetermined:
-        names_left = ", ".join(found.undetermined)
-        warn([f"the runs do not show {names_left}: left out of the calibration. Drive more briskly."])
+        left = ", ".join(found.undetermined)
+        warn([f"the runs do not show {left}: left out of the calibration. Drive more briskly."])
     if not found.trusted:
         log_line(f"note: {found.scale}.")
     print_result(document, _print, as_json=as_json)
@@ -138,6 +145,6 @@ def _print(document: dict[str, Any]) -> None:
     for name, e in document["estimates"].items():
         table.add_row(name, *(f"{e[part]:.5g}" for part in ("value", "low", "high")), e["unit"])
     output.print(table)
-    write_line(f"{document['scale']}")
+    write_line(document["scale"])
     if document["calibration"]:
         write_line(f"written: {document['calibration']}; use it with --calibration {document['calibration']}")

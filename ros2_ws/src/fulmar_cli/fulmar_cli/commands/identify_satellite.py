@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from fulmar_bringup.console import print_result, write_line
 
+if TYPE_CHECKING:
+    from fulmar_bags.bag_reading import BagReading
 
-def print_satellite(bags: list[Path], *, given: bool, as_json: bool) -> bool:
+
+def print_satellite(bags: list[Path], reading: BagReading, *, given: bool, as_json: bool) -> bool:
     """Identify the inertia where the bags are of one satellite, and print it; False for any other robot.
 
     Raises:
@@ -19,7 +22,7 @@ def print_satellite(bags: list[Path], *, given: bool, as_json: bool) -> bool:
     from fulmar_evaluation.identification.by_kind import ESTIMATED
     from fulmar_evaluation.identification.satellite import robot_of_bag
 
-    names = {robot_of_bag(bag) for bag in bags}
+    names = {robot_of_bag(bag, reading) for bag in bags}
     if len(names) != 1 or not (name := names.pop()):
         return False
     robot = load_robot(name)
@@ -31,7 +34,7 @@ def print_satellite(bags: list[Path], *, given: bool, as_json: bool) -> bool:
             f"--known, --ballast and --out are not for '{name}': wheels and gyroscope show its inertia in kg·m² "
             "without them, and there is no calibration of it. Leave them out."
         )
-    print_result(estimate(robot, bags), _print, as_json=as_json)
+    print_result(estimate(robot, bags, reading), _print, as_json=as_json)
     return True
 
 

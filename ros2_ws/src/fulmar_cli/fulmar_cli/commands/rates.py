@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from fulmar_bags.bag_reading import BagReading
 from fulmar_bringup.console import log_line, print_result, write_line
 from fulmar_bringup.progress import work_bar
 from fulmar_cli.commands.arguments import JsonOption, argument, option
+from fulmar_cli.commands.bag_reading import with_bag_options
 from fulmar_core.config.errors import FAILED, ConfigError
 
 if TYPE_CHECKING:
@@ -28,6 +30,7 @@ BYTES_AN_EVENT = 5.0  # of compressed recordings, about
 BAG_HELP = "Write the packets into a bag too, for `fulmar bag play` to feed a live estimator with."
 
 
+@with_bag_options(robot=False)
 def rates(
     sources: Annotated[list[Path], argument("SOURCE...", SOURCES_HELP)],
     robot: Annotated[str, option("R", ROBOT_HELP)] = "cubesat_wheels",
@@ -37,6 +40,8 @@ def rates(
     to_bag: Annotated[Path | None, option("BAG", BAG_HELP)] = None,
     plot: Annotated[Path | None, option("FILE", "Draw the rates over time: .png, .svg or .pdf.")] = None,
     as_json: JsonOption = False,
+    *,
+    reading: BagReading,
 ) -> None:
     """Estimate turn rates from recorded events of stars, by the estimator that runs as a node.
 
@@ -61,7 +66,7 @@ def rates(
 
         check_image(plot)
     the_robot = load_robot(robot)
-    cameras = cameras_of(the_robot, sources, size=_size(size), fov_deg=fov)
+    cameras = cameras_of(the_robot, sources, size=_size(size), fov_deg=fov, reading=reading)
     with _kept(to_bag, the_robot, cameras, sources) as keep, work_bar("estimating") as moved:
         total = sum(path.stat().st_size for path in sources if path.is_file())
         done = [0]
@@ -71,7 +76,7 @@ def rates(
             done[0] += len(packet[2])
             moved(done[0], max(total / BYTES_AN_EVENT, done[0]))
 
-        found = rates_of(packets_of(sources, cameras), cameras, estimator, each)
+        found = rates_of(packets_of(sources, cameras, reading), cameras, estimator, each)
     if plot is not None:
         _draw(found, plot)
     print_result(found.document(), _print, as_json=as_json)

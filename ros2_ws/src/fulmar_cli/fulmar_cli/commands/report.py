@@ -5,11 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
+from fulmar_bags.bag_reading import BagReading
 from fulmar_bringup.console import log_line, write_line
 from fulmar_cli.commands.arguments import argument, flag, option
+from fulmar_cli.commands.bag_reading import with_bag_options
 from fulmar_core.config.errors import BagError
 
 
+@with_bag_options()
 def report(
     bags: Annotated[list[Path], argument("BAG...", "Bags of runs; several are compared.")],
     out: Annotated[
@@ -18,13 +21,11 @@ def report(
             "FILE", "An .html page or a .png image; by default report.html in the bag, or comparison.html."
         ),
     ] = None,
-    task: Annotated[
-        str | None, option("T", "Task of the runs, where a bag names none; from `fulmar list tasks`.")
-    ] = None,
-    robot: Annotated[str | None, option("R", "Robot of the runs, where a bag names none.")] = None,
     force: Annotated[
         bool, flag("--force", "Replace FILE even if it is not a report of the same bags.")
     ] = False,
+    *,
+    reading: BagReading,
 ) -> None:
     """Make a report with plots from recorded runs.
 
@@ -33,15 +34,12 @@ def report(
     """
     from fulmar_bags.contents import open_bag
     from fulmar_bags.run_record import read_any_run
-    from fulmar_core.tasks import load_task
     from fulmar_evaluation.report.bag_report import write_bag_report
     from fulmar_evaluation.report.run_report import write_report
     from fulmar_evaluation.report.writer import default_report
     from fulmar_evaluation.rerun.embedded_configs import knowing_what_they_carry
 
-    if task is not None:
-        load_task(task)
-    records = [read_any_run(bag, task=task, robot=robot) for bag in bags]
+    records = [read_any_run(bag, reading) for bag in bags]
     for record in records:
         for warning in record.warnings:
             log_line(f"warning: {warning}")
@@ -53,5 +51,5 @@ def report(
             if len(bags) > 1:
                 raise
             log_line(f"warning: no result: {missing}")
-            write_bag_report(open_bag(bags[0]), path, note=f"No result: {missing}", force=force)
+            write_bag_report(open_bag(bags[0], reading), path, note=f"No result: {missing}", force=force)
     write_line(str(path))

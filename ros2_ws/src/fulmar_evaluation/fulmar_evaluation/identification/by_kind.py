@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from fulmar_bags.bag_reading import BagReading
 from fulmar_core.robots.robot import Robot
 from fulmar_evaluation.identification.boat import BoatModel
 from fulmar_evaluation.identification.free_flyer import FreeFlyerModel
@@ -44,4 +45,6 @@ MODELS: dict[tuple[str, str], Identifies] = {
 }
 
 # Kinds that estimators identify instead, from a robot and its bags; JSON-ready.
-ESTIMATED: dict[str, Callable[[Robot, Sequence[Path]], dict[str, Any]]] = {"satellite": identify_satellite}
+ESTIMATED: dict[str, Callable[[Robot, Sequence[Path], BagReading], dict[str, Any]]] = {
+    "satellite": identify_satellite
+}

@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from fulmar_bags.bag_reading import AS_IT_IS, BagReading
 from fulmar_bags.contents import open_bag
 from fulmar_bags.message_reader import reading_of
 from fulmar_bags.wire_reader import WireReader
@@ -23,12 +24,13 @@ METHODS: tuple[Literal["batch", "rls", "ekf"], ...] = ("batch", "rls", "ekf")
 NAMES = ("xx", "yy", "zz", "xy", "xz", "yz")
 
 
-def identify_satellite(robot: Robot, bags: Sequence[Path]) -> dict[str, Any]:
+def identify_satellite(robot: Robot, bags: Sequence[Path], reading: BagReading = AS_IT_IS) -> dict[str, Any]:
     """Estimate the inertia by every method, over all bags.
 
     Args:
         robot: The satellite.
         bags: Its runs; the recursive methods go from one to the next.
+        reading: What the bags do not say themselves.
 
     Returns:
         JSON-ready: by method the tensor's entries with 95 % intervals [kg·m²], or why there is none.
@@ -38,7 +40,7 @@ def identify_satellite(robot: Robot, bags: Sequence[Path]) -> dict[str, Any]:
     """
     settings = load_estimator("inertia")
     assert isinstance(settings, InertiaSettings)
-    runs = [_readings(bag) for bag in bags]
+    runs = [_readings(bag, reading) for bag in bags]
     found: dict[str, Any] = {
         "robot": robot.name,
         "bags": [str(bag) for bag in bags],
@@ -55,16 +57,17 @@ def identify_satellite(robot: Robot, bags: Sequence[Path]) -> dict[str, Any]:
     return found
 
 
-def _readings(bag: Path) -> list[tuple[int, str, Any]]:
+def _readings(bag: Path, reading: BagReading) -> list[tuple[int, str, Any]]:
     """Stamp [ns], name and reading of every message of gyroscope and wheels, by time."""
-    reader = WireReader(open_bag(bag))
+    reader = WireReader(open_bag(bag, reading))
     found = []
     for name in ("imu", "wheels"):
         kind = SENSORS[name]
         readings = [reading_of(message, kind) for _, message in reader.messages(kind.wire)]
         if not readings:
             raise BagError(
-                f"{bag}: no message on '{kind.wire.name}', which shows the inertia. Record a run of a satellite with "
+                f"{bag}: no message on '{kind.wire.name}', which shows the inertia. If it has another name there, give "
+                f"--topics {kind.wire.name}=TOPIC; else record a run of a satellite with "
                 "its gyroscope and wheels: "
                 "fulmar run cubesat_wheels --task point_inertial --controller excite --lockstep"
             )
@@ -90,6 +93,6 @@ def _document(estimator: InertiaEstimator) -> dict[str, Any]:
     }
 
 
-def robot_of_bag(bag: Path) -> str:
-    """Name of the robot whose run a bag holds."""
-    return str((open_bag(bag).info or {}).get("robot", ""))
+def robot_of_bag(bag: Path, reading: BagReading = AS_IT_IS) -> str:
+    """Name of the robot whose run a bag holds; empty where neither the bag nor `reading` says it."""
+    return reading.robot or open_bag(bag).robot
