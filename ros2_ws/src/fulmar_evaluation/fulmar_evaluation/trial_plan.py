@@ -21,6 +21,7 @@ from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.simulation.counts import check_episodes
 from fulmar_core.simulation.episode import episode_steps
 from fulmar_core.tasks import load_task
+from fulmar_core.worlds.by_kind import check_scenario
 from fulmar_core.worlds.scenario import check_delays, load_scenario
 from fulmar_evaluation.evaluation import (
     BATCH_EPISODES,
@@ -83,6 +84,7 @@ def plan_trial(
             "Use `fulmar run`, or make it a class: docs/own-controller.md."
         )
     the_robot, the_task = load_robot(robot), load_task(task)
+    check_scenario(the_robot, scenario)
     check_delays(the_robot, load_scenario(scenario))
     hz = checked_rate(the_robot, control_hz or usual_hz(controller, the_robot, the_task, policy))
     if episode_s is not None and steps is not None:
