@@ -15,15 +15,17 @@ from typing import Any
 from fulmar_core.config.errors import BundleError, ConfigError, UnknownNameError
 from fulmar_core.config.own_class import is_own, load_class
 from fulmar_core.controllers.by_kind import LAWS, exciting
-from fulmar_core.controllers.classical import check_pair, load_classical
+from fulmar_core.controllers.classical import check_pair, has_law, load_classical
 from fulmar_core.controllers.controller import Controller
 from fulmar_core.controllers.excite import Excite
+from fulmar_core.loop.controller_settings import POLICY
 from fulmar_core.loop.policy_bundle import PASSPORT, read_passport
 from fulmar_core.robots.robot import Robot
 from fulmar_core.tasks import Task
 from fulmar_core.tasks.goal_files import load_torques
 from policy_server.own_controller import MEMBERS, OwnController
 
+CLASSICAL = "classical"  # the law of a robot's family
 EXTERNAL = "external"  # any node that publishes the robot's commands
 
 
@@ -179,6 +181,28 @@ def shipped_policy(robot: str, task: str) -> Path | None:
     """The shipped bundle for a robot and a task, or None."""
     folder = policies_directory() / f"{robot}_{task}"
     return folder if (folder / PASSPORT).is_file() else None
+
+
+def usual_controller(robot: Robot, task: Task, policy: str = "") -> str:
+    """The controller of a pair where none is asked for: one that exists.
+
+    Args:
+        robot: The robot.
+        task: What it does.
+        policy: Folder of a bundle that was given; empty: none.
+
+    Returns:
+        What runs that bundle; else what the robot's file says, a shipped policy, or the law of its kind. Where there is
+        none of these it is `policy`, which nothing can load.
+    """
+    if policy:
+        return POLICY
+    law = has_law(robot, task)
+    if robot.usual_controller and law:
+        return robot.usual_controller
+    if law and shipped_policy(robot.name, task.name) is None:
+        return robot.kind.usual_law or CLASSICAL
+    return POLICY
 
 
 def usual_hz(controller: str, robot: Robot, task: Task, policy: Path | None = None) -> float:

@@ -90,7 +90,9 @@ def _as_trained(robot: Robot) -> Any:
     """A robot as batches have it: on air, its supply full, and without sensors that no policy reads."""
     actuators: Any = robot.actuators if robot.actuators.tank is None else replace(robot.actuators, tank=None)
     sensors = replace(robot.sensors, supply=None)
-    found = _chosen(replace(robot, air_bearing=False, actuators=actuators, sensors=sensors))
+    found = _chosen(
+        replace(robot, air_bearing=False, usual_controller="", actuators=actuators, sensors=sensors)
+    )
     del found["sensors"]["own"]
     return found
 

@@ -244,6 +244,7 @@ class Robot:
     hydrodynamics: Hydrodynamics | None = None  # of a hull that swims
     airframe: Airframe | None = None  # of an aircraft
     event_cameras: tuple[EventCamera, ...] = ()  # that look at the stars, at most two
+    usual_controller: str = ""  # that drives it where none is asked for; empty: a shipped policy, else a law
     air_bearing: bool = False  # it floats on air that `air_bearing/enable` switches
 
     @functools.cached_property
