@@ -6,8 +6,6 @@ from pathlib import Path
 
 import pytest
 
-from fulmar_bringup.completion import usual_controller
-from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.task_choice import check_heading, default_task
 from fulmar_cli.commands.values import read_goal
 from fulmar_core.config.errors import ConfigError
@@ -37,7 +35,6 @@ def test_three_numbers_are_a_pose_and_two_a_position_whichever_policies_are_ship
             "Say --task go_to_position or --goal x,y, or --controller classical.",
         ),
         ("leatherback", "classical", (1.0, 2.0, 90.0), "Say --task go_to_position or --goal x,y."),
-        ("leatherback", "policy", None, "a run without --task and --goal is go_to_pose: no policy"),
         ("floating_platform", "mpc", (1.0, 2.0), "Say --task go_to_pose or --goal x,y,deg, or --controller"),
     ],
 )
@@ -65,20 +62,21 @@ def test_a_heading_that_a_named_task_does_not_have_is_said_to_have_no_effect():
 def test_a_goal_has_two_or_three_numbers():
     assert read_goal("1,-0.5") == (1.0, -0.5)
     assert read_goal("1,-0.5,90") == (1.0, -0.5, 90.0)
-    for text in ("1", "1,2,3,4", "1,nan", "a,b"):
-        with pytest.raises(ConfigError, match="two or three finite numbers"):
+    for text in ("1", "1,2,3,4"):
+        with pytest.raises(ConfigError, match="must be x,y,deg or x,y, in space"):
+            read_goal(text)
+    for text in ("1,nan", "a,b", "1,inf", "1m,2", "1,", ""):
+        with pytest.raises(ConfigError, match="is no finite number"):
             read_goal(text)
 
 
-def test_an_aircraft_holds_its_height_by_lqi_where_no_policy_is_shipped(monkeypatch):
-    assert default_task("navion", "policy") == "fly_hold"
+def test_an_aircraft_holds_its_height_where_it_can_and_else_a_bank():
+    assert default_task("a0s", "") == "fly_hold"
+    assert default_task("navion", "") == "fly_attitude"  # its hull touches the water a metre above it
+    assert default_task("navion", "policy") == "fly_attitude"
 
-    def usual(controller, policy=""):
-        return usual_controller(RunPlan("navion", "fly_hold", controller, "mujoco", policy=policy))
 
-    monkeypatch.setattr("fulmar_bringup.completion.shipped_policy", lambda *_names: None)
-    assert usual("policy") == "lqi"
-    assert usual("lqr") == "lqr"
-    assert usual("policy", "mine") == "policy"
-    monkeypatch.setattr("fulmar_bringup.completion.shipped_policy", lambda *_names: Path("shipped"))
-    assert usual("policy") == "policy"
+def test_a_robot_without_a_goal_does_the_first_of_its_usual_tasks_that_the_controller_does():
+    assert default_task("leatherback", "policy") == "go_to_position"
+    assert default_task("jetbot", "policy") == "go_to_position"
+    assert default_task("jetbot", "classical") == "go_to_pose"

@@ -87,6 +87,14 @@ def test_a_satellite_has_the_time_that_its_turns_take(plan, file):
     assert request.duration_s == pytest.approx(2 * 20.0 + 3.0 * math.radians(90.0 + 180.0) / 0.03 + 5.0)
 
 
+def test_a_file_of_poses_of_a_satellite_has_no_places(plan, file):
+    goals = file("kind: poses\ntitle: away\nposes: [[0, 0, 0, 0, 0, 90], [5, 0, 0, 0, 0, 90]]\n")
+    with pytest.raises(
+        ConfigError, match=r"'5,0,0,0,0,90': x = 5 m would have no effect, 'cubesat_wheels' goes to no"
+    ):
+        plan(goals, robot="cubesat_wheels", task="slew", start=(0.0,) * 6)
+
+
 def test_velocities_begin_at_the_origin_and_end_a_little_after_the_last(plan):
     request = plan("velocity_steps")
     assert request.start == (0.0, 0.0, 0.0)

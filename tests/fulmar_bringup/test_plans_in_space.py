@@ -109,10 +109,19 @@ def test_a_box_in_the_plane_is_refused(plan):
 
 @pytest.mark.parametrize(
     ("goal", "task"),
-    [(None, "go_to_pose_3d"), (GOAL, "go_to_pose_3d"), (GOAL[:3], "go_to_position_3d")],
+    [(None, "go_to_pose_3d"), (GOAL, "go_to_pose_3d")],
 )
 def test_the_goal_decides_the_task(goal, task):
     assert default_task("spacecraft_16", "external", goal=goal) == task
+
+
+def test_three_numbers_where_six_are_usual_are_asked_back_with_both_forms():
+    with pytest.raises(
+        ConfigError, match=r"has 3 numbers.*--goal x,y,z,roll,pitch,yaw.*--task go_to_position_3d"
+    ):
+        default_task("spacecraft_16", "external", goal=(1.0, 0.0, 90.0))
+    with pytest.raises(ConfigError, match=r"cannot stop at a place.*--height H.*--velocity V.*fly_attitude"):
+        default_task("navion", "lqi", goal=(100.0, 0.0, 50.0))
 
 
 def test_a_hardware_file_that_is_named_serves_a_robot_without_one_of_its_own(plan, tmp_path):

@@ -14,7 +14,7 @@ from fulmar_core.loop import policy_bundle
 from tests.fulmar_cli.command_line import EVALUATE, RUN, SHIPPED, complaint
 
 CRAFT = ["run", "spacecraft_16"]
-IN_SPACE = "3 (x,y,z) or 6 (x,y,z,roll,pitch,yaw)"
+IN_SPACE = "'spacecraft_16' moves in space: 3 (x,y,z) or 6 (x,y,z,roll,pitch,yaw)"
 
 
 @pytest.fixture
@@ -95,14 +95,14 @@ def broken_configs(tmp_path, monkeypatch):
             "unknown hardware 'zero_g_lap'. Did you mean 'zero_g_lab'?",
         ),
         ([*RUN, "--backend", "hardware", "--hardware", "turtlebot2"], "is the hardware of 'turtlebot2'"),
-        ([*RUN, "--goal", "nan,0,0"], "--goal = 'nan,0,0' must be two or three finite numbers"),
-        ([*RUN, "--goal", "1"], "--goal = '1' must be two or three finite numbers"),
-        (["run", "jetbot", "--goal", "1,2,90"], "Say --task go_to_position or --goal x,y, or --controller"),
-        ([*RUN, "--start", "a,b,c"], "--start = 'a,b,c' must be three finite numbers"),
+        ([*RUN, "--goal", "nan,0,0"], "--goal = 'nan,0,0': 'nan' is no finite number. Give x,y or x,y,deg [m, deg]"),
+        ([*RUN, "--goal", "1"], "--goal = '1' has 1 number; 'floating_platform' moves in the plane: 2 (x,y) or"),
+        (["run", "jetbot", "--goal", "1,2,90", "--controller", "policy"], "Say --task go_to_position or --goal x,y"),
+        ([*RUN, "--start", "a,b,c"], "--start = 'a,b,c': 'a' is no finite number"),
         ([*RUN, "--area=2,-2,0,1"], "--area = '2,-2,0,1' must be x_min,x_max,y_min,y_max"),
         ([*CRAFT, "--goal", "1,0,-0.5,0,30"], f"--goal = '1,0,-0.5,0,30' has 5 numbers; {IN_SPACE} are needed"),
-        ([*CRAFT, "--goal", "nan,0,0"], f"--goal = 'nan,0,0' must be {IN_SPACE} finite numbers"),
-        ([*CRAFT, "--goal", "a,0,0"], f"--goal = 'a,0,0' must be {IN_SPACE} finite numbers"),
+        ([*CRAFT, "--goal", "nan,0,0"], "--goal = 'nan,0,0': 'nan' is no finite number. Give x,y,z or x,y,z,roll"),
+        ([*CRAFT, "--goal", "a,0,0"], "--goal = 'a,0,0': 'a' is no finite number. Give x,y,z or x,y,z,roll,pitch,yaw"),
         ([*CRAFT, "--start", "0,0,0,0,0"], f"--start = '0,0,0,0,0' has 5 numbers; {IN_SPACE} are needed"),
         (["goals", "--robot", "spacecraft_16", "--pose", "1,2,3,4,5"], f"has 5 numbers; {IN_SPACE} are needed"),
         (["run", "spacecraft", "--goal", "1,2,3,4,5"], "unknown robot 'spacecraft'"),

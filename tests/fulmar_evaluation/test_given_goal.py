@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from fulmar_bags.contents import open_bag
-from fulmar_bags.control_steps import control_steps_of
+from fulmar_bags.control_steps import _given, control_steps_of
 from fulmar_bags.run_record import read_run
 from fulmar_core.config.errors import BagError, ConfigError
+from fulmar_core.robots.robot_file import load_robot
 from fulmar_evaluation.run_evaluation import evaluate_run
 
 BAG = Path(__file__).resolve().parents[1] / "replay/bags/floating_platform_go_to_pose_policy"
@@ -21,8 +22,16 @@ GOAL = (1.0, 0.0, -0.5, 0.0, 0.0, 90.0)
 def test_a_rerun_takes_a_pose_of_the_robot_s_space_and_no_other():
     (goal,) = control_steps_of(open_bag(BAG), goal=(1.0, 2.0, 90.0)).goals
     assert goal.value[0] == pytest.approx([1.0, 2.0, 0.0, 0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)])
-    with pytest.raises(ConfigError, match="6 numbers; a pose in two dimensions is x,y,deg"):
+    with pytest.raises(ConfigError, match=r"6 numbers; .* moves in the plane"):
         control_steps_of(open_bag(BAG), goal=GOAL)
+
+
+def test_a_rerun_of_a_satellite_takes_an_attitude_and_no_place():
+    robot = load_robot("cubesat_wheels")
+    turned = _given((0.0, 0.0, 90.0), robot, 0).value[0]
+    assert turned == pytest.approx([0.0, 0.0, 0.0, 0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)])
+    with pytest.raises(ConfigError, match="x = 5 m would have no effect"):
+        _given((5.0, 0.0, 0.0, 0.0, 0.0, 90.0), robot, 0)
 
 
 def asked_for(goal, task):

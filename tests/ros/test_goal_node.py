@@ -312,7 +312,7 @@ def test_a_pose_on_the_command_line_becomes_the_goal_of_a_running_controller(
             command.kill()
     assert command.returncode == 0, said
     (line,) = [line for line in said.splitlines() if "published" in line]
-    assert "pose x = 3 m, y = 1 m, heading = 90 deg on /floating_platform/goal_pose" in line
+    assert "x 3, y 1 m, heading 90 degrees on /floating_platform/goal_pose" in line
 
 
 @pytest.mark.parametrize("controller", [["area:=[-2.0, 9.0, -2.0, 2.0]"]], indirect=True)
@@ -359,9 +359,9 @@ def test_a_pose_for_a_controller_that_takes_other_goals_ends_with_one_line(
     ("neighbour", "place", "taken", "advice"),
     [
         ("spacecraft_16", (0.0, 0.0, 0.0), "goal_pose", "--pose x,y,z,roll,pitch,yaw or a file of poses"),
-        ("spacecraft_16", (0.0,) * 6, "goal_point", "--pose x,y,z or a file of positions"),
+        ("spacecraft_16", (0.0,) * 6, "goal_point", "--position x,y,z or a file of positions"),
         ("floating_platform", (0.0, 0.0), "goal_pose", "--pose x,y,deg or a file of poses"),
-        ("floating_platform", (0.0, 0.0, 0.0), "goal_point", "--pose x,y or a file of positions"),
+        ("floating_platform", (0.0, 0.0, 0.0), "goal_point", "--position x,y or a file of positions"),
     ],
     indirect=["neighbour"],
 )

@@ -101,10 +101,10 @@ def test_goals_of_the_other_space_are_refused_by_both_robots():
 
 
 def test_a_single_goal_says_what_it_is():
-    assert single_goal((1.0, 0.0, 0.5), SpatialState).title == "position x = 1 m, y = 0 m, z = 0.5 m"
+    assert single_goal((1.0, 0.0, 0.5), SpatialState).title == "x 1, y 0, z 0.5 m, any attitude"
     pose = single_goal((1.0, 0.0, 0.5, 0.0, 0.0, 90.0), SpatialState)
-    assert pose.title == "pose x = 1 m, y = 0 m, z = 0.5 m, roll = 0 deg, pitch = 0 deg, yaw = 90 deg"
-    assert single_goal((1.0, 0.5, 90.0)).title == "pose x = 1 m, y = 0.5 m, heading = 90 deg"
+    assert pose.title == "x 1, y 0, z 0.5 m, roll 0, pitch 0, yaw 90 degrees"
+    assert single_goal((1.0, 0.5, 90.0)).title == "x 1, y 0.5 m, heading 90 degrees"
 
 
 @pytest.mark.parametrize(

@@ -31,9 +31,9 @@ from fulmar_core.robots.topics import (
     command_wire,
 )
 from fulmar_core.safety.geofence import NO_AREA
-from fulmar_core.states.state import State
 from fulmar_core.tasks import Task, load_recorded_task, load_task
 from fulmar_core.tasks.goal import PoseTuple
+from fulmar_core.tasks.goal_numbers import GOAL, goes_to_places, whole_pose
 from fulmar_core.wires.reading import Reading
 from fulmar_core.wires.robot_name import Frames
 
@@ -125,7 +125,7 @@ def control_steps_of(
     the_robot = load_robot(_name(bag, "robot", robot))
     task = task or bag.reading.task
     the_task = load_task(task) if task else load_recorded_task(_name(bag, "task", None), bag.path)
-    the_task.check(the_robot)
+    the_task.check_running(the_robot)
     reader = WireReader(bag)
     settings = _settings(bag, the_robot, the_task, control_hz, reader.warnings)
     wire, names = command_wire(the_robot), the_robot.actuators.names
@@ -167,9 +167,7 @@ def control_steps_of(
         acted=shown != ABSENT if len(observations) else np.ones(len(steps), dtype=bool),
         odometry=seen,
         sample=_first_of(seen.stamp_ns, stamp_ns),
-        goals=tuple(reader.goals(the_task))
-        if goal is None
-        else (_given(goal, the_task.state_type, int(log_ns[0])),),
+        goals=tuple(reader.goals(the_task)) if goal is None else (_given(goal, the_robot, int(log_ns[0])),),
         obstacles=reader.obstacles(),
         things=reader.things(the_task),
         presses=estop_messages(reader),
@@ -332,17 +330,19 @@ def _first_of(stamps: np.ndarray, wanted: np.ndarray) -> np.ndarray:
     return np.array([first.get(stamp, ABSENT) for stamp in wanted.tolist()])
 
 
-def _given(pose: PoseTuple, form: type[State], log_ns: int) -> Received:
-    """A goal in the place of those in the bag, as `form` writes poses.
+def _given(pose: PoseTuple, robot: Robot, log_ns: int) -> Received:
+    """A goal in the place of those in the bag, as people write poses of a robot.
 
     Raises:
-        ConfigError: It has not as many numbers.
+        ConfigError: As in `whole_pose`; or it is a place alone.
     """
-    if len(pose) != len(form.NUMBERS):
+    form = robot.state_type
+    numbers = whole_pose(pose, robot, GOAL)
+    if len(pose) == form.AXES and goes_to_places(robot, GOAL):
         raise ConfigError(
-            f"--goal has {len(pose)} numbers; a pose in {form.WORLD} is {','.join(form.NUMBERS)} in m and degrees."
+            f"{GOAL} has {len(pose)} numbers; a pose in {form.WORLD} is {','.join(form.NUMBERS)} in m and degrees."
         )
-    return Received(log_ns, 0, form.rigid_targets(form.target_at(pose), twists=False)[None])
+    return Received(log_ns, 0, form.rigid_targets(form.target_at(numbers), twists=False)[None])
 
 
 def answers_within(steps_ns: np.ndarray, commands_ns: np.ndarray) -> np.ndarray:

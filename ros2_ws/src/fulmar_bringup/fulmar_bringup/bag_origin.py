@@ -33,6 +33,7 @@ NOT_KEPT = (
     "supervised",
     "intercepted",
     "mission",
+    "start_drawn",
     "standing",
     "end_on_estop",
     "extras",

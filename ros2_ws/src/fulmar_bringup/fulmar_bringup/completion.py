@@ -9,7 +9,14 @@ from typing import cast
 import numpy as np
 
 from fulmar_bringup.excitation_plan import excitation_of
-from fulmar_bringup.goal_plan import check_file_places, checked_goals, duration_of, goal_path, goal_rate
+from fulmar_bringup.goal_plan import (
+    check_file_places,
+    checked_goals,
+    duration_of,
+    goal_path,
+    goal_rate,
+    start_of,
+)
 from fulmar_bringup.own_row import own_nodes
 from fulmar_bringup.placement import placed
 from fulmar_bringup.plan_checks import adapter_path
@@ -23,20 +30,21 @@ from fulmar_bringup.system import (
     default_hardware,
     system_of,
 )
-from fulmar_bringup.task_choice import task_of, whole_pose
+from fulmar_bringup.task_choice import task_of
 from fulmar_core.config.errors import ConfigError, UnknownNameError
 from fulmar_core.config.recording import MODES, Mode, Recording
 from fulmar_core.estimators.kinds import default_estimator, estimator_kind
-from fulmar_core.loop.controller_settings import POLICY
 from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.robots.topics import ODOMETRY
 from fulmar_core.safety.geofence import check_starts
 from fulmar_core.tasks import Task, load_task
 from fulmar_core.tasks.goal import PLACES
+from fulmar_core.tasks.goal_numbers import GOAL, START, whole_pose
 from fulmar_core.tasks.torque_profiles import DURATION_S
+from fulmar_core.worlds.by_kind import check_scenario
 from fulmar_core.worlds.scenario import load_scenario
-from policy_server.controllers import controller_entry, shipped_policy
+from policy_server.controllers import controller_entry, shipped_policy, usual_controller
 
 EVENT_RATE = "event_rate"  # file of configs/estimators that takes the place of a dead gyroscope
 
@@ -50,9 +58,9 @@ def completed(plan: RunPlan) -> RunPlan:
     if plan.mission is not None:
         return plan
     plan = replace(plan, task=task_of(plan))
-    plan = replace(plan, controller=usual_controller(plan))
-    check_names(plan.robot, plan.task, plan.controller, plan.backend, plan.hardware or None)
-    robot, task = load_robot(plan.robot), load_task(plan.task)
+    robot, task = load_robot(plan.robot), _asked_task(plan)
+    plan = replace(plan, controller=plan.controller or usual_controller(robot, task, plan.policy))
+    check_names(plan.robot, task, plan.controller, plan.backend, plan.hardware or None)
     _check_asked(plan, robot)
     policy = Path(plan.policy) if plan.policy else None
     if policy is None and controller_entry(plan.controller).runs_bundle:
@@ -67,14 +75,14 @@ def completed(plan: RunPlan) -> RunPlan:
         adapter=adapter_path(plan.robot, plan.adapter),
         guards=_guards(plan, robot),
     )
+    check_scenario(robot, plan.scenario, estimated=bool(plan.guards.files))
     return _with_goal(_as_its_system(plan), robot, task)
 
 
-def usual_controller(plan: RunPlan) -> str:
-    """The controller that was asked for, or another one in the place of a policy that a satellite or aircraft lacks."""
-    law = load_robot(plan.robot).kind.usual_law
-    lacks = plan.controller == POLICY and not plan.policy and shipped_policy(plan.robot, plan.task) is None
-    return law if lacks and law else plan.controller
+def _asked_task(plan: RunPlan) -> Task:
+    """The task of a plan, at the height that was asked for."""
+    task = load_task(plan.task)
+    return task.at_height(plan.height) if plan.height else task
 
 
 def _check_asked(plan: RunPlan, robot: Robot) -> None:
@@ -82,13 +90,18 @@ def _check_asked(plan: RunPlan, robot: Robot) -> None:
     if plan.backend != "hardware" and (plan.hardware or plan.emulated):
         raise ConfigError(f"--hardware and --emulate go with --backend hardware, not with {plan.backend}.")
     asked = {"goal": plan.goal, "start": plan.start, "duration": plan.duration_s, "rate": plan.rate}
+    asked |= {"height": plan.height, "velocity": plan.velocity}
     for name, value in asked.items():
         if value is not None and not np.isfinite(value).all():
             raise ConfigError(f"{name} = {value} must be finite.")
-    if plan.goals and plan.goal is not None:
-        raise ConfigError("--goals brings its own goals; it takes no --goal.")
+    given = {"--goal": plan.goal is not None, "--velocity": bool(plan.velocity), "--goals": bool(plan.goals)}
+    several = [option for option, is_given in given.items() if is_given]
+    if plan.goals and len(several) > 1:
+        raise ConfigError(f"--goals brings its own goals; it takes no {several[0]}.")
+    if len(several) > 1:
+        raise ConfigError(f"{' and '.join(several)} are two goals. Give one of them.")
     # References of aircraft begin where the craft is, and no single goal holds one.
-    if plan.is_real and plan.goal is None and robot.kind.stays and not (plan.goals or plan.standing):
+    if plan.is_real and robot.kind.stays and not (several or plan.standing):
         raise ConfigError("a real robot goes nowhere by chance: say where with --goal or --goals.")
 
 
@@ -139,8 +152,8 @@ def _as_its_system(plan: RunPlan) -> RunPlan:
 def _with_goal(plan: RunPlan, robot: Robot, task: Task) -> RunPlan:
     """The plan with start, goal and length, as given, as a goal file says, or as the seed draws them."""
     form = robot.state_type
-    goal = plan.goal and whole_pose(plan.goal, robot, "--goal")
-    start = plan.start and whole_pose(plan.start, robot, "--start")
+    goal = plan.goal and whole_pose(plan.goal, robot, GOAL)
+    start = plan.start and whole_pose(plan.start, robot, START)
     if plan.standing or plan.is_real:  # where a robot stands is where its odometry begins
         start = start or (0.0,) * len(form.NUMBERS)
     excitation = plan.excitation or excitation_of(plan.goals, robot, plan.controller)
@@ -151,12 +164,13 @@ def _with_goal(plan: RunPlan, robot: Robot, task: Task) -> RunPlan:
         check_file_places(file, goals, robot, plan.guards.area)
     if not start and not goals:
         check_starts(robot, task)
-    mission, drawn = placed(replace(plan, goal=goal, start=start), file)
-    start = start or drawn
+    mission, drawn = placed(replace(plan, goal=goal, start=start), file, task)
+    start_drawn, start = not start, start or drawn
     usual_s = DURATION_S if excitation else duration_of(file, robot, start) if file else task.episode_s
     return replace(
         plan,
         start=start,
+        start_drawn=start_drawn and (file is None or start_of(file) is None),
         goal=goal or (form.written(mission.current) if task.goal_topic in PLACES else None),
         goals=str(goal_path(goals)) if goals else "",
         excitation=excitation,

@@ -28,6 +28,7 @@ from fulmar_core.tasks.goal_files import (
     goal_file_path,
     load_goals,
 )
+from fulmar_core.tasks.goal_numbers import check_place
 from fulmar_core.tasks.goal_sequence import goal_sequence
 
 GOALS_HZ = 10.0  # of a goal node, at most
@@ -166,9 +167,11 @@ def check_file_places(file: GoalFile, goals: str, robot: Robot, area: Sequence[f
     """Reject goals, of a file of some name or of `--pose`, that lie where a robot must not go.
 
     Raises:
-        ConfigError: As in `geofence.check_places`.
+        ConfigError: As in `geofence.check_places`, or a pose has a place and the robot goes to none.
     """
     what = f"the goal of '{goals}'" if goals else "the goal"
+    for pose in file.poses if isinstance(file, Poses) else ():
+        check_place(pose, robot, what)
     check_places(what, _places_of(file).tolist(), area, farthest_goal(robot))
 
 

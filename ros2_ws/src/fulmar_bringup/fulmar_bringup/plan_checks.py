@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from fulmar_bringup.emulation import check_emulated
+from fulmar_bringup.estimator_row import camera_specs
 from fulmar_bringup.node_spec import CONTROLLER, PARTS
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.system import Guards, default_hardware
@@ -24,6 +25,7 @@ from fulmar_core.loop.bundle_signature import verify_bundle
 from fulmar_core.loop.policy_bundle import check_fit, check_folder, read_bundle, read_passport
 from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.robots.sensors.catalogue import catalogue_path
 from fulmar_core.robots.topics import COMMAND, MOCAP, SENSOR_WIRES, TRUTH, VELOCITY_COMMAND
 from fulmar_core.safety.geofence import NO_AREA, check_area_of
 from fulmar_core.safety.watchdog import default_timeout
@@ -36,6 +38,7 @@ from policy_server.controllers import EXTERNAL, controller_entry, shipped_polici
 # Topics between plant, controller and estimator. Goals, e-stop and status keep their names: the run itself and every
 # other command of `fulmar` use them.
 REMAPPABLE = tuple(wire.name for wire in (MOCAP, *SENSOR_WIRES.values(), TRUTH, COMMAND, VELOCITY_COMMAND))
+NOMINAL = "nominal"  # the scenario without disturbances
 TOPIC = re.compile(r"/?[A-Za-z][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*")
 
 
@@ -47,6 +50,7 @@ def checked(plan: RunPlan) -> RunPlan:
         BundleError: The policy is damaged or made for something else.
     """
     robot, task = load_robot(plan.robot), load_task(plan.task)
+    _check_surroundings(plan, robot)
     checked_rate(robot, plan.control_hz)
     _check_pace(plan)
     _check_device(plan)
@@ -63,6 +67,20 @@ def checked(plan: RunPlan) -> RunPlan:
     if not plan.standing:
         _check_distance(plan, robot, task)
     return plan
+
+
+def _check_surroundings(plan: RunPlan, robot: Robot) -> None:
+    """Refuse a scenario of a real robot, and cameras that would look at stars which are not installed."""
+    if plan.is_real and plan.scenario != NOMINAL:
+        raise ConfigError(
+            f"--scenario {plan.scenario} disturbs simulations and emulated devices; a real robot has its own "
+            "surroundings. Leave it out, or add --emulate."
+        )
+    if camera_specs(plan) and catalogue_path() is None:
+        raise ConfigError(
+            f"the simulated event cameras of '{robot.name}' look at the stars, and the star catalogue is not "
+            "installed. Run: fulmar install-stars"
+        )
 
 
 def _check_pace(plan: RunPlan) -> None:

@@ -7,11 +7,16 @@ what they leave out, and `plan_checks.checked` refuses what cannot work.
 from __future__ import annotations
 
 from dataclasses import KW_ONLY, dataclass, field
+from pathlib import Path
 
 from fulmar_bringup.node_spec import ENDS, RESTARTS, NodeSpec
 from fulmar_bringup.system import NONE, Guards
 from fulmar_core.config.recording import Recording
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.tasks import load_task
 from fulmar_core.tasks.goal import Goal, PoseTuple
+from fulmar_core.tasks.goal_files import load_goals
+from fulmar_core.tasks.goal_words import attitude_words, number, pose_words
 from fulmar_core.wires.robot_name import Frames, frames_of, namespace_of
 
 ORIGIN = (0.0, 0.0, 0.0)
@@ -23,7 +28,7 @@ class Who:
 
     robot: str
     task: str  # empty: as goal, goal file or kind of robot ask for
-    controller: str
+    controller: str  # empty: the usual one of robot and task
     _: KW_ONLY
     name: str = ""  # what the robot is called; empty: as its type
     policy: str = ""  # folder of a bundle; empty: the shipped one
@@ -75,6 +80,11 @@ class How:
     seed: int = 0
     start: PoseTuple = ()  # as `State.NUMBERS`, or a place alone; empty: as the seed draws it [m, deg]
     goal: PoseTuple | None = None  # the same; None: as the seed draws it, or not one place [m, deg]
+    velocity: tuple[float, ...] = ()  # the goal of a task of velocities, as `Kind.velocity_form` [m/s, deg/s]
+    height: float = (
+        0.0  # above the ground, that a craft which flies holds or starts at; 0: as the task has it [m]
+    )
+    start_drawn: bool = False  # of a complete plan: the start was not given
     goals: str = ""  # goal file that a node of its own publishes; empty: the goal comes from outside
     excitation: str = ""  # goal file of torques that the controller plays; empty: none
     duration_s: float = 0.0  # 0: as goal file or task ask for; of a complete plan, until it is stopped [s]
@@ -124,11 +134,33 @@ class RunPlan(Recorded, Guarded, How, Where, Who):
 
     @property
     def line(self) -> str:
-        """The plan in one line."""
+        """What a complete plan was understood as, in one line: goal, task, start, controller, surroundings, length."""
         real = "in real time" if self.rate == 1.0 else f"at {self.rate:g} times real time"
         pace = "in lock step" if self.lockstep else real
-        length = f"for {self.duration_s:g} s" if self.duration_s else "until it is stopped"
+        length = f"{number(self.duration_s)} s" if self.duration_s else "until it is stopped"
         return (
-            f"{self.robot_name}: {self.task}, {self.controller} at {self.control_hz:g} Hz on {self.backend}, "
-            f"scenario {self.scenario}, seed {self.seed}, {pace}, {length}"
+            f"goal: {self._goal_words}; robot {self.robot_name}; task {self.task}; start: {self._start_words}; "
+            f"controller {self.controller} at {self.control_hz:g} Hz on {self.backend}; "
+            f"scenario {self.scenario}, seed {self.seed}; {pace}; {length}"
         )
+
+    @property
+    def _goal_words(self) -> str:
+        task = load_task(self.task)
+        if self.excitation:
+            return f"torques of '{self.excitation}'"
+        if self.goals:
+            return f"'{Path(self.goals).stem}', {load_goals(self.goals).title}"
+        if self.standing:
+            return f"awaited on {task.goal_topic}"
+        assert self.mission is not None  # as in `completed`
+        return task.said(self.mission)
+
+    @property
+    def _start_words(self) -> str:
+        robot = load_robot(self.robot)
+        if self.is_real:
+            return "where it stands"
+        words = attitude_words if not robot.kind.goes_anywhere else pose_words
+        drawn = f", drawn by seed {self.seed}" if self.start_drawn else ""
+        return f"{words(robot.state_type, self.start)}{drawn}"

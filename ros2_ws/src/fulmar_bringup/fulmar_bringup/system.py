@@ -16,7 +16,7 @@ from fulmar_core.estimators.kinds import default_estimator, estimator_kind
 from fulmar_core.robots.jsbsim_models import JSBSIM, is_jsbsim, jsbsim_model
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.safety.geofence import NO_AREA, check_area
-from fulmar_core.tasks import load_task
+from fulmar_core.tasks import Task, load_task
 from fulmar_core.wires.robot_name import check_robot_name
 from hardware_drivers.hardware import hardware_of, hardware_path, load_hardware
 from policy_server.controllers import FALLBACKS, controller_entry, usual_hz
@@ -130,7 +130,9 @@ def system_of(controller: str, backend: str) -> System | None:
     return load_system(name) if name in config_names("systems") else None
 
 
-def check_names(robot: str, task: str, controller: str, backend: str, hardware: str | None = None) -> None:
+def check_names(
+    robot: str, task: str | Task, controller: str, backend: str, hardware: str | None = None
+) -> None:
     """Refuse unknown names, and controllers and backends that do not exist for a robot and a task.
 
     Hardware is a file that was asked for; without one the robot has to have its own.
@@ -138,7 +140,7 @@ def check_names(robot: str, task: str, controller: str, backend: str, hardware: 
     Raises:
         ConfigError: On the first wrong one.
     """
-    the_robot, the_task = load_robot(robot), load_task(task)
+    the_robot, the_task = load_robot(robot), load_task(task) if isinstance(task, str) else task
     the_task.check(the_robot)
     controller_entry(controller).check(the_robot, the_task)
     if is_jsbsim(backend):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from fulmar_bringup.excitation_plan import torques_note
@@ -16,10 +16,12 @@ from fulmar_core.states.spatial import SpatialState
 from fulmar_core.states.state import State
 from fulmar_core.tasks import load_task
 from fulmar_core.tasks.excitation import Torques
-from fulmar_core.tasks.goal import PoseTuple
-from fulmar_core.tasks.goal_files import Poses, Positions, Trajectory, load_goal_file
-from policy_server.controllers import CONTROLLERS, shipped_policy
+from fulmar_core.tasks.goal_files import GoalFile, Poses, Positions, Trajectory, load_goal_file, single_goal
+from fulmar_core.tasks.goal_numbers import GOAL, goes_to_places, names_of, whole_pose, written
+from fulmar_core.tasks.goal_words import attitude_words
+from policy_server.controllers import CLASSICAL, CONTROLLERS, shipped_policy, usual_controller
 
+POSITION_OPTION = "--position"  # of `fulmar goals`
 POSE, POSITION = "go_to_pose", "go_to_position"
 DEFAULT_TASKS = {Positions: POSITION, Poses: POSE}  # all others are about velocities
 EXCITED = "point_inertial"  # while a satellite plays torques
@@ -31,39 +33,29 @@ def goal_options(form: type[State]) -> dict[str, str]:
     return {POSE + form.SUFFIX: f"--goal {pose}", POSITION + form.SUFFIX: f"--goal {place}"}
 
 
-def whole_pose(numbers: Sequence[float], robot: Robot, option: str) -> PoseTuple:
-    """A pose as people write it, with angles of 0 where there are none.
-
-    Args:
-        numbers: A place [m], or a pose [m, deg].
-        robot: Whose pose it is.
-        option: What gave it.
-
-    Raises:
-        ConfigError: So many numbers are neither, for such a robot.
-    """
-    form = robot.state_type
-    if len(numbers) not in (form.AXES, len(form.NUMBERS)):
-        given = ",".join(f"{number:g}" for number in numbers)
-        raise ConfigError(
-            f"{option} = '{given}' has {len(numbers)} numbers; '{robot.name}' moves in {form.WORLD}: "
-            f"{form.AXES} ({','.join(form.NUMBERS[: form.AXES])}) or {len(form.NUMBERS)} "
-            f"({','.join(form.NUMBERS)}) are needed [m, deg]."
-        )
-    return (*numbers, *[0.0] * (len(form.NUMBERS) - len(numbers)))
-
-
 def task_of(plan: RunPlan) -> str:
     """Name of the task of a plan: the one that is given, or what its goal, its goal file or its robot asks for.
 
     Raises:
-        ConfigError: As in `default_task`.
+        ConfigError: As in `default_task`, or the kind of robot has nothing to do with what is asked for.
     """
     if plan.task:
         return plan.task
+    robot = load_robot(plan.robot)
+    kind = robot.kind
     if plan.goals:
-        kind, asked = load_robot(plan.robot).kind, task_of_goals(plan.goals)
+        asked = task_of_goals(plan.goals)
         return kind.goal_task if asked == POSE + SpatialState.SUFFIX and not kind.goes_anywhere else asked
+    for option, value, task in (
+        ("--velocity", plan.velocity, kind.velocity_task),
+        ("--height", plan.height, kind.height_task),
+    ):
+        if value and not task:
+            raise ConfigError(
+                f"{option} is not for {kind.plural} such as '{robot.name}'. Leave it out, or name a task with --task."
+            )
+        if value:
+            return task
     policy, hardware = Path(plan.policy) if plan.policy else None, plan.hardware or None
     return default_task(
         plan.robot, plan.controller, plan.backend, goal=plan.goal, policy=policy, hardware=hardware
@@ -78,8 +70,9 @@ def goal_note(plan: RunPlan) -> str:
     """
     robot = load_robot(plan.robot)
     if plan.goal is not None:
-        whole_pose(plan.goal, robot, "--goal")
-        return check_heading(plan.task, plan.goal) if plan.task else ""
+        whole_pose(plan.goal, robot, GOAL)
+        places = plan.task and "x" in names_of(plan.goal, robot, GOAL)
+        return check_heading(plan.task, plan.goal) if places else ""
     return torques_note(plan.goals, robot, plan.controller)
 
 
@@ -92,53 +85,100 @@ def default_task(
     policy: Path | None = None,
     hardware: str | None = None,
 ) -> str:
-    """Name of the task that a goal asks for: a place is a position, with angles it is a pose, as without a goal.
+    """Name of the task that a goal asks for: a place is a position, with angles it is a pose.
 
-    A satellite turns to a goal, and without one points to the Earth. An aircraft holds its height.
+    Without a goal it is the first of the kind's usual tasks that the controller does with this robot; a satellite
+    points to the Earth, an aircraft holds its height.
 
-    The goal is as `State.NUMBERS` of the robot; a bundle that was given is checked later. Without a hardware file the
+    The goal has the numbers that were given; a bundle that was given is checked later. Without a hardware file the
     robot has to have its own.
 
     Raises:
-        ConfigError: The controller does not do that task with this robot, but another one; with what to say instead.
+        ConfigError: The controller does not do that task with this robot, but another one, or the goal could be meant
+            otherwise; with what to say instead.
     """
     if backend == "hardware":
         default_hardware(robot, hardware)
-    kind = load_robot(robot).kind
+    the_robot = load_robot(robot)
+    kind = the_robot.kind
+    if goal is None:
+        usual = [task for task in (kind.usual_task, kind.other_task) if task]
+        able = [task for task in usual if not _unable(robot, task)] or usual
+        return next((task for task in able if not why_not(robot, task, controller, policy)), able[0])
+    counts, reason = kind.asked_back
+    if len(goal) in counts:
+        raise ConfigError(
+            f"--goal {written(goal)} has {len(goal)} numbers: '{robot}' is one of the {kind.plural}, {reason}."
+        )
     if kind.goal_task:
-        return kind.usual_task if goal is None else kind.goal_task
+        return kind.goal_task
     form = kind.state_type
     pose, position = (name + form.SUFFIX for name in (POSE, POSITION))
-    asked = position if goal is not None and len(goal) == form.AXES else pose
+    asked, other = (position, pose) if len(goal) == form.AXES else (pose, position)
     reason = why_not(robot, asked, controller, policy)
     if not reason:
         return asked
-    other = pose if asked == position else position
-    reason_of_other = why_not(robot, other, controller, policy)
-    if reason == reason_of_other:
-        return asked  # not for this robot, whatever the task: the plan is refused with what is
     instead = []
-    if not reason_of_other:
+    if not why_not(robot, other, controller, policy):
         instead.append(f"--task {other} or {goal_options(form)[other]}")
-    if controller != "classical" and not why_not(robot, asked, "classical", None):
-        instead.append("--controller classical")
+    if controller != CLASSICAL and not why_not(robot, asked, CLASSICAL, None):
+        instead.append(f"--controller {CLASSICAL}")
     if not instead:
         return asked  # the plan is refused with the reason, which no other task changes
-    what = "without --task and --goal" if goal is None else f"with --goal {','.join(f'{x:g}' for x in goal)}"
-    raise ConfigError(f"a run {what} is {asked}: {reason} Say {', or '.join(instead)}.")
+    raise ConfigError(f"a run with --goal {written(goal)} is {asked}: {reason} Say {', or '.join(instead)}.")
+
+
+def single_file(numbers: tuple[float, ...], option: str, robot: Robot) -> GoalFile:
+    """One goal of `fulmar goals` as its file would hold it: a position [m], or a pose or an attitude [m, deg].
+
+    Raises:
+        ConfigError: As in `whole_pose`; or so many numbers could be meant otherwise, or are no position.
+    """
+    pose, form, kind = whole_pose(numbers, robot, option), robot.state_type, robot.kind
+    if option == POSITION_OPTION:
+        if len(numbers) != form.AXES or not kind.goes_anywhere:
+            raise ConfigError(
+                f"{option} {written(numbers)} is no position of '{robot.name}', which moves in {form.WORLD}: "
+                f"{','.join(form.NUMBERS[: form.AXES])} [m], or give --pose {','.join(kind.goal_forms[0])}."
+            )
+        return single_goal(numbers, form)
+    if kind.goes_anywhere and len(numbers) in kind.asked_back[0]:
+        raise ConfigError(
+            f"{option} {written(numbers)} has {len(numbers)} numbers, and '{robot.name}' is one of the {kind.plural}: "
+            f"its poses have {len(form.NUMBERS)}, {','.join(form.NUMBERS)} [m, deg]. For a place with any attitude "
+            f"give {POSITION_OPTION} {written(numbers)}."
+        )
+    if not goes_to_places(robot, option):
+        return replace(single_goal(pose, form), title=attitude_words(form, pose))
+    return single_goal(numbers if len(numbers) == form.AXES else pose, form)
 
 
 def why_not(robot: str, task: str, controller: str, policy: Path | None) -> str:
-    """Why a controller does not do a task with a robot; empty if it does, or if there is no such controller."""
+    """Why a controller does not do a task with a robot; empty if it does, or if there is no such controller.
+
+    An empty name stands for the usual controller of the pair.
+    """
+    the_robot, the_task = load_robot(robot), load_task(task)
+    controller = controller or usual_controller(the_robot, the_task, str(policy or ""))
     if controller not in CONTROLLERS:
-        return ""
+        return _unable(robot, task)
     entry = CONTROLLERS[controller]
     try:
-        entry.check(load_robot(robot), load_task(task))
+        the_task.check(the_robot)
+        entry.check(the_robot, the_task)
     except ConfigError as error:
         return str(error)
     if entry.runs_bundle and policy is None and shipped_policy(robot, task) is None:
         return f"no policy is shipped for '{robot}' and '{task}'."
+    return ""
+
+
+def _unable(robot: str, task: str) -> str:
+    """Why a robot cannot do a task, whatever controls it; empty if it can."""
+    try:
+        load_task(task).check(load_robot(robot))
+    except ConfigError as error:
+        return str(error)
     return ""
 
 

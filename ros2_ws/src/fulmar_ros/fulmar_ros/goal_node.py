@@ -366,7 +366,7 @@ def _how_to_give(topic: str, form: type[State]) -> str:
     numbers = ",".join(form.NUMBERS)
     return {
         "goal_pose": f"--pose {numbers} or a file of poses",
-        "goal_point": f"--pose {','.join(form.NUMBERS[: form.AXES])} or a file of positions",
+        "goal_point": f"--position {','.join(form.NUMBERS[: form.AXES])} or a file of positions",
         "goal_path": "a file of positions or poses, and --as-path",
         "goal_velocity": "a file of velocities or of a path",
     }[topic]

@@ -74,7 +74,7 @@ class MarkersNode(Node):
         super().__init__("markers", cli_args=cli_args)
         settings = read_parameters(self, MarkersSettings)
         robot, task = load_robot(settings.robot), load_task(settings.task)
-        task.check(robot)
+        task.check_running(robot)
         check_area_of(robot, settings.area)
         self._name, self._frames = name_of(self, robot), own_frames(self, robot)
         self._topic = task.goal_topic

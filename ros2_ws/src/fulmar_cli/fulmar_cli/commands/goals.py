@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from fulmar_bringup.console import log_line
 from fulmar_cli.commands.arguments import NameOption, argument, flag, option
 from fulmar_cli.commands.list import list_names
 from fulmar_cli.commands.values import read_area, read_goal
@@ -33,9 +34,12 @@ def goals(
         option(
             "X,Y,DEG",
             "One goal instead of a file: x [m], y [m], heading [deg], or x,y for a position; in space "
-            "x,y,z,roll,pitch,yaw [m, deg], or x,y,z for a position.",
+            "x,y,z,roll,pitch,yaw [m, deg]; of satellites roll,pitch,yaw.",
             "--pose",
         ),
+    ] = None,
+    position: Annotated[
+        str | None, option("X,Y[,Z]", "One position instead of a file [m].", "--position")
     ] = None,
     as_path: Annotated[
         bool, flag("--as-path", "Send all positions or poses at once, for tasks that pass through them.")
@@ -73,14 +77,12 @@ def goals(
 
     Exit code: 0 done, or stopped by Ctrl-C, 1 there is no robot or no controller that takes such goals.
     """
-    if name is None and pose is None:
+    if name is None and pose is None and position is None:
         list_names("goals")
         return
-    if name is not None and pose is not None:
-        raise ConfigError(f"'{name}' and --pose are two goals: give one of them.")
-    place = read_goal(pose, "--pose", robot or "")
+    option, text = _one_of(name, pose, position)
     if robot is None:
-        example = name if place is None else f"--pose {pose}"
+        example = name if text is None else f"{option} {text}"
         raise ConfigError(f"whose goals? Example: fulmar goals {example} --robot floating_platform")
     from fulmar_bringup.goal_plan import check_file_places, check_pace
     from fulmar_bringup.goals_row import goals_spec
@@ -93,11 +95,12 @@ def goals(
     the_robot = load_robot(robot)
     inside = read_area(area) or NO_AREA
     check_area_of(the_robot, inside)
-    given = None if place is None else _single(place, the_robot)
-    file = given or load_goals(name or "")
+    single = None if text is None else _single(text, option, the_robot)
+    file = single or load_goals(name or "")
     goal_sequence(file, the_robot, as_path=as_path)  # rejects goals that the robot cannot have
     check_pace(file, name or "", the_robot, min(control_hz, the_robot.timing.control_hz))
     check_file_places(file, name or "", the_robot, inside)
+    log_line(f"goal: {file.title}; robot {robot_name or robot}")
     spec = goals_spec(
         robot,
         name or "",
@@ -110,13 +113,25 @@ def goals(
     from fulmar_ros.runtime import run_node
 
     _, _, _, *arguments = command_line(spec)  # python -m module
-    raise typer.Exit(run_node(lambda request_exit: GoalNode(request_exit, goals=given), arguments))
+    raise typer.Exit(run_node(lambda request_exit: GoalNode(request_exit, goals=single), arguments))
 
 
-def _single(place: tuple[float, ...], robot: Robot) -> GoalFile:
-    """The one goal of --pose, which numbers of another kind of robot are not."""
-    from fulmar_bringup.task_choice import whole_pose
-    from fulmar_core.tasks.goal_files import single_goal
+def _one_of(name: str | None, pose: str | None, position: str | None) -> tuple[str, str | None]:
+    """The option that gives one goal, and its text; empty and None for a file.
 
-    whole_pose(place, robot, "--pose")
-    return single_goal(place, robot.state_type)
+    Raises:
+        ConfigError: There are two goals.
+    """
+    options = {"--pose": pose, "--position": position}
+    given = {option: text for option, text in options.items() if text is not None}
+    both = [*([f"'{name}'"] if name else []), *given]
+    if len(both) > 1:
+        raise ConfigError(f"{' and '.join(both)} are two goals: give one of them.")
+    return next(iter(given.items()), ("", None))
+
+
+def _single(text: str, option: str, robot: Robot) -> GoalFile:
+    """The one goal of --pose or --position, which numbers of another kind of robot are not."""
+    from fulmar_bringup.task_choice import single_file
+
+    return single_file(read_goal(text, option, robot.name) or (), option, robot)

@@ -9,51 +9,28 @@ import typer
 
 from fulmar_bringup.console import log_line, print_result, write_line
 from fulmar_cli.commands import arguments as cli
-from fulmar_cli.commands.arguments import dated_folder, flag, option
-from fulmar_cli.commands.values import read_area, read_goal, read_guards, read_pose
-
-RUN_TASK_HELP = (
-    f"{cli.TASK_HELP} By default the goal decides: go_to_position for x,y, go_to_pose for x,y,deg and without a goal, "
-    "and the task that takes the goals of --goals. In space go_to_position_3d or go_to_pose_3d; satellites slew, point."
-)
-BACKEND_HELP = "mujoco, mock (Fulmar's own dynamics, perfect sensors), jsbsim[:MODEL] (aircraft) or hardware."
-DURATION_HELP = "Simulated seconds; the task's episode by default."
-GOAL_HELP = "Where to go [m, deg], in space x,y,z or x,y,z,roll,pitch,yaw; by default the seed draws it."
-START_HELP = "Where to begin [m, deg], in space x,y,z or x,y,z,roll,pitch,yaw; by default the seed draws it."
-GOALS_HELP = "Goals in turn, a path, or torques for excite: one of `fulmar list goals`, or a .yaml file."
-ESTIMATOR_HELP = "Estimate odometry, inertia, rates: names of configs/estimators or classes, with commas."
-END_HELP = "An e-stop ends and fails the run; by default the robot waits for a reset and a new goal."
-AREA_HELP = "x_min, x_max, y_min, y_max, in space also z_min, z_max, not to be left [m]: --area=-2,2,-1,1."
-RECORDING_HELP = (
-    "whole: every message. ring: the last 30 s stay in memory and are written only when a fault occurs (an error of "
-    "plant or controller, the watchdog, the e-stop), with 5 s after it; without a fault there is no bag and no result "
-    "for the goal, and the exit code is 0. The system file's `recorder:` by default."
-)
-REMAP_HELP = (
-    "Another name for mocap/pose, a sensor's topic such as odom, ground_truth/odom or a command topic, for every node; "
-    "the bag keeps the usual one. Give it once for each topic."
-)
-ADAPTER_HELP = (
-    "With --controller external: take commands as the driver of this hardware file sends them, and pass them on to "
-    "the plant. A name from configs/hardware, or a .yaml file."
-)
+from fulmar_cli.commands import run_help as text
+from fulmar_cli.commands.arguments import flag, option, recorded
+from fulmar_cli.commands.values import read_area, read_goal, read_guards, read_numbers, read_pose
 
 
 @cli.with_node_options(standing=False)
 def run(
     robot: cli.RobotArgument,
     name: cli.NameOption = None,
-    task: Annotated[str | None, option("T", RUN_TASK_HELP)] = None,
-    controller: cli.ControllerOption = "policy",
-    backend: Annotated[str, option("B", BACKEND_HELP)] = "mujoco",
+    task: Annotated[str | None, option("T", text.RUN_TASK_HELP)] = None,
+    controller: Annotated[str | None, option("C", text.CONTROLLER_HELP)] = None,
+    backend: Annotated[str, option("B", text.BACKEND_HELP)] = "mujoco",
     hardware: cli.HardwareOption = None,
     emulate: cli.EmulateOption = False,
     arm: cli.ArmOption = False,
     policy: cli.PolicyOption = None,
-    goal: Annotated[str | None, option("x,y[,deg]", GOAL_HELP)] = None,
-    goals: Annotated[str | None, option("NAME", GOALS_HELP)] = None,
-    start: Annotated[str | None, option("x,y,deg", START_HELP)] = None,
-    duration: Annotated[float | None, option("S", DURATION_HELP, min=0.1)] = None,
+    goal: Annotated[str | None, option("x,y[,deg]", text.GOAL_HELP)] = None,
+    goals: Annotated[str | None, option("NAME", text.GOALS_HELP)] = None,
+    velocity: Annotated[str | None, option("V,V,DEG", text.VELOCITY_HELP)] = None,
+    height: Annotated[float | None, option("M", text.HEIGHT_HELP, min=0.01)] = None,
+    start: Annotated[str | None, option("x,y,deg", text.START_HELP)] = None,
+    duration: Annotated[float | None, option("S", text.DURATION_HELP, min=0.1)] = None,
     lockstep: Annotated[bool, flag("--lockstep", "As fast as possible; one seed, the same bytes.")] = False,
     rate: cli.RateOption = 1.0,
     control_hz: Annotated[
@@ -63,18 +40,18 @@ def run(
     calibration: cli.CalibrationOption = None,
     seed: cli.SeedOption = 0,
     record: cli.RecordOption = None,
-    estimator: Annotated[str | None, option("NAME", ESTIMATOR_HELP)] = None,
+    estimator: Annotated[str | None, option("NAME", text.ESTIMATOR_HELP)] = None,
     estop: cli.EstopOption = False,
-    end_on_estop: Annotated[bool, flag("--end-on-estop", END_HELP)] = False,
+    end_on_estop: Annotated[bool, flag("--end-on-estop", text.END_HELP)] = False,
     fallback: Annotated[str | None, option("C", "Classical controller if the policy is rejected.")] = None,
     trusted_keys: Annotated[
         Path | None, option("FILE|DIR", "Public keys: reject bundles that none of them has signed.")
     ] = None,
-    area: Annotated[str | None, option("x,x,y,y", AREA_HELP)] = None,
+    area: Annotated[str | None, option("x,x,y,y", text.AREA_HELP)] = None,
     max_run_time: Annotated[
         float | None, option("S", "Longest acting time [s]; no limit by default.", min=0.1)
     ] = None,
-    recording: Annotated[str | None, option("whole|ring", RECORDING_HELP)] = None,
+    recording: Annotated[str | None, option("whole|ring", text.RECORDING_HELP)] = None,
     copies: Annotated[
         int, option("N", "Times each command is sent, for networks that lose some.", min=1, max=3)
     ] = 1,
@@ -84,8 +61,8 @@ def run(
     mocap_hz: Annotated[
         float, option("HZ", "Rate of a simulated motion capture; 200 in the Zero-G Lab.", min=0.0, max=1000.0)
     ] = 0.0,
-    remap: Annotated[list[str] | None, option("FROM:=TO", REMAP_HELP)] = None,
-    adapter: Annotated[str | None, option("NAME", ADAPTER_HELP)] = None,
+    remap: Annotated[list[str] | None, option("FROM:=TO", text.REMAP_HELP)] = None,
+    adapter: Annotated[str | None, option("NAME", text.ADAPTER_HELP)] = None,
     topic: Annotated[str | None, option("T", "Topic that --adapter takes; the file's by default.")] = None,
     as_json: cli.JsonOption = False,
     extras: tuple[str, ...] = (),
@@ -110,7 +87,7 @@ def run(
 
     fulmar run turtlebot2 --backend hardware --emulate --task go_to_position --seed 3
 
-    fulmar run cubesat_wheels --scenario gyro_dies --lockstep
+    fulmar run cubesat_wheels --goal 0,0,90 --lockstep
     """
     from fulmar_bringup.completion import completed
     from fulmar_bringup.plan_checks import checked, read_remappings
@@ -121,11 +98,12 @@ def run(
 
     use_calibration(calibration, robot)
     asked = RunPlan(
-        robot, task or "", controller, backend, control_hz or 0.0, name=name or "", policy=str(policy or ""),
+        robot, task or "", controller or "", backend, control_hz or 0.0, name=name or "", policy=str(policy or ""),
         hardware=hardware or "", emulated=emulate, arm=arm, goal=read_goal(goal, robot=robot), goals=goals or "",
+        velocity=read_numbers(velocity, "--velocity") or (), height=height or 0.0,
         start=read_pose(start, "--start", robot) or (), duration_s=duration or 0.0, lockstep=lockstep, rate=rate,
         scenario=scenario, seed=seed, command=cli.invoked_command(), copies=copies, mocap_hz=mocap_hz,
-        record=str(record or dated_folder("runs", name or robot, controller)), recording_mode=recording or "",
+        record=str(record or ""), recording_mode=recording or "",
         guards=read_guards(
             estimator=estimator, estop=estop, fallback=fallback, max_run_time_s=max_run_time,
             trusted_keys=str(trusted_keys) if trusted_keys else None, area=read_area(area),
@@ -136,7 +114,7 @@ def run(
     note = goal_note(asked)
     if note:
         log_line(note)
-    plan = checked(completed(asked))
+    plan = checked(recorded(completed(asked)))
     check_plan(plan)
     from fulmar_evaluation.run_outcome import run_and_evaluate
     from fulmar_evaluation.run_summary import summary_text

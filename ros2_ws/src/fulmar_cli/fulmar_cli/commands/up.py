@@ -12,7 +12,7 @@ import typer
 from fulmar_bringup.console import log_line, print_json, write_line
 from fulmar_bringup.progress import live_line
 from fulmar_cli.commands import arguments as cli
-from fulmar_cli.commands.arguments import argument, dated_folder, flag, option
+from fulmar_cli.commands.arguments import argument, flag, option, recorded
 from fulmar_cli.commands.values import read_pose
 from fulmar_core.config.errors import DONE, FAILED
 
@@ -97,11 +97,12 @@ def up(
     asked = system_plan(system, robot=robot, name=name, task=task, controller=controller, backend=backend)
     plan = replace(
         asked, policy=str(policy or ""), hardware=hardware or "", emulated=emulate, arm=arm, scenario=scenario,
-        seed=seed, start=read_pose(start, "--start") or (), rate=rate, recording_mode=recording or "", extras=extras,
-        unattended=service, only=only or "", guards=replace(asked.guards, estop=estop or asked.guards.estop),
-        record=str(record or dated_folder("runs", asked.robot_name, asked.controller)), command=cli.invoked_command(),
+        seed=seed, start=read_pose(start, "--start", asked.robot) or (), rate=rate, recording_mode=recording or "",
+        extras=extras, unattended=service, only=only or "",
+        guards=replace(asked.guards, estop=estop or asked.guards.estop), record=str(record or ""),
+        command=cli.invoked_command(),
     )  # fmt: skip
-    plan = checked(completed(plan))
+    plan = checked(recorded(completed(plan)))
     check_plan(plan)
     log_line(plan.line)
     if dry_run:

@@ -12,6 +12,7 @@ from fulmar_core.safety.geofence import check_area
 if TYPE_CHECKING:
     from fulmar_bringup.system import Guards
 
+GOAL = "--goal"
 Area = tuple[float, ...]  # x_min, x_max, y_min, y_max, in space also z_min, z_max [m]
 
 
@@ -67,40 +68,59 @@ def read_guards(**given: Any) -> Guards:
     return Guards(**{name: value for name, value in given.items() if value is not None})
 
 
-def read_goal(text: str | None, option: str = "--goal", robot: str = "") -> tuple[float, ...] | None:
-    """Read a place or a pose: `x,y` or `x,y,deg`, in space `x,y,z` or `x,y,z,roll,pitch,yaw` [m, deg].
+def read_goal(text: str | None, option: str = GOAL, robot: str = "") -> tuple[float, ...] | None:
+    """Read a place, an attitude or a pose: `x,y` or `x,y,deg`, in space as `Kind.goal_forms` [m, deg].
 
     Args:
         text: What was given.
         option: What gave it.
-        robot: Whose goal it is, where that is known: the message then says what this robot needs.
+        robot: Whose goal it is, where that is known: it then has to have as many numbers as that takes.
 
     Raises:
-        ConfigError: If it is not two, three or six finite numbers.
+        ConfigError: If it is not two, three or six finite numbers, or not what this robot takes.
     """
-    wanted = (
-        "two or three finite numbers: x [m], y [m] and, for a pose, heading [deg]. "
-        f"Example: {option} 1,-0.5 or {option} 1,-0.5,90. In space x,y,z or x,y,z,roll,pitch,yaw [m, deg]."
-    )
-    return _read(text, option, wanted, lambda values: len(values) in (2, 3, 6), robot)
+    return _read_place(text, option, robot, (2, 3, 6))
 
 
 def read_pose(text: str | None, option: str, robot: str = "") -> tuple[float, ...] | None:
-    """Read a pose: `x,y,deg`, in space `x,y,z`, upright, or `x,y,z,roll,pitch,yaw` [m, deg].
+    """Read a pose: `x,y,deg`, in space `x,y,z`, upright, or six numbers; else as in `read_goal`."""
+    return _read_place(text, option, robot, (3, 6))
 
-    Args:
-        text: What was given.
-        option: What gave it.
-        robot: As in `read_goal`.
 
-    Raises:
-        ConfigError: If it is not three or six finite numbers.
-    """
-    wanted = (
-        f"three finite numbers: x [m], y [m], heading [deg]. Example: {option} 1,-0.5,90. "
-        "In space x,y,z,roll,pitch,yaw [m, deg]."
-    )
-    return _read(text, option, wanted, lambda values: len(values) in (3, 6), robot)
+def read_numbers(text: str | None, option: str, wanted: str = "x,y,deg [m, deg]") -> tuple[float, ...] | None:
+    """Read numbers with commas between them; raises ConfigError for the first that is none, or not finite."""
+    if text is None:
+        return None
+    for part in text.split(","):
+        if not _is_finite(part):
+            raise ConfigError(
+                f"{option} = '{text}': '{part.strip()}' is no finite number. Give {wanted}, with commas and no units."
+            )
+    return tuple(float(part) for part in text.split(","))
+
+
+def _read_place(
+    text: str | None, option: str, robot: str, counts: tuple[int, ...]
+) -> tuple[float, ...] | None:
+    """Read a place, an attitude or a pose; without a robot any of so many numbers."""
+    if text is None:
+        return None
+    if not robot:
+        numbers = read_numbers(text, option) or ()
+        if len(numbers) not in counts:
+            wanted = "x,y,deg or x,y" if 2 in counts else "x,y,deg"
+            raise ConfigError(
+                f"{option} = '{text}' must be {wanted}, in space x,y,z,roll,pitch,yaw or three of them [m, deg]."
+            )
+        return numbers
+    from fulmar_core.robots.robot_file import load_robot
+    from fulmar_core.tasks.goal_numbers import forms_of, whole_pose
+
+    the_robot = load_robot(robot)
+    forms = forms_of(the_robot, option)
+    numbers = read_numbers(text, option, f"{' or '.join(map(','.join, forms))} [m, deg]") or ()
+    whole_pose(numbers, the_robot, option)
+    return numbers
 
 
 def _read(
@@ -108,7 +128,6 @@ def _read(
     option: str,
     wanted: str,
     fits: Callable[[tuple[float, ...]], bool],
-    robot: str = "",
 ) -> Any:
     if text is None:
         return None
@@ -118,29 +137,7 @@ def _read(
             return values
     except ValueError:  # of a part, or of `fits`
         pass
-    if robot:
-        _refuse_in_space(text, option, robot)
     raise ConfigError(f"{option} = '{text}' must be {wanted}")
-
-
-def _refuse_in_space(text: str, option: str, robot: str) -> None:
-    """Say what a robot in space needs; nothing for one in the plane.
-
-    Raises:
-        ConfigError: The robot moves in space, or there is none of this name.
-    """
-    from fulmar_core.robots.robot_file import load_robot
-    from fulmar_core.states.planar import PlanarState
-
-    form = load_robot(robot).state_type
-    if form is PlanarState:
-        return
-    parts = text.split(",")
-    place, pose = form.NUMBERS[: form.AXES], form.NUMBERS
-    needed = f"{len(place)} ({','.join(place)}) or {len(pose)} ({','.join(pose)})"
-    if all(map(_is_finite, parts)):
-        raise ConfigError(f"{option} = '{text}' has {len(parts)} numbers; {needed} are needed [m, deg].")
-    raise ConfigError(f"{option} = '{text}' must be {needed} finite numbers [m, deg].")
 
 
 def _is_finite(text: str) -> bool:

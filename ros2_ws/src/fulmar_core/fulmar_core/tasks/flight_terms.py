@@ -19,7 +19,9 @@ def is_lost(state: SpatialState, robot: Robot) -> Array:
     return (state.z + robot.hull_span[0] <= 0.0) | stalled | ~xp.isfinite(state.z)
 
 
-def check_above_ground(task: str, robot: Robot, lowest: float, leads: str = "starts at") -> None:
+def check_above_ground(
+    task: str, robot: Robot, lowest: float, leads: str = "starts at", *, otherwise: str = ""
+) -> None:
     """Reject a task whose lowest height [m] puts the hull of an aircraft on the ground.
 
     Raises:
@@ -28,7 +30,7 @@ def check_above_ground(task: str, robot: Robot, lowest: float, leads: str = "sta
     if lowest + robot.hull_span[0] <= 0.0:
         raise ConfigError(
             f"task '{task}' {leads} {lowest:g} m, where the hull of '{robot.name}' touches the ground. Its "
-            f"origin is {-robot.hull_span[0]:g} m above its lowest point."
+            f"origin is {-robot.hull_span[0]:g} m above its lowest point.{otherwise}"
         )
 
 

@@ -19,6 +19,7 @@ from fulmar_core.states.rotation import Array
 from fulmar_core.states.spatial import SpatialState
 from fulmar_core.tasks.flight_terms import angle_of_attack, check_above_ground, is_lost
 from fulmar_core.tasks.goal import Goal, no_obstacles
+from fulmar_core.tasks.goal_words import number
 from fulmar_core.tasks.references.flight_paths import PATHS, through
 from fulmar_core.tasks.task import FileTask
 from fulmar_core.tasks.terms import Errors, weighted_sum
@@ -99,6 +100,20 @@ class FollowReference(FileTask[SpatialState]):
         if any(b <= a for a, b in pairwise(ahead)):
             raise ValueError("each of 'waypoints' must lie further ahead than the one before.")
 
+    def said(self, goal: Goal) -> str:
+        """See `Task.said`."""
+        first, count = goal.targets[0], len(goal.targets)
+        words = f"height {number(first[2])} m"
+        if count == 1:
+            return words
+        return f"a path of {number(self.spacing_s * (count - 1))} s ({self.title}), from {words}"
+
+    def at_height(self, height: float) -> FollowReference:
+        """See `Task.at_height`."""
+        if self.reference != "hold":
+            return super().at_height(height)
+        return replace(self, height=(height, height))
+
     def farthest_start(self, *, training: bool) -> tuple[str, float]:
         """See `Task.farthest_start`."""
         name = "training_height" if training else "height"
@@ -112,10 +127,15 @@ class FollowReference(FileTask[SpatialState]):
         """
         super().check(robot)
         if self.reference == "hold":
-            check_above_ground(self.name, robot, self.height[0] + self.start.height[0])
+            higher = " Give a greater height, as `fulmar run` takes by --height."
+            check_above_ground(self.name, robot, self.height[0] + self.start.height[0], otherwise=higher)
         if self.waypoints:
             check_above_ground(self.name, robot, self.waypoints[0][2] + self.start.height[0])
             check_above_ground(self.name, robot, min(place[2] for place in self.waypoints), "leads down to")
+
+    def check_running(self, robot: Robot) -> None:
+        """See `Task.check_running`: what flies may have begun higher."""
+        self.check_kind(robot)
 
     def draw(self, draws: Draws, robot: Robot, *, training: bool) -> tuple[SpatialState, Goal]:
         """Draw starts and goals; see `Task.draw`."""

@@ -16,6 +16,7 @@ from fulmar_core.states.planar import PlanarState
 from fulmar_core.states.spatial import SpatialState
 from fulmar_core.states.state import State
 from fulmar_core.tasks.excitation import Torques
+from fulmar_core.tasks.goal_words import any_attitude, place_words, pose_words
 from fulmar_core.tasks.references import ReferencePath
 from fulmar_core.tasks.references.in_space import SpacePath
 from fulmar_core.tasks.references.look_ahead import LookAhead, follow
@@ -205,12 +206,9 @@ def single_goal(place: tuple[float, ...], form: type[State] = PlanarState) -> Po
         form: State type of the robot.
     """
     axes, angles = place[: form.AXES], place[form.AXES :]
-    words = [f"{axis} = {value:g} m" for axis, value in zip(form.NUMBERS, axes, strict=False)]
     if not angles:
-        return Positions("positions", f"position {', '.join(words)}", (axes,))
-    names = form.NUMBERS[form.AXES :] if form is SpatialState else ("heading",)
-    words += [f"{name} = {angle:g} deg" for name, angle in zip(names, angles, strict=True)]
-    return Poses("poses", f"pose {', '.join(words)}", (place,))
+        return Positions("positions", f"{place_words(form, place)}, {any_attitude(form)}", (axes,))
+    return Poses("poses", pose_words(form, place), (place,))
 
 
 def load_goal_file(name: str) -> GoalFile | Torques:

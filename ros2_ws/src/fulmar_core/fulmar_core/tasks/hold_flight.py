@@ -28,6 +28,7 @@ from fulmar_core.states.rotation import Array
 from fulmar_core.states.spatial import SpatialState, quat_of
 from fulmar_core.tasks.flight_terms import angle_of_attack, check_above_ground, is_lost, tilt_error
 from fulmar_core.tasks.goal import Goal, goals_at
+from fulmar_core.tasks.goal_words import number
 from fulmar_core.tasks.task import FileTask
 from fulmar_core.tasks.terms import Errors, weighted_sum
 
@@ -87,6 +88,10 @@ class _HoldFlight(FileTask[SpatialState]):
         """The task with the cruising speed of a craft; see `Task.fitted`."""
         return replace(self, cruise=robot.airframe.speed) if robot.airframe is not None else self
 
+    def at_height(self, height: float) -> Self:
+        """See `Task.at_height`."""
+        return replace(self, start=replace(self.start, height=(height, height)))
+
     def check(self, robot: Robot) -> None:
         """See `Task.check`; and the hull is in the air at the lowest start.
 
@@ -95,6 +100,10 @@ class _HoldFlight(FileTask[SpatialState]):
         """
         super().check(robot)
         check_above_ground(self.name, robot, self.start.height[0])
+
+    def check_running(self, robot: Robot) -> None:
+        """See `Task.check_running`: what flies may have begun higher."""
+        self.check_kind(robot)
 
     def farthest_start(self, *, training: bool) -> tuple[str, float]:
         """See `Task.farthest_start`; nothing here is a way to a place."""
@@ -193,6 +202,11 @@ class HoldAttitude(_HoldFlight):
         quat = product(from_euler(bank, -climb, zero), level)
         return xp.stack((zero, zero, height, *quat), axis=-1)
 
+    def said(self, goal: Goal) -> str:
+        """See `Task.said`."""
+        *_, roll, pitch, _yaw = self.state_type.written(goal.current)
+        return f"roll {number(roll, 2)}, pitch {number(pitch, 2)} degrees, any heading"
+
     def errors(self, state: SpatialState, goal: Goal) -> Errors:
         """Angle between the wanted and the true attitude, the heading left out."""
         return Errors(attitude=self._error(state, goal))
@@ -231,6 +245,10 @@ class HoldAirspeed(_HoldFlight):
         zero = 0.0 * height
         speed = trim.speed * draws.uniform(*self.speed)
         return array_namespace(height).stack((speed, zero, zero, zero, zero, zero), axis=-1)
+
+    def said(self, goal: Goal) -> str:
+        """See `Task.said`."""
+        return f"{number(goal.current[0])} m/s through the air, level"
 
     def errors(self, state: SpatialState, goal: Goal) -> Errors:
         """Errors of the speed with the climb rate, and the turn rate."""

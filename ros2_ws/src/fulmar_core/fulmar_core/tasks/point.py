@@ -24,6 +24,7 @@ from fulmar_core.states.counter_rng import Draws
 from fulmar_core.states.rotation import Array
 from fulmar_core.states.spatial import SpatialState, quat_of
 from fulmar_core.tasks.goal import Goal, goals_at
+from fulmar_core.tasks.goal_words import attitude_words
 from fulmar_core.tasks.space_terms import (
     ATTITUDE_TERMS,
     FINE_ATTITUDE_TERMS,
@@ -89,6 +90,11 @@ class Point(FileTask[SpatialState]):
         *MOTION_TERMS[3:],
         *ROTATION_TERMS,
     )
+
+    def said(self, goal: Goal) -> str:
+        """See `Task.said`."""
+        words = attitude_words(self.state_type, self.state_type.written(goal.current))
+        return f"{words}, turning along an orbit" if self.orbit_rate else words
 
     def farthest_start(self, *, training: bool) -> tuple[str, float]:
         """Nothing limits a distance; see `Task.farthest_start`."""

@@ -6,6 +6,7 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Generic, Self
 
+from fulmar_core.config.errors import ConfigError
 from fulmar_core.config.paths import config_names
 from fulmar_core.dynamics.things import Thing
 from fulmar_core.robots.kinds import GOING
@@ -16,6 +17,7 @@ from fulmar_core.states.planar import PlanarState
 from fulmar_core.states.rotation import Array
 from fulmar_core.states.state import S, State
 from fulmar_core.tasks.goal import Goal, goal_at
+from fulmar_core.tasks.goal_words import counted, goal_words
 from fulmar_core.tasks.terms import Errors, Tolerance
 
 
@@ -97,6 +99,10 @@ class Task(ABC, Generic[S]):
         """
         self.check_kind(robot)
 
+    def check_running(self, robot: Robot) -> None:
+        """The part of `check` that does not ask where episodes begin: a run may have begun elsewhere."""
+        self.check(robot)
+
     def check_kind(self, robot: Robot) -> None:
         """The quick part of `check`, which looks at the robot's kind alone."""
         same = self.name.removesuffix(self.state_type.SUFFIX) + robot.state_type.SUFFIX
@@ -111,6 +117,23 @@ class Task(ABC, Generic[S]):
             targets: Poses in the world, shape (k, 7), or twists in the body's frame, shape (k, 6).
         """
         return goal_at(*self.state_type.targets_of(targets))
+
+    def said(self, goal: Goal) -> str:
+        """A goal of one robot in words, as the line before a run says it."""
+        faces = self.tolerance.heading_deg + self.tolerance.attitude_deg > 0.0
+        words = goal_words(self.goal_topic, self.state_type, goal.targets, faces=faces)
+        subject = "" if self.subject == "robot" else f"the {self.subject} at "
+        count = int((goal.obstacles[..., 2] > 0.0).sum()) if goal.obstacles.size else 0
+        around = f", around {counted(count, 'obstacle')}" if count else ""
+        return f"{subject}{words}{around}"
+
+    def at_height(self, height: float) -> Self:
+        """The task at another height above the ground, of a craft that flies [m].
+
+        Raises:
+            ConfigError: It has none of its own.
+        """
+        raise ConfigError(f"task '{self.name}' has no height to choose. Leave --height out.")
 
     def fitted(self, robot: Robot) -> Self:
         """The task for a robot: how near it has to come may depend on how well it knows its place."""

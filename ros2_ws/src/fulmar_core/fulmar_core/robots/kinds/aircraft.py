@@ -13,6 +13,17 @@ AIRCRAFT = Kind(
     usual_task="fly_hold",
     usual_estimator="mocap_imu_3d",
     far_goal=(0.0, 0.0, 1.0, 0.0, 0.0, 0.0),  # where it begins: it goes on along x for ever
+    goal_forms=(("roll", "pitch", "yaw"),),
+    start_forms=(("x", "y", "z"),),
+    other_task="fly_attitude",
+    velocity_form=("ahead",),
+    velocity_task="fly_airspeed",
+    height_task="fly_hold",
+    asked_back=(
+        (3, 6),
+        "it cannot stop at a place. Say --height H [m] or --velocity V [m/s] instead, or, for a bank and a pitch, "
+        "--task fly_attitude --goal roll,pitch,yaw [deg]",
+    ),
     goal_task="fly_hold",
     usual_law="lqi",
     recipe="aircraft",

@@ -14,6 +14,16 @@ FREE_FLYER = Kind(
     usual_task="go_to_pose_3d",
     usual_estimator="mocap_imu_3d",
     far_goal=(4.0, 4.0, 2.0, 20.0, -30.0, 90.0),
+    goal_forms=(("x", "y", "z"),),
+    start_forms=(("x", "y", "z"),),
+    other_task="go_to_position_3d",
+    velocity_form=("ahead", "left", "up", "roll", "pitch", "yaw"),
+    velocity_task="track_velocities_3d",
+    asked_back=(
+        (3,),
+        "its usual goal has 6: --goal x,y,z,roll,pitch,yaw [m, deg]. For a place x,y,z with any attitude add "
+        "--task go_to_position_3d",
+    ),
     recipe="free_flyer",
     weighs=False,
     drifts=True,

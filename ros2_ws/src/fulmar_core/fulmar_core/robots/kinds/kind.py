@@ -20,6 +20,17 @@ class Kind:
     usual_task: str  # what it does where nothing else is asked for
     usual_estimator: str  # file of configs/estimators that says where it is
     far_goal: tuple[float, ...]  # that it does not reach while a fault is done to it
+    # Goals and starts on the command line: the names of their numbers, of `State.NUMBERS`, beside all of these.
+    goal_forms: tuple[tuple[str, ...], ...]
+    start_forms: tuple[tuple[str, ...], ...]
+    other_task: str = ""  # what it does where it cannot do the usual task
+    velocity_form: tuple[
+        str, ...
+    ] = ()  # names of the numbers of --velocity [m/s, deg/s]; empty: it takes none
+    velocity_task: str = ""  # the task of --velocity
+    height_task: str = ""  # the task of --height; empty: it takes none
+    # Goals of so many numbers that are asked back where no task is named, since they could be meant otherwise, and why.
+    asked_back: tuple[tuple[int, ...], str] = ((), "")
     # The one task of a goal; empty where a place is a position and with angles a pose.
     goal_task: str = ""
     # What drives it where no policy is shipped; empty where one has to be.

@@ -13,5 +13,10 @@ ROLLING = Kind(
     usual_task="go_to_pose",
     usual_estimator="mocap_imu",
     far_goal=(FAR_M, 0.0, 0.0),
+    goal_forms=(("x", "y"),),
+    start_forms=(("x", "y"),),
+    other_task="go_to_position",
+    velocity_form=("ahead", "left", "turning"),
+    velocity_task="track_velocities",
     axes=(0, 1, 5),
 )
