@@ -28,7 +28,7 @@ def test_a_robot_alone_is_a_run_of_what_it_can_do_by_a_controller_that_exists(ro
     assert plan.policy in ("", str(shipped_policy(robot, plan.task)))
     entry = controller_entry(plan.controller)
     assert entry.runs_bundle or entry.is_law
-    assert plan.start[2] > 0.0 or kind.stops  # above the ground
+    assert plan.start[2] > 0.0 or kind.stays  # above the ground
     rows = system_rows(plan, record={"directory": "", "info": "{}", "files": "{}"})
     assert rows["controller"].parameters["controller"] == plan.controller
     assert rows["plant"].parameters["start"] == list(plan.start)

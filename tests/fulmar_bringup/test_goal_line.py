@@ -69,8 +69,8 @@ def said_as_run(plan):
     assert numbers_of(parts["length"])[0] == pytest.approx(plant["duration_s"], abs=1e-3)
     assert (parts["pace"] == "in lock step") is plant["lockstep"]
     start = np.asarray(plant["start"], dtype=float)
-    begun = numbers_of(parts["start:"].partition(", drawn")[0])
-    assert begun == pytest.approx(
+    heard = numbers_of(parts["start:"].partition(", drawn")[0])
+    assert heard == pytest.approx(
         list(start[form.AXES :] if not robot.kind.goes_anywhere else start), abs=6e-3
     )
     target = plan.mission.current
@@ -84,7 +84,7 @@ def said_as_run(plan):
         assert min(abs(number - one) for one in (*sent, plan.duration_s, *numbers_of(task.title))) < 0.11, (
             plan.line
         )
-    if task.goal_topic in ("goal_pose", "goal_point") and robot.kind.stops:
+    if task.goal_topic in ("goal_pose", "goal_point") and robot.kind.stays:
         places = form.AXES if robot.kind.goes_anywhere else 0
         assert len(said) == places + (len(sent) - form.AXES) * (task.goal_topic == "goal_pose")
 

@@ -148,3 +148,9 @@ def test_a_message_that_cannot_be_read_is_refused_and_breaks_nothing(wired):
     made.send("wheels/state", JointState(name=["wheel_x"], velocity=[]))
     assert made.inputs.newest.refusal
     assert made.at() == {}
+
+
+@pytest.mark.parametrize("lockstep", [False, True])
+def test_in_lock_step_a_best_effort_publisher_of_a_sensor_is_refused_and_so_reported(wired, lockstep):
+    refused = wired("wheels", lockstep=lockstep).inputs.subscribed
+    assert {wire.name: strict for wire, strict in refused.items()} == {"wheels/state": lockstep}

@@ -23,10 +23,11 @@ from fulmar_bringup.estop_robots import Stopped, release_without_node, stop_robo
 from fulmar_bringup.robot_operator import running_robots, unfit_publishers
 from fulmar_cli.commands.estop import estop
 from fulmar_core.config.errors import RunFailed
-from fulmar_core.robots.topics import ESTOP, ESTOP_RESET, ESTOP_TRIGGER
+from fulmar_core.robots.topics import ESTOP, ESTOP_RESET, ESTOP_TRIGGER, RELAY
 from fulmar_ros.estop_node import EstopNode
 from fulmar_ros.plant_node import PlantNode
 from fulmar_ros.qos import publisher_qos, subscriber_qos
+from fulmar_ros.relay import Relay
 from fulmar_ros.runtime import spinning
 from tests.conftest import RosDomain
 from tests.ros.cli import fulmar
@@ -184,6 +185,19 @@ def test_one_message_stops_a_robot_without_an_e_stop_node_until_a_reset(
     until(lambda: drive(neighbour))
     time.sleep(0.8)
     until(lambda: drive(neighbour))  # the two messages did not make the plant wait for a node
+
+
+def test_a_press_that_only_another_node_received_stops_the_robot(
+    neighbour: Neighbour, plant: PlantNode
+) -> None:
+    relay = Relay(neighbour.node)
+    until(lambda: drive(neighbour) and neighbour.node.count_subscribers(f"{NAMESPACE}/{RELAY.name}") > 0)
+    time.sleep(0.3)
+    until(lambda: drive(neighbour))
+    info = {"source_timestamp": 7, "publication_sequence_number": 1, "received_timestamp": time.time_ns()}
+    relay.send(ESTOP, Bool(data=True), info)
+    closed_in_time_and_for_good(neighbour)
+    assert "pressed" in neighbour.said["plant"][0]
 
 
 def test_a_press_outlives_the_process_of_its_button(neighbour: Neighbour, plant: PlantNode) -> None:

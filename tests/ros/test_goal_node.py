@@ -19,11 +19,12 @@ from nav_msgs.msg import Path
 from fulmar_bags.message_reader import stamp_ns
 from fulmar_core.config.errors import ConfigError
 from fulmar_core.robots.robot_file import load_robot
-from fulmar_core.robots.topics import GOAL_WIRES
+from fulmar_core.robots.topics import GOAL_POSE, GOAL_WIRES, RELAY
 from fulmar_core.tasks.goal_files import single_goal
 from fulmar_ros.goal_messages import TYPES
 from fulmar_ros.goal_node import GoalNode
 from fulmar_ros.qos import subscriber_qos
+from fulmar_ros.relay import Relay
 from fulmar_ros.runtime import spinning
 from tests.conftest import RosDomain
 from tests.ros.cli import fulmar, start_fulmar
@@ -328,6 +329,18 @@ def test_a_pose_outside_the_area_of_the_running_controller_ends_with_one_line_an
         in line
     )
     assert controller.guard.loop.goal.current.tolist() == before
+
+
+def test_a_goal_that_only_another_node_received_is_followed(
+    neighbour: Neighbour, stream: Stream, controller: Any
+) -> None:
+    relay, goal = Relay(neighbour.node), PoseStamped()
+    goal.header.frame_id, goal.pose.position.x, goal.pose.orientation.w = "odom", 2.0, 1.0
+    info = {"source_timestamp": 7, "publication_sequence_number": 1, "received_timestamp": time.time_ns()}
+    until(lambda: neighbour.node.count_subscribers(f"{NAMESPACE}/{RELAY.name}") > 0)
+    time.sleep(0.3)
+    relay.send(GOAL_POSE, goal, info)
+    until(lambda: bool(np.allclose(controller.guard.loop.goal.current, [2.0, 0.0, 0.0])))
 
 
 def test_a_pose_beyond_the_geofence_of_the_running_controller_ends_with_one_line(

@@ -154,7 +154,8 @@ def _with_goal(plan: RunPlan, robot: Robot, task: Task) -> RunPlan:
     form = robot.state_type
     goal = plan.goal and whole_pose(plan.goal, robot, GOAL)
     start = plan.start and whole_pose(plan.start, robot, START)
-    if plan.standing or plan.is_real:  # where a robot stands is where its odometry begins
+    # Where a robot stands is where its odometry begins; what cannot stop begins in the air.
+    if plan.is_real or (plan.standing and robot.kind.stays):
         start = start or (0.0,) * len(form.NUMBERS)
     excitation = plan.excitation or excitation_of(plan.goals, robot, plan.controller)
     goals = "" if excitation else plan.goals

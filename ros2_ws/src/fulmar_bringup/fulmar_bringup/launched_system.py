@@ -13,13 +13,13 @@ from fulmar_bringup.completion import completed
 from fulmar_bringup.node_spec import NodeSpec
 from fulmar_bringup.node_table import OPTIONS
 from fulmar_bringup.plan_checks import checked
-from fulmar_bringup.system_plan import system_plan
+from fulmar_bringup.system_plan import USUAL, system_plan
 from fulmar_bringup.system_rows import system_rows
 from fulmar_core.config.errors import ConfigError
 from fulmar_core.config.written_text import check_lines
 
 ARGUMENTS = {
-    "system": "a file of configs/systems, without .yaml; mujoco_policy by default",
+    "system": f"a file of configs/systems, without .yaml; {USUAL} by default, or what the robot usually does",
     "robot": "a file of configs/robots, without .yaml",
     "name": "what the robot is called: its namespace; its type by default",
     "task": "a file of configs/tasks, without .yaml, or your own class: mypackage.mymodule:MyTask",
@@ -53,7 +53,7 @@ def list_nodes(**asked: str | None) -> tuple[NodeSpec, ...]:
             raise ConfigError(f"{word} = '{asked[word]}' must be true or false.")
     choices = {name: asked.get(name) for name in ("robot", "name", "task", "controller", "backend")}
     plan = replace(
-        system_plan(asked.get("system") or "mujoco_policy", **choices),
+        system_plan(asked.get("system"), **choices),
         policy=asked.get("policy") or "",
         goals=asked.get("goals") or "",
         hardware=asked.get("hardware") or "",

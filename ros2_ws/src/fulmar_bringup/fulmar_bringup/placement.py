@@ -108,7 +108,7 @@ def velocity_target(numbers: Sequence[float], robot: Robot, task: Task) -> np.nd
     held = HeldVelocity((*numbers, *[0.0] * (size - len(numbers))), task.episode_s)
     file = Velocities("velocities", "one velocity", (held,))
     check_pace(file, given, robot, robot.timing.control_hz)
-    if not robot.kind.stops:
+    if not robot.kind.stays:
         find_trim(robot, numbers[0])
     return np.asarray(file.targets()[0])
 

@@ -148,7 +148,7 @@ class ControllerNode(LifecycleNode):
             lockstep=self.settings.lockstep,
         )
         self.wires.publish_metadata(switch.current.metadata)
-        self._wire_watch = WireWatch(self, self.wires.subscribed)
+        self._wire_watch = WireWatch(self, self.wires.subscribed | self._readings.subscribed)
         self._writer_watch = WriterWatch(self, self.wires.followed | self._readings.followed)
         # Lock step has no beat of its own; a wall-clock timer keeps the status alive between messages.
         self._status_timer = self.create_timer(PERIOD_S / 4, self._publish_idle_status)

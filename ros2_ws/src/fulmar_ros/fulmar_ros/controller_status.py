@@ -38,7 +38,7 @@ class ControllerStatus:
         self.inputs_refused = 0, ""
         self._said: tuple[object, ...] = ()
         self._said_at = 0.0
-        self._beyond = Refusal()
+        self._beyond, self._followed = Refusal(), 0  # and the number of the newest goal that was followed
 
     def repeat(self) -> None:
         """Publish the next time whether or not anything changed."""
@@ -129,8 +129,13 @@ class ControllerStatus:
         health.publish(level, message, values, warnings=warned)
 
     def _refusal(self, decision: Decision, guard: GuardedLoop) -> Refusal:
-        """Why the newest goal does not count; of one beyond the geofence its first distance, which changes."""
-        if guard.refusal.reason or BEYOND_GEOFENCE not in decision.reason:
+        """Why the newest goal does not count; of one beyond the geofence its first distance, which changes.
+
+        A robot that is carried away from a goal that it followed refuses nothing.
+        """
+        number = guard.mission.goals_received
+        self._followed = number if decision.mode is Mode.ACTIVE else self._followed
+        if guard.refusal.reason or BEYOND_GEOFENCE not in decision.reason or number == self._followed:
             self._beyond = Refusal()
             return guard.refusal
         stamp_ns = guard.mission.goal_stamp_ns

@@ -27,6 +27,7 @@ class ReadingInputs:
     Attributes:
         newest: What came.
         followed: Subscriptions by topic.
+        subscribed: The wires; the values say whether a best-effort publisher is refused.
     """
 
     def __init__(
@@ -56,6 +57,9 @@ class ReadingInputs:
         self._asked = 0
         self.newest = NewestReadings(robot, names, in_step=lockstep)
         self.followed: dict[str, list[Subscription]] = {}
+        self.subscribed = {
+            kind.wire: lockstep and kind.sensor is not None for kind in self.newest.kinds.values()
+        }
         for name, kind in self.newest.kinds.items():
             wire = kind.wire
             kind_of_message, receive = needed_class(wire), partial(self._take, name, reader_of(kind))

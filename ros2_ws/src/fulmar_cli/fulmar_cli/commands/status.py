@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import time
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -65,6 +66,7 @@ def status(
     if wait and node:
         raise ConfigError("--wait active waits for a controller; it takes no --node. Leave one of them out.")
     timeout = timeout or (WAIT_S if wait else TIMEOUT_S)
+    began_s = time.monotonic()
     robots = domain_status(name, node, timeout_s=timeout, until=all_active if wait else None)
     well = bool(robots) and all(one.well(alone=node is not None) for robot in robots for one in robot.nodes)
     if as_json:
@@ -80,24 +82,24 @@ def status(
             markup=False, soft_wrap=True,
         )  # fmt: skip
     for robot in robots if not as_json else ():
-        _show(robot, timeout)
+        _show(robot, time.monotonic() - began_s)
         if wait and not robot.active:
             log_line(f"the controller of '{robot.name}' takes no goals within {timeout:g} s.")
     raise typer.Exit(DONE if (all_active(robots) if wait else well) else FAILED)
 
 
-def _show(robot: RobotStatus, timeout_s: float) -> None:
+def _show(robot: RobotStatus, looked_s: float) -> None:
     write_line(f"{robot.name}  e-stop: {robot.estop}")
     width = max([11, *(len(node.node) + 1 for node in robot.nodes)])
     for node in robot.nodes:
         level = "?" if node.level in NO_REPORT else node.level
-        write_line(f"  {node.node:<{width}}{level:<7}{_words(node, timeout_s)}")
+        write_line(f"  {node.node:<{width}}{level:<7}{_words(node, looked_s)}")
 
 
-def _words(node: NodeStatus, timeout_s: float) -> str:
+def _words(node: NodeStatus, looked_s: float) -> str:
     if node.level in NO_REPORT:
         there = ", though it is there" if node.level == "silent" else ""
-        return f"no report within {timeout_s:g} s{there}"
+        return f"no report within {looked_s:.1f} s{there}"
     age = "" if node.age_s is None else f"{node.age_s:.1f} s ago"
     place = f"process {node.pid} on {node.host}" if node.pid else ""
     return ", ".join(filter(None, (node.mode, node.reason, age, place)))

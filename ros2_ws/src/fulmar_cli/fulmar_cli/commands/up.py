@@ -16,6 +16,9 @@ from fulmar_cli.commands.arguments import argument, flag, option, recorded
 from fulmar_cli.commands.values import read_pose
 from fulmar_core.config.errors import DONE, FAILED
 
+SYSTEM_HELP = (
+    "A name from `fulmar list systems`; mujoco_policy by default, or what the robot of --robot usually does."
+)
 START_HELP = "Where a simulated robot begins, in space x,y,z[,roll,pitch,yaw]; the origin by default."
 SERVICE_HELP = (
     "For a start without a person: the e-stop is pressed until `fulmar estop --reset`, and nothing is armed."
@@ -32,8 +35,10 @@ ONLY_HELP = (
 
 @cli.with_node_options(standing=True)
 def up(
-    system: Annotated[str, argument("SYSTEM", "A name from `fulmar list systems`.")] = "mujoco_policy",
-    robot: Annotated[str | None, option("R", "Another robot than the system's.")] = None,
+    system: Annotated[str | None, argument("[SYSTEM]", SYSTEM_HELP)] = None,
+    robot: Annotated[
+        str | None, option("R", "Another robot than the system's, or one without a system.")
+    ] = None,
     name: cli.NameOption = None,
     task: Annotated[str | None, option("T", "Another task, or your own class.")] = None,
     controller: Annotated[
@@ -83,6 +88,8 @@ def up(
     fulmar estop
 
     fulmar estop --reset
+
+    fulmar up --robot spacecraft_16          # any robot of `fulmar list robots`, as `fulmar run` would
 
     fulmar up mujoco_lqr --only plant        # and on another host: fulmar up mujoco_lqr --only controller
     """
