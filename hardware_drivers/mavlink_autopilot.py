@@ -11,6 +11,8 @@ MODES = {
     0: "MANUAL", 1: "ACRO", 3: "STEERING", 4: "HOLD", 5: "LOITER", 6: "FOLLOW", 7: "SIMPLE", 8: "DOCK", 9: "CIRCLE",
     10: "AUTO", 11: "RTL", 12: "SMART_RTL", 15: "GUIDED", 16: "INITIALISING",
 }  # fmt: skip
+ARDUPILOT = 3  # MAV_AUTOPILOT; others, such as PX4, number their modes in their own way
+ROVER, BOAT = 10, 11  # MAV_TYPE of ArduPilot's Rover; mode 0 of its Copter is STABILIZE, not MANUAL
 ARMED = 128  # MAV_MODE_FLAG_SAFETY_ARMED
 CRITICAL = 5  # MAV_STATE: from here on a failsafe acts
 ERROR = 3  # MAV_SEVERITY: what is said with this number or a lower one is a warning
@@ -27,6 +29,7 @@ class Autopilot:
     Attributes:
         mode: Number of its mode; None: not known yet.
         armed: Whether the propellers may turn.
+        stranger: What it is, in words, where it is no boat of ArduPilot; empty otherwise.
         failsafe: Whether it says that a failsafe acts.
         beats: Heartbeats so far.
     """
@@ -35,7 +38,7 @@ class Autopilot:
         """Begin with nothing known; the channels are those that are overridden, from 1 on."""
         self.mode: int | None = None
         self.armed = self.failsafe = False
-        self.beats = 0
+        self.beats, self.stranger = 0, ""
         self._fields = tuple(f"chan{number}_raw" for number in (steering_channel, throttle_channel))
         self._lock = threading.Lock()
         self._beaten_s: float | None = None
@@ -49,6 +52,14 @@ class Autopilot:
         kind = message.get_type()
         if kind == "HEARTBEAT":
             self.mode, self.armed = int(message.custom_mode), bool(message.base_mode & ARMED)
+            known = message.autopilot == ARDUPILOT and message.type in (ROVER, BOAT)
+            self.stranger = (
+                ""
+                if known
+                else (
+                    f"no ArduPilot Rover or boat (MAV_AUTOPILOT {message.autopilot}, MAV_TYPE {message.type})"
+                )
+            )
             self.failsafe = message.system_status >= CRITICAL
             self._beaten_s = now_s
             self.beats += 1
@@ -70,6 +81,8 @@ class Autopilot:
         """Why overrides do nothing now, in words that stay the same meanwhile; empty while they do something."""
         if self._beaten_s is None or now_s - self._beaten_s > BEATLESS_S:
             return f"the autopilot has sent no heartbeat for {BEATLESS_S:g} s: its mode is not known"
+        if self.stranger:
+            return f"the autopilot is {self.stranger}: what its modes and channels mean is not known"
         if self.mode != MANUAL:
             return f"the autopilot is in mode {self.mode_name}, not MANUAL: overrides do nothing"
         if not self.armed:

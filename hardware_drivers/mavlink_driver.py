@@ -165,6 +165,10 @@ class MavlinkDriver(DeviceDriver):
             DeviceError: It does not, with the autopilot's own words.
         """
         assert self._commands is not None
+        if self._state.stranger:
+            raise DeviceError(
+                f"{self._name}: the autopilot is {self._state.stranger}. Nothing is set or armed."
+            )
         beats = self._state.beats
         reason = self._commands.ask(
             number, first, second, done=lambda: self._state.beats > beats and done(), within_s=OBEYS_S

@@ -10,9 +10,8 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from fulmar_core.config.paths import config_path
+from fulmar_core.config.yaml_text import load
 
 RANGE = re.compile(
     r"accepted is|at most|must be|at least|must lie|must not be|no body has|which does not hold"
@@ -21,7 +20,7 @@ RANGE = re.compile(
 
 @functools.cache
 def _shipped(name: str) -> Any:
-    return yaml.safe_load(config_path("robots", name).read_text(encoding="utf-8"))
+    return load(config_path("robots", name).read_text(encoding="utf-8"))
 
 
 def times(factor: float) -> Callable[[float], float]:

@@ -114,7 +114,8 @@ def answers(folder):
     done = subprocess.run(
         [sys.executable, "-m", "tests.fulmar_cli.without_extras"],
         input=json.dumps([(line.split(), missing) for line, missing in questions]),
-        env={"PYTHONPATH": str(Path(__file__).parents[2]), "PATH": "/usr/bin:/bin"},
+        # Without HOME, ROS has no folder for its logs.
+        env={"PYTHONPATH": str(Path(__file__).parents[2]), "PATH": "/usr/bin:/bin", "HOME": "/tmp"},
         cwd=folder,
         capture_output=True,
         text=True,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -13,7 +14,7 @@ from fulmar_bringup.service import trial
 from fulmar_bringup.service.device_rules import device_groups, device_rules
 from fulmar_bringup.service.unit import RT_LIMIT, Service, command_of, system_of_unit, unit_text
 from fulmar_cli.installation import service_plan
-from fulmar_core.config.errors import BAD_USAGE, DONE, FAILED
+from fulmar_core.config.errors import BAD_USAGE, DONE, FAILED, ConfigError
 from fulmar_core.config.paths import config_names, config_path
 from hardware_drivers.hardware import load_hardware
 from tests.own_files import own_folder
@@ -302,6 +303,14 @@ def test_a_service_that_would_not_start_is_not_installed_and_says_why(service, t
         assert (ended, printed) == (BAD_USAGE, "")
         assert "the service would not start, and nothing was written: as '" in messages
         assert messages.endswith(f"it says: exit code {code}\n")
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root becomes another user")
+def test_a_service_is_tried_as_its_user_in_a_folder_of_that_user():
+    says = 'touch there && echo "fulmar: $(id -un) in $PWD, $HOME, $GIVEN" >&2; exit 3'
+    asked = Service("x", "mock_lqr", ("/bin/sh", "-c", says), USER)
+    with pytest.raises(ConfigError, match=rf"as '{USER}', .* it says: {USER} in \S+, /\S+, this$"):
+        trial.try_once(asked, {"GIVEN": "this"}, as_user=True)
 
 
 def test_a_dry_run_of_a_system_finds_what_a_start_would_miss_and_starts_nothing(fulmar, own):

@@ -73,15 +73,24 @@ def test_an_rclpy_of_another_python_is_named_by_its_folder(sound, tmp_path):
     assert ros_fault(sound | {"PYTHONPATH": str(packages)}) is None
 
 
-def test_rclpy_is_not_loaded_where_it_would_end_the_process(monkeypatch):
+def test_rclpy_is_not_loaded_where_it_would_end_the_process(monkeypatch, tmp_path):
+    (tmp_path / "such_an_rclpy.py").touch()
+    monkeypatch.syspath_prepend(str(tmp_path))
     monkeypatch.setattr(sys, "meta_path", list(sys.meta_path))
-    monkeypatch.setattr(ros_check, "RCLPY", "no_such_rclpy")
+    monkeypatch.setattr(ros_check, "RCLPY", "such_an_rclpy")
     monkeypatch.setenv("ROS_DOMAIN_ID", "999")
     look_before_loading()
     look_before_loading()  # once is enough
     with pytest.raises(ConfigError, match=r"ROS_DOMAIN_ID = '999' must be .* Run: export ROS_DOMAIN_ID=0"):
-        importlib.import_module("no_such_rclpy")
+        importlib.import_module("such_an_rclpy")
     monkeypatch.setenv("ROS_DOMAIN_ID", "9")
-    for _ in range(2):
-        with pytest.raises(ModuleNotFoundError):
-            importlib.import_module("no_such_rclpy")
+    importlib.import_module("such_an_rclpy")
+
+
+def test_that_rclpy_is_missing_is_said_elsewhere(monkeypatch):
+    monkeypatch.setattr(sys, "meta_path", list(sys.meta_path))
+    monkeypatch.setattr(ros_check, "RCLPY", "no_such_rclpy")
+    monkeypatch.setenv("ROS_DOMAIN_ID", "999")
+    look_before_loading()
+    with pytest.raises(ModuleNotFoundError):
+        importlib.import_module("no_such_rclpy")

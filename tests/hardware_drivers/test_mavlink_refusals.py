@@ -72,6 +72,25 @@ def channels(steering: int, throttle: int) -> mavlink.MAVLink_message:
     return mavlink.MAVLink_rc_channels_message(0, 16, steering, 1500, throttle, *[0] * 15, 255)
 
 
+@pytest.mark.parametrize(("autopilot", "kind"), [(12, 11), (3, 2), (3, 1), (0, 6)])
+def test_an_autopilot_whose_modes_mean_something_else_is_a_refusal(state, autopilot, kind):
+    """PX4, and ArduPilot's Copter, whose mode 0 is STABILIZE."""
+    state.take(mavlink.MAVLink_heartbeat_message(kind, autopilot, ARMED, 0, 4, 3), 0.0)
+    assert state.refusal(0.0).startswith(
+        f"the autopilot is no ArduPilot Rover or boat (MAV_AUTOPILOT {autopilot}, MAV_TYPE {kind})"
+    )
+
+
+def test_a_copter_is_neither_set_to_manual_nor_armed(monkeypatch):
+    monkeypatch.setattr(
+        "sim_nodes.emulators.ardupilot.mavlink.MAV_TYPE_SURFACE_BOAT", mavlink.MAV_TYPE_QUADROTOR
+    )
+    with boat() as bench:
+        with pytest.raises(DeviceError, match="is no ArduPilot Rover or boat"), driven(bench):
+            pass
+        assert not bench.device.armed
+
+
 def test_without_heartbeats_the_mode_is_not_known(state):
     assert state.refusal(BEATLESS_S) == ""
     assert "no heartbeat" in state.refusal(BEATLESS_S + 0.1)

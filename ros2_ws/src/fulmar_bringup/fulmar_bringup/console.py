@@ -47,8 +47,12 @@ _results: list[TextIO] = []  # where JSON goes while standard output is kept fre
 
 
 @contextlib.contextmanager
-def json_alone() -> Iterator[None]:
-    """Keep standard output for `print_json`: what classes of users, libraries and workers print goes to the error."""
+def json_alone() -> Iterator[bool]:
+    """Keep standard output for `print_json`: what classes of users, libraries and workers print goes to the error.
+
+    Yields:
+        True, for the flag that asks for it.
+    """
     shown = sys.stdout
     with contextlib.ExitStack() as ending:
         if _is_descriptor(shown, 1):  # else it was replaced, by a test
@@ -63,7 +67,7 @@ def json_alone() -> Iterator[None]:
         ending.enter_context(contextlib.redirect_stdout(sys.stderr))
         _results.append(results)
         ending.callback(_results.pop)
-        yield
+        yield True
 
 
 def _is_descriptor(stream: TextIO, number: int) -> bool:

@@ -44,7 +44,7 @@ from fulmar_cli.commands.teleop import teleop
 from fulmar_cli.commands.train import train
 from fulmar_cli.commands.up import up
 from fulmar_cli.installation.extras import advice_for
-from fulmar_cli.surroundings import settle
+from fulmar_cli.process_environment import settle
 from fulmar_core.config.errors import (
     BAD_USAGE,
     DONE,

@@ -12,7 +12,7 @@ import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.abc import MetaPathFinder
-from importlib.machinery import EXTENSION_SUFFIXES
+from importlib.machinery import EXTENSION_SUFFIXES, PathFinder
 from pathlib import Path
 
 from fulmar_core.config.errors import ConfigError
@@ -84,7 +84,7 @@ class _Refusal(MetaPathFinder):
         """
         if fullname == RCLPY:
             fault = ros_fault(os.environ)
-            if fault:
+            if fault and PathFinder.find_spec(RCLPY):  # that it is missing is said elsewhere
                 raise _refusal(fault)
             sys.meta_path.remove(self)
 

@@ -38,9 +38,7 @@ def json_flag(text: str) -> Any:
     """The flag `--json`: nothing but JSON goes to standard output then, whatever others print."""
 
     def keep(context: typer.Context, value: bool) -> bool:
-        if value:
-            context.with_resource(json_alone())
-        return value
+        return value and context.with_resource(json_alone())
 
     return flag("--json", text, callback=keep)
 
