@@ -13,7 +13,7 @@ from xml.etree import ElementTree as Xml
 
 from fulmar_core.robots.actuators.control_surfaces import ControlSurfaces
 from fulmar_core.robots.airframe.airframe import SLOWEST, Airframe
-from fulmar_core.robots.airframe.coefficients import NAMES, SURFACES, Coefficients, Curve
+from fulmar_core.robots.airframe.coefficients import NAMES, SURFACES, Coefficients, Curve, slopes_of
 from fulmar_core.robots.airframe.ground_effect import HIGHEST, LOWEST
 from fulmar_core.robots.airframe.propulsion import SLOWEST as SLOWEST_PISTON
 from fulmar_core.robots.airframe.propulsion import ElectricMotor
@@ -140,10 +140,10 @@ def _factor(name: str) -> Node:
 
 def _coefficient(model: Coefficients, name: str) -> Node:
     parts = [_value(0.0)]
-    for number, factors, slopes in model.with_slopes[name]:
+    for number, factors in model.parsed[name]:
         each = [_factor(factor) for factor, power in factors for _ in range(power)]
         parts.append(_times(_value(number), *each) if each else _value(number))
-        for slope, rest in slopes if model.alpha_range is not None else ():
+        for slope, rest in slopes_of(number, factors) if model.alpha_range is not None else ():
             each = [_factor(factor) for factor, power in rest for _ in range(power)]
             parts.append(_times(_value(slope), _get("fulmar/alpha-beyond"), *each))
     if name in model.tables:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 from fulmar_core.config.errors import did_you_mean
 from fulmar_core.states.arrays import clip, is_numpy
@@ -83,8 +83,7 @@ class Coefficients:
             raise ValueError("'alpha_range' must be [low, high] with low < high.")
         parsed = {name: self._terms_of(name) for name in NAMES}
         object.__setattr__(self, "_parsed", parsed)
-        slopes = {name: tuple((*term, _slopes(*term)) for term in terms) for name, terms in parsed.items()}
-        object.__setattr__(self, "_with_slopes", slopes)
+        object.__setattr__(self, "_plans", (_Plan(parsed, slopes=False), _Plan(parsed, slopes=True)))
 
     def _terms_of(self, name: str) -> tuple[Term, ...]:
         return tuple((number, _powers(words)) for words, number in self.terms.get(name, {}).items())
@@ -93,11 +92,6 @@ class Coefficients:
     def parsed(self) -> dict[str, tuple[Term, ...]]:
         """Terms of each coefficient, angles in the file's unit and the source's signs."""
         return self._parsed  # type: ignore[attr-defined, no-any-return]
-
-    @property
-    def with_slopes(self) -> dict[str, tuple[tuple[float, Factors, tuple[Term, ...]], ...]]:
-        """Terms as `parsed`, each with the terms of its derivative by the angle of attack."""
-        return self._with_slopes  # type: ignore[attr-defined, no-any-return]
 
     def scaled_flow(self, flow: Flow) -> dict[str, Array]:
         """Factors in the file's unit, signs and origin; those that are missing count as 0."""
@@ -128,40 +122,69 @@ class Coefficients:
             beyond = alpha - own["alpha"]
             if is_numpy(beyond) and not beyond.any():  # what is traced has no numbers yet
                 beyond = None
-        powers = _Powers(own)
-        return {name: self._one(name, powers, alpha, beyond) for name in NAMES}
-
-    def _one(self, name: str, powers: _Powers, alpha: Array, beyond: Array | None) -> Array:
-        found = 0.0 * alpha
-        for number, factors, slopes in self.with_slopes[name]:
-            found = found + number * powers.product(factors)
-            if beyond is not None:
-                for slope, rest in slopes:
-                    found = found + beyond * slope * powers.product(rest)
-        if name in self.tables:
-            found = found + self.tables[name].at(alpha + self.alpha_zero)
+        inside, outside = self._plans  # type: ignore[attr-defined]
+        found = inside.sums(own, alpha) if beyond is None else outside.sums(own, alpha, beyond)
+        for name, table in self.tables.items():
+            found[name] = found[name] + table.at(alpha + self.alpha_zero)
         return found
 
 
-class _Powers:
-    """Products of powers of factors, each computed once."""
+class _Plan:
+    """The sums of terms, compiled: each product of factors is computed once, from a shorter one and a factor."""
 
-    def __init__(self, own: Mapping[str, Array]) -> None:
-        self._own = own
-        self._known: dict[Factors, Array] = {}
+    def __init__(self, parsed: Mapping[str, tuple[Term, ...]], *, slopes: bool) -> None:
+        """List the products that terms need, and with `slopes` their derivatives by the angle of attack."""
+        self._numbers: dict[Factors, int] = {(): 0}  # of each product
+        self._steps: list[
+            tuple[int, str]
+        ] = []  # the shorter product, and the factor that is multiplied to it
+        self._terms = {
+            name: [
+                (
+                    number,
+                    self._number(factors),
+                    [
+                        (slope, self._number(rest))
+                        for slope, rest in (slopes_of(number, factors) if slopes else ())
+                    ],
+                )
+                for number, factors in terms
+            ]
+            for name, terms in parsed.items()
+        }
 
-    def product(self, factors: Factors) -> Array | float:
-        if not factors:
-            return 1.0
-        if factors not in self._known:
+    def _number(self, factors: Factors) -> int:
+        if factors not in self._numbers:
             name, power = factors[-1]
-            rest = (*factors[:-1], *(((name, power - 1),) if power > 1 else ()))
-            value = self._own.get(name, 0.0)
-            self._known[factors] = self.product(rest) * value if rest else value
-        return self._known[factors]
+            shorter = self._number((*factors[:-1], *(((name, power - 1),) if power > 1 else ())))
+            self._steps.append((shorter, name))
+            self._numbers[factors] = len(self._steps)
+        return self._numbers[factors]
+
+    def sums(self, own: Mapping[str, Array], alpha: Array, beyond: Array | None = None) -> dict[str, Array]:
+        """Each coefficient without its table, shapes (...,).
+
+        Args:
+            own: Factors as `Coefficients.scaled_flow` gives them.
+            alpha: Angle of attack, of whose shape the sums are.
+            beyond: How far it lies out of the range of the terms; only a plan with slopes takes it.
+        """
+        products: list[Any] = [1.0]
+        for shorter, name in self._steps:
+            value = own.get(name, 0.0)
+            products.append(products[shorter] * value if shorter else value)
+        sums = {}
+        for name, terms in self._terms.items():
+            found = 0.0 * alpha
+            for number, product, slopes in terms:
+                found = found + number * products[product]
+                for slope, rest in slopes:
+                    found = found + beyond * slope * products[rest]
+            sums[name] = found
+        return sums
 
 
-def _slopes(number: float, factors: Factors) -> tuple[Term, ...]:
+def slopes_of(number: float, factors: Factors) -> tuple[Term, ...]:
     """Derivative of a term by the angle of attack, as terms; none where it does not depend on it."""
     return tuple(
         (number * power, (*factors[:at], *(((factor, power - 1),) if power > 1 else ()), *factors[at + 1 :]))
