@@ -64,7 +64,7 @@ class OdometryWriter:
 
     def raw(self, state: RigidBodyState, time_ns: int) -> bytes:
         """The message of `write` as bytes."""
-        return self.image.write(time_ns, *_pose_and_twist(state))
+        return self.image.write(time_ns, *pose_and_twist(state))
 
     def write(self, state: RigidBodyState, time_ns: int) -> Odometry:
         """Fill the message; it is overwritten by the next call.
@@ -74,7 +74,7 @@ class OdometryWriter:
             time_ns: Time of measurement [ns].
         """
         self._message.header.stamp = stamp_of(time_ns)
-        _fill(self._message, *_pose_and_twist(state))
+        _fill(self._message, *pose_and_twist(state))
         return self._message
 
 
@@ -85,7 +85,7 @@ def _fill(message: Odometry, pose: Sequence[float], twist: Sequence[float]) -> N
     v.x, v.y, v.z, w.x, w.y, w.z = twist
 
 
-def _pose_and_twist(state: RigidBodyState) -> tuple[Sequence[float], Sequence[float]]:
+def pose_and_twist(state: RigidBodyState) -> tuple[Sequence[float], Sequence[float]]:
     """Place and quaternion in the world, velocity and turn rate in the body."""
     x, y, z, w = state.quat_xyzw.tolist()
     velocity = turned((x, y, z, -w), state.velocity_in_world.tolist())

@@ -20,52 +20,55 @@ from fulmar_core.robots.topics import (
 )
 from fulmar_core.states.rotation import rotate_inverse
 from fulmar_core.wires.robot_name import Frames
-from fulmar_ros.convert import OdometryWriter, stamp_of
+from fulmar_ros.convert import pose_and_twist
+from fulmar_ros.wire_image import WireImage, layout_of
 
-Write = Callable[[Estimate], Any]
+Write = Callable[[Estimate], Any]  # to a message, or to the bytes of one
 
 
 def _rate_writer(frames: Frames) -> Write:
     """Writes a turn rate, shape (3,), with its covariance, shape (3, 3); the velocity is not known."""
+    layout = _layout(TwistWithCovarianceStamped(), frames.base)
+    unknown = np.diag([-1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
 
-    def write(estimate: Estimate) -> TwistWithCovarianceStamped:
-        message = TwistWithCovarianceStamped()
-        message.header.stamp, message.header.frame_id = stamp_of(estimate.stamp_ns), frames.base
-        turning = message.twist.twist.angular
-        turning.x, turning.y, turning.z = (float(part) for part in estimate.value)
-        covariance = np.diag([-1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    def write(estimate: Estimate) -> bytes:
+        covariance = unknown.copy()
         covariance[3:, 3:] = estimate.covariance
-        message.twist.covariance = covariance.ravel()
-        return message
+        numbers = (
+            0.0,
+            0.0,
+            0.0,
+            *np.asarray(estimate.value, dtype=float).tolist(),
+            *covariance.ravel().tolist(),
+        )
+        return layout.write(estimate.stamp_ns, numbers)
 
     return write
 
 
 def _odometry_writer(frames: Frames) -> Write:
     """Writes a `RigidBodyState` with its covariance of shape (12, 12)."""
-    writer = OdometryWriter(None, frame=frames.odom, child_frame=frames.base)
+    layout = _layout(Odometry(child_frame_id=frames.base), frames.odom, frames.base)
 
-    def write(estimate: Estimate) -> Odometry:
-        message = writer.write(estimate.value, estimate.stamp_ns)
-        message.pose.covariance = estimate.covariance[:6, :6].ravel()
+    def write(estimate: Estimate) -> bytes:
+        pose, twist = pose_and_twist(estimate.value)
         turn = np.eye(6)
         turn[:3, :3] = rotate_inverse(estimate.value.quat_xyzw, np.eye(3)).T  # velocity: world to body
-        message.twist.covariance = (turn @ estimate.covariance[6:, 6:] @ turn.T).ravel()
-        return message
+        of_pose, of_twist = estimate.covariance[:6, :6], turn @ estimate.covariance[6:, 6:] @ turn.T
+        numbers = (*pose, *of_pose.ravel().tolist(), *twist, *of_twist.ravel().tolist())
+        return layout.write(estimate.stamp_ns, numbers)
 
     return write
 
 
 def _inertia_writer(frames: Frames) -> Write:
     """Writes an inertia tensor, shape (3, 3)."""
+    layout = _layout(InertiaStamped(), frames.base)
 
-    def write(estimate: Estimate) -> InertiaStamped:
-        message = InertiaStamped()
-        message.header.stamp, message.header.frame_id = stamp_of(estimate.stamp_ns), frames.base
-        its, tensor = message.inertia, estimate.value
-        its.ixx, its.iyy, its.izz = (float(tensor[i, i]) for i in range(3))
-        its.ixy, its.ixz, its.iyz = float(tensor[0, 1]), float(tensor[0, 2]), float(tensor[1, 2])
-        return message
+    def write(estimate: Estimate) -> bytes:
+        xx, xy, xz, _, yy, yz, *_, zz = np.asarray(estimate.value, dtype=float).ravel().tolist()
+        mass, com = 0.0, (0.0, 0.0, 0.0)  # are not known
+        return layout.write(estimate.stamp_ns, (mass, *com, xx, xy, xz, yy, yz, zz))
 
     return write
 
@@ -85,6 +88,11 @@ def _covariance_writer(_frames: Frames) -> Write:
         return Float64MultiArray(layout=layout, data=covariance.ravel().tolist())
 
     return write
+
+
+def _layout(message: Any, frame: str, *texts: str) -> WireImage:
+    message.header.frame_id = frame
+    return layout_of(message, frame, *texts)
 
 
 WRITERS: dict[Wire, tuple[type, Callable[[Frames], Write]]] = {

@@ -75,7 +75,7 @@ class PlantPeriod:
         """Publish a message or the bytes of one; readings count for the period that is under way."""
         if publisher is self._clock or (publisher in self._at_end_only and self.within):
             return  # the clock is published with the end of a period
-        data = message if isinstance(message, bytes) else canonical_bytes(message)
+        data = canonical_bytes(message)
         publish_patiently(publisher, data)
         if publisher is self._truth:
             return  # only simulated sensors may read it

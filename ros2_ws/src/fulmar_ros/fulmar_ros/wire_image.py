@@ -115,7 +115,9 @@ class WireImage:
 
 
 def canonical_bytes(message: Any) -> bytes:
-    """A message as bytes, equal for equal messages; see `message_types.canonical`."""
+    """A message, or its bytes, as bytes that are equal for equal messages; see `message_types.canonical`."""
+    if isinstance(message, bytes):
+        return message
     from fulmar_bags.message_types import (
         canonical,  # of an extra, and slow to import: only lock step needs it
     )
