@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+from rclpy.serialization import deserialize_message
+from sensor_msgs.msg import Imu
 
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.robots.sensors.imu import ImuSample
@@ -15,7 +17,7 @@ TURN = np.array([0.0, 0.0, 0.3])
 
 def written(force):
     writer = ReadingWriter(SENSORS["imu"], load_robot("turtlebot2").sensors.imu)
-    return writer.write(Reading(ImuSample(force, TURN)), 1)
+    return deserialize_message(writer.write(Reading(ImuSample(force, TURN)), 1), Imu)
 
 
 def test_a_force_that_nobody_measures_is_marked_as_absent():

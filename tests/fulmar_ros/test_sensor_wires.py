@@ -2,21 +2,28 @@
 
 from __future__ import annotations
 
+import struct
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from geometry_msgs.msg import QuaternionStamped
+from rclpy.serialization import deserialize_message
+from sensor_msgs.msg import JointState
 
 from fulmar_bags.message_reader import reading_of
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.robots.sensors.imu import ImuSample
 from fulmar_core.robots.sensors.star_tracker import StarTrackerSpec
 from fulmar_core.robots.sensors.table import SENSORS
+from fulmar_core.robots.sensors.wheels import WheelSpeeds
 from fulmar_core.wires.reading import Reading
 from fulmar_core.wires.robot_name import PLAIN, Frames
 from fulmar_ros.sensor_wires import ReadingWriter, SensorWires
+from fulmar_ros.wire_image import canonical_bytes
 from tests.states import planar_state
 
+FORCE = np.array([0.1, -0.0, 9.8])
 ATTITUDE = np.array([0.0, 0.6, 0.0, 0.8])
 PLATFORM = load_robot("floating_platform")
 ROBOT = replace(PLATFORM, sensors=replace(PLATFORM.sensors, star_tracker=StarTrackerSpec()))
@@ -24,8 +31,8 @@ KIND = SENSORS["star_tracker"]
 
 
 def test_an_attitude_is_written_and_read_by_its_row():
-    message = ReadingWriter(KIND, StarTrackerSpec(), Frames("alpha/")).write(Reading(ATTITUDE), 3_000_000_007)
-    assert type(message).__name__ == "QuaternionStamped"
+    data = ReadingWriter(KIND, StarTrackerSpec(), Frames("alpha/")).write(Reading(ATTITUDE), 3_000_000_007)
+    message = deserialize_message(data, QuaternionStamped)
     assert message.header.frame_id == "inertial"
     read = reading_of(message, KIND)
     assert read.stamp_ns == 3_000_000_007
@@ -57,8 +64,8 @@ class Node:
 
 
 def publish(topic, message):
-    stamp = None if isinstance(message, bytes) else message.header.stamp
-    topic.sent.append(stamp and stamp.sec * 1_000_000_000 + stamp.nanosec)
+    seconds, nanoseconds = struct.unpack_from("<iI", message, 4)
+    topic.sent.append(seconds * 1_000_000_000 + nanoseconds)
 
 
 @pytest.fixture
@@ -140,3 +147,45 @@ def test_a_sensor_without_a_subscriber_is_not_written_and_odometry_always_is(nod
         topic.listeners = 0
     wires.publish(sample(), 5)
     assert (len(node.topics["odom"].sent), len(node.topics["attitude"].sent)) == (1, 0)
+
+
+@pytest.mark.parametrize(
+    ("name", "robot", "readings"),
+    [
+        (
+            "imu",
+            "turtlebot2",
+            [
+                Reading(ImuSample(np.array([0.1, -0.0, 9.8]), np.array([1e-300, 0.2, each])))
+                for each in (0.3, np.nan)
+            ],
+        ),
+        ("star_tracker", "cubesat_wheels", [Reading(ATTITUDE), Reading(-ATTITUDE)]),
+        (
+            "wheels",
+            "cubesat_wheels",
+            [Reading(WheelSpeeds(("a", "b"), np.array([1.0, each]))) for each in (2.0, 3.0)],
+        ),
+        ("supply", "spacecraft_16", [Reading(2e7, covariance=np.eye(1)), Reading(1e7)]),
+    ],
+)
+def test_readings_are_written_as_the_bytes_that_rclpy_makes(name, robot, readings):
+    kind, spec = SENSORS[name], load_robot(robot).sensors.specs[name]
+    writer = ReadingWriter(kind, spec, Frames("alpha/"))
+    for reading in (*readings, readings[0]):
+        data = writer.write(reading, 3_000_000_007)
+        plain = ReadingWriter(kind, spec, Frames("alpha/"))
+        plain._has_layout = False
+        assert isinstance(data, bytes)
+        assert data == canonical_bytes(plain.write(reading, 3_000_000_007))
+
+
+def test_a_reading_with_more_parts_than_the_one_before_is_written_whole():
+    writer = ReadingWriter(SENSORS["wheels"], None)
+    for names in (("a", "b"), ("a", "b", "c"), ("c", "b")):
+        speeds = WheelSpeeds(names, np.arange(float(len(names))))
+        read = reading_of(
+            deserialize_message(writer.write(Reading(speeds), 1), JointState), SENSORS["wheels"]
+        )
+        assert read.value.names == names
+        np.testing.assert_array_equal(read.value.speeds, speeds.speeds)

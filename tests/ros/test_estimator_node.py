@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Odometry
+from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import Imu
 
 from fulmar_core.config.errors import ConfigError
@@ -67,7 +68,8 @@ class Sources:
         self.readings.publish(reading)
         if pose:
             off = np.zeros(3) if frozen else noise[5:]
-            message = PoseWriter().write(planar_state(x + off[0], off[1], 0.5 + off[2]), self.now_ns)
+            pose = PoseWriter().raw(planar_state(x + off[0], off[1], 0.5 + off[2]), self.now_ns)
+            message = deserialize_message(pose, PoseStamped)
             message.header.frame_id = frame
             self.poses.publish(message)
 

@@ -22,7 +22,7 @@ from fulmar_core.robots.sensors.odometer import OdometrySpec
 from fulmar_core.safety.input_gate import Measurement
 from fulmar_core.states.state import RigidBodyState
 from fulmar_core.wires.robot_name import PLAIN, Frames
-from fulmar_ros.wire_image import LATEST_NS, WireImage, marks
+from fulmar_ros.wire_image import LATEST_NS, WireImage, layout_of, marks
 
 COVARIANCE = 36  # numbers of the covariance of a pose or a twist
 
@@ -97,18 +97,14 @@ class PoseWriter:
     """States as poses of a motion capture."""
 
     def __init__(self, frames: Frames = PLAIN) -> None:
-        """Fill in what never changes."""
-        self._message = PoseStamped()
-        self._message.header.frame_id = frames.odom
+        """Learn the layout."""
+        message = PoseStamped()
+        message.header.frame_id = frames.odom
+        self._image = layout_of(message, frames.odom)
 
-    def write(self, state: RigidBodyState, time_ns: int) -> PoseStamped:
-        """Fill the message; it is overwritten by the next call."""
-        message = self._message
-        message.header.stamp = stamp_of(time_ns)
-        p, q = message.pose.position, message.pose.orientation
-        p.x, p.y, p.z = state.position_in_world.tolist()
-        q.x, q.y, q.z, q.w = state.quat_xyzw.tolist()
-        return message
+    def raw(self, state: RigidBodyState, time_ns: int) -> bytes:
+        """A message as bytes."""
+        return self._image.write(time_ns, (*state.position_in_world.tolist(), *state.quat_xyzw.tolist()))
 
 
 def _diagonal(stds: Sequence[float]) -> np.ndarray:

@@ -45,6 +45,9 @@ class LockstepLoop:
         compares what is applied with what is measured.
         """
         self._backend, self._wires, self._guard, self._clock = backend, wires, guard, clock
+        self._bearing = (
+            backend if isinstance(backend, AirBearing) else None
+        )  # asking takes as long as a sensor
         robot: Robot = backend.robot
         self._substeps = robot.timing.substeps(control_hz)
         self._dt = self._substeps * robot.timing.physics_dt
@@ -119,9 +122,9 @@ class LockstepLoop:
 
     def _update_bearing(self) -> bool:
         """Publish a change of the air bearing before the state that it belongs to; returns whether it is off."""
-        if not isinstance(self._backend, AirBearing):
+        if self._bearing is None:
             return False
-        on = self._backend.bearing_on
+        on = self._bearing.bearing_on
         if on is not self._bearing_on:
             self._bearing_on = on
             self._publish_bearing()

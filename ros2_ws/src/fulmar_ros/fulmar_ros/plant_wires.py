@@ -237,13 +237,13 @@ class PlantWires:
 
     def _publish_pose(self, stamp: int, state: RigidBodyState) -> None:
         if self._poses is not None:
-            self._publish(self._poses, self._write_pose.write(state, stamp))
+            self._publish(self._poses, self._write_pose.raw(state, stamp))
 
     def _publish_thing(self, name: str, pose: np.ndarray, time_ns: int) -> None:
         if name not in self._things:
             wire = thing_wire(name)
             self._things[name] = self._node.create_publisher(PoseStamped, wire.name, self._qos(wire))
-        self._publish(self._things[name], self._write_pose.write(at_rest(*pose).to_rigid(), time_ns))
+        self._publish(self._things[name], self._write_pose.raw(at_rest(*pose).to_rigid(), time_ns))
 
     def publish_truth(self, sample: Sample, time_ns: int) -> None:
         """Publish the true state, if the backend knows it and it has a subscriber."""

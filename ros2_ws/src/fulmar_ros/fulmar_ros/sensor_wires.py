@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import copy
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from rclpy.node import Node
@@ -17,13 +18,17 @@ from fulmar_core.wires.wire import Wire
 from fulmar_ros.convert import OdometryWriter, stamp_of
 from fulmar_ros.frame_wires import OdometryTransform
 from fulmar_ros.message_class import needed_class
+from fulmar_ros.wire_image import layout_of, numbers_in
 
 Encode = Callable[[Reading, int], Any]  # a reading and its stamp [ns] to a message, or to its bytes
 ODOMETRY = "odometry"
 
 
 class ReadingWriter:
-    """Readings of one sensor as messages, by the fields that its row of the table names."""
+    """Readings of one sensor as messages, by the fields that its row of the table names.
+
+    Most messages are a header, texts and doubles: they are written as bytes, see `wire_image`.
+    """
 
     def __init__(self, kind: SensorKind, spec: Any, frames: Frames = PLAIN) -> None:
         """Prepare the message.
@@ -44,13 +49,86 @@ class ReadingWriter:
             for name in outer:
                 part = getattr(part, name)
             self._fields.append((part, last))
+        self._paths = kind.message.paths
+        self._layout: ReadingLayout | None = None
+        self._has_layout = True  # as long as no reading has shown the contrary
 
     def write(self, reading: Reading, time_ns: int) -> Any:
-        """Fill the message; it is overwritten by the next call."""
+        """The message as bytes; or the message itself, which is overwritten by the next call."""
+        values = self._values(reading, self._spec)
+        data = self._layout.write(values, time_ns) if self._layout is not None else None
+        return self._first(values, time_ns) if data is None else data
+
+    def _first(self, values: Sequence[Any], time_ns: int) -> Any:
+        """The message of a reading with other texts or more numbers than those before."""
         self._message.header.stamp = stamp_of(time_ns)
-        for (part, name), value in zip(self._fields, self._values(reading, self._spec), strict=True):
+        for (part, name), value in zip(self._fields, values, strict=True):
             setattr(part, name, value)
-        return self._message
+        if not self._has_layout:
+            return self._message
+        try:
+            self._layout = ReadingLayout(self._message, self._paths, values)
+        except ValueError:
+            self._has_layout = False
+            return self._message
+        return self._layout.write(values, time_ns)
+
+
+class ReadingLayout:
+    """Where the values of a sensor's fields lie in the bytes of its messages."""
+
+    def __init__(self, message: Any, paths: Sequence[str], values: Sequence[Any]) -> None:
+        """Learn it from a message.
+
+        Args:
+            message: Filled with the values.
+            paths: Of its fields.
+            values: A number, a list of numbers or a list of texts for each path.
+
+        Raises:
+            ValueError: The message is more than texts, then numbers.
+        """
+        self._texts = [value if _is_text(value) else None for value in values]
+        self._numbers: list[float] = []
+        places: dict[str, int | slice] = {}
+        for path, part, name, count in numbers_in(message):
+            at, value = len(self._numbers), getattr(part, name)
+            places[path] = at if count is None else slice(at, at + count)
+            self._numbers.extend((value,) if count is None else value)
+        self._places = [
+            None if _is_text(value) else places.get(path) for path, value in zip(paths, values, strict=True)
+        ]
+        if any(place is None and text is None for place, text in zip(self._places, self._texts, strict=True)):
+            raise ValueError(f"{type(message).__name__} has fields that are neither doubles nor texts.")
+        texts = (
+            message.header.frame_id,
+            *(text for each in self._texts if each is not None for text in each),
+        )
+        self._written = list(values)
+        self._image = layout_of(copy.deepcopy(message), *texts)
+
+    def write(self, values: Sequence[Any], time_ns: int) -> bytes | None:
+        """A message as bytes; None if it has other texts or another count of numbers."""
+        numbers, written = self._numbers, self._written
+        for at, (place, value) in enumerate(zip(self._places, values, strict=True)):
+            if value is written[at] and isinstance(value, tuple):
+                continue  # covariances, which stay as they are
+            written[at] = value
+            if place is None:
+                if value != self._texts[at]:
+                    return None
+            elif isinstance(place, int):
+                numbers[place] = value
+            elif len(value) != place.stop - place.start:
+                return None
+            else:
+                numbers[place] = value
+        return self._image.write(time_ns, numbers)
+
+
+def _is_text(value: Any) -> bool:
+    """Whether a value is a list of texts."""
+    return isinstance(value, list | tuple) and bool(value) and isinstance(value[0], str)
 
 
 class SensorWires:

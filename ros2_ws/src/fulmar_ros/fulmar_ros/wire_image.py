@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from itertools import pairwise
 from typing import Any, TypeAlias
 
@@ -112,6 +113,43 @@ class WireImage:
         seconds, rest = _STAMP.unpack_from(data, self._stamp_at)
         runs = [packing.unpack_from(data, at) for packing, at in zip(self._runs, self._places, strict=True)]
         return seconds * NS + rest, runs
+
+
+MOST_COUNTS = 3  # lengths of sequences that stand between texts and numbers, as in a JointState
+
+
+def numbers_in(message: Any, path: str = "") -> Iterator[tuple[str, Any, str, int | None]]:
+    """Fields of doubles in the order of the bytes: path, the part that has it, name and length; None: it is no list."""
+    for name, kind in message.get_fields_and_field_types().items():
+        value = getattr(message, name)
+        if hasattr(value, "get_fields_and_field_types"):
+            yield from numbers_in(value, f"{path}{name}.")
+        elif kind == "double":
+            yield f"{path}{name}", message, name, None
+        elif kind.startswith(("double[", "sequence<double")):
+            yield f"{path}{name}", message, name, len(value)
+
+
+def layout_of(message: Any, *texts: str) -> WireImage:
+    """Image of a message of a header, texts and doubles, in this order; its one run is all the doubles.
+
+    Args:
+        message: Its doubles and its stamp are overwritten.
+        texts: As `WireImage` takes them.
+
+    Raises:
+        ValueError: The message holds something else.
+    """
+    message.header.stamp = type(message.header.stamp)()
+    fields = list(numbers_in(message))
+    run = marks(sum(1 if count is None else count for *_, count in fields))
+    rest = iter(run)
+    for _, part, name, count in fields:
+        setattr(part, name, next(rest) if count is None else [next(rest) for _ in range(count)])
+    for counts in range(MOST_COUNTS + 1 if run else 0):
+        with suppress(ValueError):
+            return WireImage(message, run, texts=texts, counts=counts)
+    raise ValueError(f"{type(message).__name__} is more than texts, then numbers.")
 
 
 def canonical_bytes(message: Any) -> bytes:

@@ -21,6 +21,7 @@ from fulmar_core.dynamics.linear_model import linearise_wrench
 from fulmar_core.estimators.actuator_health.filters import HealthSettings
 from fulmar_core.robots.actuators.force_authority import ForceAuthority
 from fulmar_core.robots.actuators.pushing import Pushing
+from fulmar_core.states.arrays import side_by_side
 from fulmar_core.states.planar import at_rest
 
 
@@ -156,16 +157,14 @@ class Lqr(PlanarLaw):
         if self.frame.tracks:
             u, v, r = now.motion
             m = self.robot.body.mass
-            wrench = wrench + np.stack(
-                (-m * r * v, m * r * u, 0.0 * r), axis=-1
-            )  # what keeps u and v in a turn
+            wrench = wrench + side_by_side(-m * r * v, m * r * u, 0.0 * r)  # what keeps u and v in a turn
         return np.asarray(wrench - now.push)
 
     def error_state(self, inputs: Inputs, now: BodyState) -> np.ndarray:
         """State minus goal in the body frame, with far errors cut to the limits."""
         if self.frame.tracks:
-            return np.asarray(np.stack(now.motion, axis=-1) - inputs.goal.current)
-        to_goal = np.stack(self._aim(inputs, now), axis=-1)
+            return np.asarray(side_by_side(*now.motion) - inputs.goal.current)
+        to_goal = side_by_side(*self._aim(inputs, now))
         distance = np.sqrt((to_goal * to_goal).sum(axis=-1, keepdims=True))
         limit = self.gains.position_error_limit * self.share_of_speed
         if self.gains.braking:
@@ -175,7 +174,7 @@ class Lqr(PlanarLaw):
         parts = [-to_goal * (limit / np.maximum(distance, limit))]
         if self.frame.heads:
             parts.append(-now.turn.clip(-self._most_turn, self._most_turn)[..., None])
-        parts.append(np.stack(now.motion, axis=-1))
+        parts.append(side_by_side(*now.motion))
         return np.concatenate(parts, axis=-1)
 
     def _aim(self, inputs: Inputs, now: BodyState) -> Vector:

@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, Generic, TypeVar
 
+import numpy as np
+
 from fulmar_core.config.errors import ConfigError
 from fulmar_core.dynamics.actuators.actuation import ActuationState
 from fulmar_core.dynamics.actuators.wheel_actuation import WheelActuation
@@ -198,13 +200,12 @@ class PlanarDynamics(Dynamics[World, PlanarState]):
 
     def reported(self, measured: PlanarState, truth: RigidBodyState) -> RigidBodyState:
         """A planar measurement with the true height, roll and pitch."""
-        true = PlanarState.from_rigid(truth)
-        flat, above = measured.to_rigid(), truth.position_in_world[2]
-        flat.position_in_world[2], flat.velocity_in_world[2] = above, truth.velocity_in_world[2]
-        flat.angular_velocity_in_body[:2] = truth.angular_velocity_in_body[:2]
-        turned = multiply(from_yaw(measured.yaw - true.yaw), truth.quat_xyzw)
+        roll_rate, pitch_rate, _ = truth.angular_velocity_in_body
         return RigidBodyState(
-            flat.position_in_world, turned, flat.velocity_in_world, flat.angular_velocity_in_body
+            np.array((measured.x, measured.y, truth.position_in_world[2])),
+            multiply(from_yaw(measured.yaw - truth.yaw), truth.quat_xyzw),
+            np.array((measured.vx, measured.vy, truth.velocity_in_world[2])),
+            np.array((roll_rate, pitch_rate, measured.yaw_rate)),
         )
 
     def push_things(

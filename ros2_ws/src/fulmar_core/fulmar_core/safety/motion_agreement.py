@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fulmar_core.robots.sensors.odometer import Channel, OdometrySpec
-from fulmar_core.states.rotation import multiply
+from fulmar_core.states.attitude import conjugate, product
 from fulmar_core.states.state import RigidBodyState
 
 WINDOW_NS = 20_000_000_000  # how far back is compared
@@ -29,7 +29,6 @@ LEAST = 0.03  # difference that is none, whatever the robot's file says [m, rad]
 JUMP = 10.0  # standard deviations of a pose that are a correction, and no motion
 JUMPS = 3  # corrections in the window: more are a motion in steps
 PROOF = 0.3  # way or turn by the twist in the window with which a pose that agrees does not stand [m, rad]
-INVERSE = np.array([-1.0, -1.0, -1.0, 1.0])
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,7 +151,7 @@ class MotionAgreement:
 
 def _turn(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Small rotation from one attitude to another, about the body's axes, (3,) [rad]."""
-    x, y, z, w = multiply(a * INVERSE, b).tolist()
+    x, y, z, w = product(conjugate(tuple(a.tolist())), tuple(b.tolist()))
     half = math.copysign(1.0, w) * np.array([x, y, z])
     return np.asarray(2.0 * half)
 

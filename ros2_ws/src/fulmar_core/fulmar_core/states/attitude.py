@@ -124,10 +124,16 @@ def logarithm(q: Quaternion) -> Vector:
     """
     x, y, z, w = q
     xp = array_namespace(x)
-    sign = xp.where(w < 0.0, -xp.ones_like(w), xp.ones_like(w))
+    if isinstance(w, float):  # of one robot, without the arrays of ones and what `where` computes for nothing
+        sign = -1.0 if w < 0.0 else 1.0
+        sine, w = xp.sqrt(x * x + y * y + z * z), sign * w
+        factor = sign * (2.0 / max(w, 0.5) if sine < 1e-6 else 2.0 * xp.atan2(sine, w) / sine)
+        return scaled(factor, (x, y, z))
+    one = xp.ones_like(w)
+    sign = xp.where(w < 0.0, -one, one)
     sine, w = xp.sqrt(x * x + y * y + z * z), sign * w
     tiny = sine < 1e-6
-    safe = xp.where(tiny, xp.ones_like(sine), sine)
+    safe = xp.where(tiny, one, sine)
     factor = sign * xp.where(tiny, 2.0 / clip(w, 0.5, None), 2.0 * xp.atan2(sine, w) / safe)
     return scaled(factor, (x, y, z))
 

@@ -81,10 +81,13 @@ def words(keys: Keys, counter: Array | int, count: int) -> Array:
     xp = array_namespace(first)
     here = counter * OTHER & MASK if isinstance(counter, int) else _low(_counter(counter) * OTHER)
     base = _mix(_low(first + here)) ^ second
-    channel = xp.asarray(
-        [(i + 1) * GOLDEN & MASK for i in range(count)], dtype=base.dtype, device=device(base)
-    )
-    return _mix(_low(base[None, :] + channel[:, None]))
+    return _mix(_low(base[None, :] + _channels(count, xp, base.dtype, device(base))))
+
+
+@functools.lru_cache(maxsize=64)
+def _channels(count: int, xp: Any, dtype: Any, where: Any) -> Array:
+    """What tells the words of one counter apart, shape (count, 1)."""
+    return xp.asarray([(i + 1) * GOLDEN & MASK for i in range(count)], dtype=dtype, device=where)[:, None]
 
 
 def uniform_from(bits: Array, dtype: Any) -> Array:

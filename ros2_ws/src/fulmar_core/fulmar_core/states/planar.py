@@ -12,7 +12,7 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from fulmar_core.states.arrays import array_namespace
+from fulmar_core.states.arrays import array_namespace, side_by_side
 from fulmar_core.states.rotation import Array, from_yaw, yaw_of
 from fulmar_core.states.state import POSE, RigidBodyState, State
 
@@ -58,13 +58,12 @@ class PlanarState(State):
 
     def to_rigid(self) -> RigidBodyState:
         """The same with z, roll, pitch and their rates zero."""
-        xp = array_namespace(self.x)
-        zero = xp.zeros_like(self.x)
+        zero = array_namespace(self.x).zeros_like(self.x)
         return RigidBodyState(
-            xp.stack((self.x, self.y, zero), axis=-1),
+            side_by_side(self.x, self.y, zero),
             from_yaw(self.yaw),
-            xp.stack((self.vx, self.vy, zero), axis=-1),
-            xp.stack((zero, zero, self.yaw_rate), axis=-1),
+            side_by_side(self.vx, self.vy, zero),
+            side_by_side(zero, zero, self.yaw_rate),
         )
 
     @classmethod

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from fulmar_core.states.arrays import array_namespace
+from fulmar_core.states.arrays import array_namespace, side_by_side
 
 Array = Any  # an array of NumPy, torch or any other library that follows the array API
 
@@ -35,36 +35,30 @@ def _turn(quat_xyzw: Array, vector: Array, w: Array) -> Array:
 
     The inverse rotation is the same with -w, since q and -q are one rotation.
     """
-    xp = array_namespace(quat_xyzw)
     x, y, z = quat_xyzw[..., 0], quat_xyzw[..., 1], quat_xyzw[..., 2]
     a, b, c = vector[..., 0], vector[..., 1], vector[..., 2]
     tx, ty, tz = 2.0 * (y * c - z * b), 2.0 * (z * a - x * c), 2.0 * (x * b - y * a)
-    return xp.stack(
-        (a + w * tx + y * tz - z * ty, b + w * ty + z * tx - x * tz, c + w * tz + x * ty - y * tx), axis=-1
+    return side_by_side(
+        a + w * tx + y * tz - z * ty, b + w * ty + z * tx - x * tz, c + w * tz + x * ty - y * tx
     )
 
 
 def cross(a: Array, b: Array) -> Array:
     """Cross product over the last axis, shapes (..., 3)."""
-    xp = array_namespace(a)
     a0, a1, a2 = a[..., 0], a[..., 1], a[..., 2]
     b0, b1, b2 = b[..., 0], b[..., 1], b[..., 2]
-    return xp.stack((a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0), axis=-1)
+    return side_by_side(a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0)
 
 
 def multiply(p_xyzw: Array, q_xyzw: Array) -> Array:
     """Hamilton product p ⊗ q, shapes (..., 4)."""
-    xp = array_namespace(p_xyzw)
     px, py, pz, pw = (p_xyzw[..., i] for i in range(4))
     qx, qy, qz, qw = (q_xyzw[..., i] for i in range(4))
-    return xp.stack(
-        (
-            pw * qx + px * qw + py * qz - pz * qy,
-            pw * qy - px * qz + py * qw + pz * qx,
-            pw * qz + px * qy - py * qx + pz * qw,
-            pw * qw - px * qx - py * qy - pz * qz,
-        ),
-        axis=-1,
+    return side_by_side(
+        pw * qx + px * qw + py * qz - pz * qy,
+        pw * qy - px * qz + py * qw + pz * qx,
+        pw * qz + px * qy - py * qx + pz * qw,
+        pw * qw - px * qx - py * qy - pz * qz,
     )
 
 
@@ -72,7 +66,7 @@ def from_yaw(yaw: Array) -> Array:
     """Quaternion of a rotation about +z, shape (...,) [rad] to (..., 4)."""
     xp = array_namespace(yaw)
     zero = xp.zeros_like(yaw)
-    return xp.stack((zero, zero, xp.sin(0.5 * yaw), xp.cos(0.5 * yaw)), axis=-1)
+    return side_by_side(zero, zero, xp.sin(0.5 * yaw), xp.cos(0.5 * yaw))
 
 
 def yaw_of(quat_xyzw: Array) -> Array:

@@ -9,7 +9,7 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from fulmar_core.states.arrays import array_namespace
+from fulmar_core.states.arrays import array_namespace, side_by_side
 from fulmar_core.states.attitude import Quaternion, Vector, euler_of, from_euler, length, minus, turn_back
 from fulmar_core.states.rotation import Array
 from fulmar_core.states.state import RigidBodyState, State
@@ -88,9 +88,8 @@ class SpatialState(State):
 
     def to_rigid(self) -> RigidBodyState:
         """The same thirteen numbers."""
-        xp = array_namespace(self.x)
         parts = (self.position, self.quat, self.velocity, self.rate)
-        return RigidBodyState(*(xp.stack(part, axis=-1) for part in parts))
+        return RigidBodyState(*(side_by_side(*part) for part in parts))
 
     @classmethod
     def targets_of(cls, rigid: Array) -> Array:

@@ -21,6 +21,7 @@ from fulmar_core.estimators.actuator_health.applied import Applied
 from fulmar_core.estimators.actuator_health.filters import HealthSettings, HoldDetector, PushFilter
 from fulmar_core.robots.actuators.thrusters import Thrusters
 from fulmar_core.robots.robot import Robot
+from fulmar_core.states.arrays import side_by_side
 from fulmar_core.states.planar import PlanarState
 
 MOST_LOST = 2
@@ -91,9 +92,7 @@ class ThrusterHealth:
         Returns:
             What is believed now.
         """
-        seen = np.stack(
-            [np.asarray(getattr(measured, name), dtype=float) for name in PlanarState.COLUMNS], axis=-1
-        )
+        seen = side_by_side(*(np.asarray(column, dtype=float) for column in measured.columns()))
         if self._state is None or self._state.shape[:-2] != seen.shape[:-1]:
             self._begin(seen)
         elif applied is None:

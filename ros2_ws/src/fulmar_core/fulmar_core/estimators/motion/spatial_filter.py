@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -18,14 +19,15 @@ from fulmar_core.estimators.motion import filter as events
 from fulmar_core.estimators.motion.filter import Filter, Placed
 from fulmar_core.estimators.motion.settings import SpatialMotionSettings
 from fulmar_core.robots.sensors.imu import ImuSample
-from fulmar_core.states.attitude import exponential, normalised, product, rotation_error
+from fulmar_core.states.attitude import exponential, normalised, product, rotation_error, turn
 from fulmar_core.states.gravity import GRAVITY
-from fulmar_core.states.rotation import rotate
 
 ERRORS = 15
 PLACE, VELOCITY, TURN, FORCE_BIAS, RATE_BIAS = (slice(i, i + 3) for i in range(0, ERRORS, 3))
 SPREAD_AT_START = (1.0, 1.0, 1.0, 0.05, 1.0)  # m, m/s, rad, m/s², rad/s without an inertial reading
 RATE_BIAS_STD = 0.02  # of a gyroscope whose readings begin [rad/s]
+_ONE, _SAME = np.eye(3), np.eye(ERRORS)
+_AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 _POSE_ROWS = np.eye(ERRORS)[[0, 1, 2, 6, 7, 8]]
 _TURN_ROWS = np.eye(ERRORS)[TURN]
 
@@ -91,24 +93,25 @@ class SpatialFilter(ExtendedKalmanFilter, Filter):  # type: ignore[misc]
             rate = inertial.angular_velocity - now.rate_bias
         if inertial is not None and has_force:
             force, noise = inertial.specific_force - now.force_bias, s.acceleration_noise
-        axes = rotate(now.quat_xyzw, np.eye(3)).T  # body to world
+        quat = tuple(now.quat_xyzw.tolist())
+        axes = _axes(quat).T  # body to world
         push = axes @ force
         if self._weighs and has_force:
             push = push - np.array([0.0, 0.0, GRAVITY])
-        turned = exponential(tuple(t * rate))
-        F = np.eye(ERRORS)
-        F[PLACE, VELOCITY] = t * np.eye(3)
+        turned = tuple(map(float, exponential(tuple((t * rate).tolist()))))
+        F = _SAME.copy()
+        F[PLACE, VELOCITY] = t * _ONE
         if has_force:
             lever = -axes @ _skew(force)
             F[PLACE, TURN], F[VELOCITY, TURN] = 0.5 * t * t * lever, t * lever
             F[PLACE, FORCE_BIAS], F[VELOCITY, FORCE_BIAS] = -0.5 * t * t * axes, -t * axes
-        F[TURN, RATE_BIAS] = -t * np.eye(3)
-        F[TURN, TURN] = rotate(np.asarray(turned), np.eye(3))  # of the inverse rotation: rows are turned axes
-        self.F, self.Q = F, self._noise(t, noise, measured=has_rate)
+        F[TURN, RATE_BIAS] = -t * _ONE
+        F[TURN, TURN] = _axes(turned)  # of the inverse rotation: rows are turned axes
+        self.F, self.Q = F, _noise(s, t, noise, measured=has_rate)
         self.belief = Belief(
             now.position + t * now.velocity + 0.5 * t * t * push,
             now.velocity + t * push,
-            np.asarray(normalised(product(tuple(now.quat_xyzw), turned))),
+            np.array(normalised(product(quat, turned))),
             now.force_bias,
             now.rate_bias,
             rate,
@@ -194,14 +197,14 @@ class SpatialFilter(ExtendedKalmanFilter, Filter):  # type: ignore[misc]
     def separation(self, other: SpatialFilter) -> tuple[np.ndarray, np.ndarray]:
         """See `Filter.separation`."""
         a, b = self.belief, other.belief
-        turn = rotation_error(tuple(b.quat_xyzw), tuple(a.quat_xyzw))
-        return np.concatenate((a.position - b.position, a.velocity - b.velocity, turn)), other.P[:9, :9]
+        angle = rotation_error(tuple(b.quat_xyzw), tuple(a.quat_xyzw))
+        return np.concatenate((a.position - b.position, a.velocity - b.velocity, angle)), other.P[:9, :9]
 
     def _residual(self, kind: int, value: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Measured less expected, the rows of the errors that it shows, and its noise."""
         if kind == events.POSE:
-            turn = rotation_error(tuple(self.belief.quat_xyzw), tuple(_unit(value[3:])))
-            return np.concatenate((value[:3] - self.belief.position, turn)), _POSE_ROWS, self._pose_noise
+            angle = rotation_error(tuple(self.belief.quat_xyzw), tuple(_unit(value[3:])))
+            return np.concatenate((value[:3] - self.belief.position, angle)), _POSE_ROWS, self._pose_noise
         quat, noise = value
         return np.asarray(rotation_error(tuple(self.belief.quat_xyzw), tuple(_unit(quat)))), _TURN_ROWS, noise
 
@@ -218,7 +221,7 @@ class SpatialFilter(ExtendedKalmanFilter, Filter):  # type: ignore[misc]
             now.rate - error[RATE_BIAS],
             now.measured,
         )
-        G = np.eye(ERRORS)
+        G = _SAME.copy()
         G[TURN, TURN] -= _skew(0.5 * error[TURN])
         self.P = G @ self.P @ G.T
         self.x = np.zeros(ERRORS)
@@ -232,21 +235,29 @@ class SpatialFilter(ExtendedKalmanFilter, Filter):  # type: ignore[misc]
         P[RATE_BIAS, RATE_BIAS] = RATE_BIAS_STD**2 * np.eye(3)
         self.belief, self.P = replace(self.belief, measured=True), P
 
-    def _noise(self, t: float, acceleration: float, *, measured: bool) -> np.ndarray:
-        """What noise adds to the covariance in a time [s]; `measured`: by an inertial reading."""
-        Q, one, s = np.zeros((ERRORS, ERRORS)), np.eye(3), self._settings
-        q = acceleration**2
-        Q[PLACE, PLACE], Q[VELOCITY, VELOCITY] = q * t**3 / 3.0 * one, q * t * one
-        Q[PLACE, VELOCITY] = Q[VELOCITY, PLACE] = q * t * t / 2.0 * one
-        Q[FORCE_BIAS, FORCE_BIAS] = s.accelerometer_drift**2 * t * one
-        if measured:
-            Q[TURN, TURN] = s.gyroscope_noise**2 * t * one
-            Q[RATE_BIAS, RATE_BIAS] = s.gyroscope_drift**2 * t * one
-        else:
-            spin = s.spin**2
-            Q[TURN, TURN], Q[RATE_BIAS, RATE_BIAS] = spin * t**3 / 3.0 * one, spin * t * one
-            Q[TURN, RATE_BIAS] = Q[RATE_BIAS, TURN] = -spin * t * t / 2.0 * one
-        return Q
+
+@lru_cache(maxsize=64)
+def _noise(s: SpatialMotionSettings, t: float, acceleration: float, *, measured: bool) -> np.ndarray:
+    """What noise adds to the covariance in a time [s]; `measured`: by an inertial reading. Not to be changed."""
+    Q, one = np.zeros((ERRORS, ERRORS)), _ONE
+    q = acceleration**2
+    Q[PLACE, PLACE], Q[VELOCITY, VELOCITY] = q * t**3 / 3.0 * one, q * t * one
+    Q[PLACE, VELOCITY] = Q[VELOCITY, PLACE] = q * t * t / 2.0 * one
+    Q[FORCE_BIAS, FORCE_BIAS] = s.accelerometer_drift**2 * t * one
+    if measured:
+        Q[TURN, TURN] = s.gyroscope_noise**2 * t * one
+        Q[RATE_BIAS, RATE_BIAS] = s.gyroscope_drift**2 * t * one
+    else:
+        spin = s.spin**2
+        Q[TURN, TURN], Q[RATE_BIAS, RATE_BIAS] = spin * t**3 / 3.0 * one, spin * t * one
+        Q[TURN, RATE_BIAS] = Q[RATE_BIAS, TURN] = -spin * t * t / 2.0 * one
+    return Q
+
+
+def _axes(quat_xyzw: tuple[float, ...]) -> np.ndarray:
+    """The axes of a body in the world, one a row, shape (3, 3); in plain numbers, for arrays here are short."""
+    x, y, z, w = quat_xyzw
+    return np.array([turn((x, y, z, w), axis) for axis in _AXES])
 
 
 def _unit(quat: np.ndarray) -> np.ndarray:

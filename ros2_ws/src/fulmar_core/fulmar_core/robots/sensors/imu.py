@@ -177,8 +177,8 @@ PATHS = (
 
 
 @functools.cache
-def _covariances(spec: ImuSpec, has_force: bool, has_rate: bool) -> tuple[np.ndarray, ...]:
-    """Of orientation, specific force and turn rate, shapes (9,); absent ones are marked as REP-145 says."""
+def _covariances(spec: ImuSpec, has_force: bool, has_rate: bool) -> tuple[tuple[float, ...], ...]:
+    """Of orientation, specific force and turn rate, nine numbers each; absent ones are marked as REP-145 says."""
     force = np.eye(3).ravel() * spec.accelerometer.std**2
     turn = np.eye(3).ravel() * spec.gyroscope.std**2
     absent = np.zeros(9)
@@ -187,7 +187,7 @@ def _covariances(spec: ImuSpec, has_force: bool, has_rate: bool) -> tuple[np.nda
         force[0] = UNKNOWN
     if not has_rate:
         turn[0] = UNKNOWN
-    return absent, force, turn
+    return tuple(absent.tolist()), tuple(force.tolist()), tuple(turn.tolist())
 
 
 def _write(reading: Reading, spec: ImuSpec) -> Sequence[Any]:
