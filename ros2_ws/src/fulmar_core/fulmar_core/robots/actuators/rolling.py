@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 from abc import abstractmethod
+from typing import ClassVar
 
 import numpy as np
 
@@ -39,7 +40,7 @@ class Rolling(Actuators):
     wheel_force: float
     friction: float
     excitation = Excitation(hold_s=1.5, foresight_s=1.0)  # long enough to come up to speed, and to stop
-    plausible = (
+    plausible: ClassVar[tuple[Plausible, ...]] = (
         Plausible(
             "actuators.wheel_radius", "m", (0.02, 1.0), (0.05, 0.8), "of the radius of the robot's outline",
             scale=lambda robot: robot.body.radius,
