@@ -21,6 +21,7 @@ from fulmar_evaluation.report.satellite_plot import (
     draw_torques,
     draw_wheels,
     torque_rows,
+    wheels_of,
 )
 from fulmar_evaluation.report.style import legend_above, legend_over
 
@@ -119,7 +120,7 @@ def _fastest(run: View) -> str:
     speeds = np.abs(run.record.wheels.values)
     for _, result in evaluated([run]):
         if speeds.size:
-            top = result.robot.actuators.top_speed
+            top = wheels_of(result).top_speed
             return f"{100.0 * speeds.max() / top:.2g} %, {speeds.max():.3g} of {top:.4g} rad/s"
     return "–"
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any, cast
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -107,6 +108,11 @@ def _small_and_large(axes: Axes) -> None:
     axes.set_ylim(-1.3 * most, 1.3 * most)
 
 
+def wheels_of(result: RunResult) -> ReactionWheels:
+    """What turns the satellite of a run; only those are drawn here."""
+    return cast(ReactionWheels, result.robot.actuators)
+
+
 def draw_wheels(axes: Axes, runs: Sequence[View]) -> None:
     """Speeds of the wheels on the left, their momentum on the right, and the limit of both."""
     fastest = 0.0
@@ -118,7 +124,7 @@ def draw_wheels(axes: Axes, runs: Sequence[View]) -> None:
             axes.plot(wheels.stamp_s - begin_s, wheels.values[:, number], label=label, **look)
         fastest = max(fastest, float(np.abs(wheels.values).max(initial=0.0)))
     for _, result in evaluated(runs)[:1]:
-        _momentum(axes, result.robot.actuators, fastest)
+        _momentum(axes, wheels_of(result), fastest)
     axes.set_ylabel("wheel speed [rad/s]")
     _over_the_run(axes, runs)
 
@@ -129,14 +135,21 @@ def _momentum(axes: Axes, actuators: ReactionWheels, fastest: float) -> None:
     words = f"limit ±{actuators.top_speed:.4g} rad/s, ±{size * actuators.top_momentum:.3g} {unit}"
     _limit(axes, fastest, actuators.top_speed, words)
     scale = size * actuators.spin_inertia
-    momentum = axes.secondary_yaxis("right", functions=(lambda speed: scale * speed, lambda h: h / scale))
+
+    def to_momentum(speed: Any) -> Any:
+        return scale * speed
+
+    def to_speed(momentum: Any) -> Any:
+        return momentum / scale
+
+    momentum = axes.secondary_yaxis("right", functions=(to_momentum, to_speed))
     momentum.set_ylabel(f"momentum [{unit}]")
 
 
 def draw_torques(rows: Sequence[Axes] | np.ndarray, run: View) -> None:
     """Torques of the motors in the first row, of the unloading in the second, as applied after all limits."""
     for _, result in evaluated([run]):
-        actuators = result.robot.actuators
+        actuators = wheels_of(result)
         torques = 1e3 * result.run.shares[0] * actuators.scale
         groups = [range(actuators.count), range(actuators.count, len(actuators.names))]
         for axes, group, what in zip(rows, groups, ("motor", "unloading"), strict=False):
@@ -157,7 +170,7 @@ def draw_torques(rows: Sequence[Axes] | np.ndarray, run: View) -> None:
 
 def torque_rows(runs: Sequence[View]) -> int:
     """Rows of `draw_torques` for one run: the second one where a run unloaded its wheels."""
-    outside = [result.run.shares[0][:, result.robot.actuators.count :] for _, result in evaluated(runs)]
+    outside = [result.run.shares[0][:, wheels_of(result).count :] for _, result in evaluated(runs)]
     return 2 if any(np.nan_to_num(each).any() for each in outside) else 1
 
 

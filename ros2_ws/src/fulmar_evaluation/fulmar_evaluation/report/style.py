@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from io import BytesIO, StringIO
+from typing import Any
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
@@ -104,7 +105,12 @@ def legend_over(axes: Axes, most: int = 6) -> None:
     """The same to the right above one of several axes."""
     handles, labels = axes.get_legend_handles_labels()
     if handles:
-        look = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "fontsize": 8.5, "handlelength": 1.2}
+        look: dict[str, Any] = {
+            "loc": "lower right",
+            "bbox_to_anchor": (1.0, 1.0),
+            "fontsize": 8.5,
+            "handlelength": 1.2,
+        }
         axes.legend(handles, labels, ncols=min(len(labels), most), columnspacing=1.2, **look)
 
 
