@@ -255,15 +255,15 @@ def test_messages_that_stay_in_their_file_are_those_that_memory_would_hold(
     assert (odometries(in_file.odometry()).pose == odometries(in_memory.odometry()).pose).all()
 
 
-PICTURE = "std_msgs/msg/UInt8MultiArray"
+IMAGE = "std_msgs/msg/UInt8MultiArray"
 
 
 def big_bag(path: Path, megabytes: int, *, compression: CompressionType, chunk: int = 4_000_000) -> Path:
     """Odometry, and a camera in the dark that makes most of the bag."""
     odometry = open_bag(write_foreign(path.with_suffix(""), StoragePlugin.MCAP)).odometry()
     new = type_store().types
-    dark = new[PICTURE](new["std_msgs/msg/MultiArrayLayout"]([], 0), np.zeros(1_000_000, dtype=np.uint8))
-    picture = bytes(type_store().serialize_cdr(dark, PICTURE))
+    dark = new[IMAGE](new["std_msgs/msg/MultiArrayLayout"]([], 0), np.zeros(1_000_000, dtype=np.uint8))
+    image = bytes(type_store().serialize_cdr(dark, IMAGE))
     with path.open("wb") as stream:
         writer = Writer(stream, compression=compression, chunk_size=chunk)
         writer.start(profile="ros2", library="tests")
@@ -271,14 +271,14 @@ def big_bag(path: Path, megabytes: int, *, compression: CompressionType, chunk: 
             writer.register_channel(
                 topic, "cdr", writer.register_schema(kind, "ros2msg", message_type(kind).definition.encode())
             )
-            for topic, kind in ((TOPIC, ODOMETRY), ("/camera", PICTURE))
+            for topic, kind in ((TOPIC, ODOMETRY), ("/camera", IMAGE))
         )
         for index in range(max(megabytes, len(odometry))):
             log_ns = odometry.log_ns[min(index, len(odometry) - 1)]
             if index < len(odometry):
                 writer.add_message(seen, log_ns, odometry.data[index], log_ns)
             if index < megabytes:
-                writer.add_message(camera, log_ns, picture, log_ns)
+                writer.add_message(camera, log_ns, image, log_ns)
         writer.finish()
     return path
 

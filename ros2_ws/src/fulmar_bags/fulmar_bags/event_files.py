@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_bags.mcap_records import UNPACK_LEAST, UNPACK_RATIO
+from fulmar_bags.stored_bytes import UNPACK_LEAST, UNPACK_RATIO
 from fulmar_core.config.errors import BagError, ConfigError
 from fulmar_core.dynamics.sky.events import Events, as_polarities, joined
 

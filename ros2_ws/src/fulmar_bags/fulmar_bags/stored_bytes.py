@@ -1,6 +1,6 @@
 """Bytes of the files of a bag, looked at where they lie, so that no bag has to fit into memory.
 
-A camera makes a bag of gigabytes; what robots are judged by are some megabytes of it. Small messages are kept as they
+A camera makes a bag of gigabytes; what an evaluation needs are some megabytes of it. Small messages are kept as they
 are read, until they fill their share; all others are read again from their place when they are looked at.
 """
 

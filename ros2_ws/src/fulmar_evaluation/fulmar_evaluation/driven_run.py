@@ -62,6 +62,6 @@ def driven_run(
 
 
 def _commands(robot: Robot) -> list[tuple[str, str]]:
-    """Names and types of the topics that say what actuators were told."""
+    """Names and types of the topics with what actuators received."""
     wire = command_wire(robot)
     return [(wire.name, kind) for kind in types_of(wire)] + [(ACTUATORS_STATE.name, ACTUATORS_STATE.type)]

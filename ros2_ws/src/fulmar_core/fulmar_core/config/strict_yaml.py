@@ -251,7 +251,7 @@ class _Builder:
                 value = float(value)
             except OverflowError:
                 value = math.inf
-        if kind is bool and not node.style and isinstance(value, str):
+        if kind is bool and isinstance(node, ScalarNode) and not node.style and isinstance(value, str):
             value = SWITCHES.get(value.lower(), value)
         if not isinstance(value, kind) or (kind in (int, float) and isinstance(value, bool)):
             why = unclear(node) if kind in (int, float) else ""

@@ -149,9 +149,9 @@ def dump(value: Any) -> str:
     return text
 
 
-def unclear(node: ScalarNode) -> str:
+def unclear(node: Node) -> str:
     """Why a value without quotes that is text here may be meant as something else; empty where it may not."""
-    if node.style or node.tag != f"{_TAG}str":
+    if not isinstance(node, ScalarNode) or node.style or node.tag != f"{_TAG}str":
         return ""
     return next((why for pattern, why in _UNCLEAR if pattern.fullmatch(node.value)), "")
 
