@@ -1,8 +1,10 @@
 """An aircraft as a JSBSim model: coefficients, ground effect, propellers and body of a robot's file as XML functions.
 
 JSBSim integrates; deflections [rad] and thrust levels come in as properties `fulmar/<actuator>`, since servos and
-motors are those of Fulmar in every simulator. Forces are along JSBSim's body axes (x ahead, y right, z down) about
-the centre of mass. The planet of `STILL_PLANET` does not turn, is a sphere, and has Fulmar's gravity.
+motors are those of Fulmar in every simulator. To them is added what JSBSim's own commands, trim and scripts ask for
+(`fcs/elevator-cmd-norm` and its like, as a share of the limit; `fcs/throttle-cmd-norm`), which acts at once. Forces
+are along JSBSim's body axes (x ahead, y right, z down) about the centre of mass. The planet of `STILL_PLANET` does not
+turn, is a sphere, and has Fulmar's gravity.
 """
 
 from __future__ import annotations
@@ -23,6 +25,14 @@ from fulmar_core.states.gravity import GRAVITY
 FOOT, POUND, SLUG_FT3 = 0.3048, 4.4482216152605, 515.378818393  # [m], [N], [kg/m³]
 SLUG = POUND / FOOT  # [kg]
 RADIUS_M = 6_378_137.0
+ENGINE, THRUSTER = "fulmar_throttle", "direct"  # files of engines
+# Which trim command belongs to a surface, and what JSBSim calls its positions, with their signs.
+TRIM_OF = {"elevator": "pitch", "aileron": "roll", "rudder": "yaw"}
+POSITIONS = {
+    "elevator": (("elevator", 1.0),),
+    "aileron": (("left-aileron", 1.0), ("right-aileron", -1.0)),
+    "rudder": (("rudder", 1.0),),
+}
 Node = Xml.Element
 
 
@@ -76,11 +86,8 @@ def aircraft_xml(robot: Robot) -> str:
     balance.append(_place("CG"))
     root.append(balance)
     root.append(_node("ground_reactions"))
-    root.append(_node("propulsion"))
-    control = _node("flight_control", name="fulmar")
-    for name in craft.names:
-        control.append(_node("property", text=f"fulmar/{name}", value="0.0"))
-    root.append(control)
+    root.append(_propulsion(craft))
+    root.append(_flight_control(craft))
     root.append(_aerodynamics(frame, craft))
     Xml.indent(root)
     return '<?xml version="1.0"?>\n' + Xml.tostring(root, encoding="unicode") + "\n"
@@ -88,6 +95,47 @@ def aircraft_xml(robot: Robot) -> str:
 
 def _place(name: str) -> Node:
     return _node("location", *(_node(axis, text="0.0") for axis in "xyz"), name=name, unit="M")
+
+
+def _propulsion(craft: ControlSurfaces) -> Node:
+    """An engine without power for each motor, which gives JSBSim its throttle; thrust is among the forces."""
+    out = _node("propulsion")
+    for motor in craft.motors:
+        ahead, left, up = motor.position
+        # JSBSim's structural axes: x to the rear, y to the right, z up.
+        places = zip("xyz", (-ahead, -left, up), strict=True)
+        place = _node("location", *(_node(axis, text=repr(float(at))) for axis, at in places), unit="M")
+        thruster = _node("thruster", place, file=THRUSTER)
+        out.append(_node("engine", thruster, file=ENGINE))
+    return out
+
+
+def _flight_control(craft: ControlSurfaces) -> Node:
+    """What is applied: what Fulmar sets, and what JSBSim's commands ask for beside it."""
+    out = _node("flight_control", name="fulmar")
+    for name in craft.names:
+        out.append(_node("property", text=f"fulmar/{name}", value="0.0"))
+    channel = _node("channel", name="surfaces")
+    for surface in craft.surfaces:
+        name, limit = surface.name, math.radians(surface.limit_deg)
+        asked = _plus(_get(f"fcs/{name}-cmd-norm"), _get(f"fcs/{TRIM_OF[name]}-trim-cmd-norm"))
+        by_command = _times(_value(limit), _node("max", _value(-1.0), _node("min", _value(1.0), asked)))
+        channel.append(_applied(name, by_command))
+        for place, sign in POSITIONS[name]:
+            gain = _node("pure_gain", name=f"fulmar/{place}-position")
+            gain.append(_node("input", text=f"fulmar/{name}-applied"))
+            gain.append(_node("gain", text=repr(sign)))
+            gain.append(_node("output", text=f"fcs/{place}-pos-rad"))
+            channel.append(gain)
+    for number, motor in enumerate(craft.motors):
+        channel.append(_applied(motor.name, _get(f"fcs/throttle-pos-norm[{number}]")))
+    out.append(channel)
+    return out
+
+
+def _applied(name: str, by_command: Node) -> Node:
+    both = _node("function", _plus(_get(f"fulmar/{name}"), by_command))
+    return _node("fcs_function", both, name=f"fulmar/{name}-applied")
 
 
 def _aerodynamics(frame: Airframe, craft: ControlSurfaces) -> Node:
@@ -119,7 +167,7 @@ def _aerodynamics(frame: Airframe, craft: ControlSurfaces) -> Node:
     present = {surface.name for surface in craft.surfaces}
     for name in SURFACES:
         own = (
-            [_times(_get(f"fulmar/{name}"), _value(per * model.signs.get(name, 1.0)))]
+            [_times(_get(f"fulmar/{name}-applied"), _value(per * model.signs.get(name, 1.0)))]
             if name in present
             else []
         )
@@ -235,7 +283,7 @@ def _add_forces(out: Node, frame: Airframe, craft: ControlSurfaces) -> None:
     }
     own: dict[str, list[Node]] = {axis: [] for axis in (*force, *moment)}
     for motor in craft.motors:
-        level = _get(f"fulmar/{motor.name}")
+        level = _get(f"fulmar/{motor.name}-applied")
         engine, limit = motor.engine, _value(motor.engine.thrust)
         if isinstance(engine, ElectricMotor):
             more = _times(level, _node("difference", _value(engine.jet_speed), speed))
@@ -274,8 +322,23 @@ STILL_PLANET = f"""<?xml version="1.0"?>
 """
 
 
-def write_aircraft(robot: Robot, folder: Path) -> Path:
-    """Write `<name>/<name>.xml` and `still_planet.xml` below a folder; returns the model.
+HEAD = '<?xml version="1.0"?>\n'
+ENGINES = {
+    ENGINE: f'{HEAD}<electric_engine name="{ENGINE}">\n  <power unit="WATTS">0.0</power>\n</electric_engine>\n',
+    THRUSTER: f'{HEAD}<direct name="Direct"/>\n',
+}
+
+
+def write_aircraft(robot: Robot, folder: Path, *, engines: str = "") -> Path:
+    """Write `<name>/<name>.xml` below a folder, and `still_planet.xml` into it.
+
+    Args:
+        robot: An aircraft.
+        folder: JSBSim's path of aircraft.
+        engines: Folder of the engines; empty: `Engines` of the model's own.
+
+    Returns:
+        The model.
 
     Raises:
         ConfigError: The robot is no aircraft.
@@ -285,7 +348,11 @@ def write_aircraft(robot: Robot, folder: Path) -> Path:
     if robot.airframe is None:
         raise ConfigError(f"'{robot.name}' is no aircraft, and JSBSim flies nothing else.")
     path = folder / robot.name / f"{robot.name}.xml"
+    own = Path(engines) if engines else path.parent / "Engines"
+    own.mkdir(parents=True, exist_ok=True)
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(aircraft_xml(robot), encoding="utf-8")
+    for name, text in ENGINES.items():
+        (own / f"{name}.xml").write_text(text, encoding="utf-8")
     (folder / "still_planet.xml").write_text(STILL_PLANET, encoding="utf-8")
     return path

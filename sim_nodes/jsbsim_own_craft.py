@@ -22,12 +22,11 @@ from fulmar_core.dynamics.flight_trim import FREE_AIR, Trim, find_trim
 from fulmar_core.robots.actuators.control_surfaces import ControlSurfaces
 from fulmar_core.robots.robot import Robot
 from sim_nodes.jsbsim_craft import STEPS, model_in
-from sim_nodes.jsbsim_model import FOOT, SLUG
+from sim_nodes.jsbsim_model import FOOT, SLUG, TRIM_OF
 
 # Rate that a surface drives, and the sign of what Fulmar's positive deflection does to it in JSBSim's axes (x ahead,
 # y right, z down): nose down, right wing down, nose to the left.
 DRIVEN = {"elevator": ("q", -1.0), "aileron": ("p", 1.0), "rudder": ("r", -1.0)}
-TRIM_OF = {"elevator": "pitch", "aileron": "roll", "rudder": "yaw"}
 SHARES = (1.0, 0.97, 0.94, 0.91, 0.88, 0.85, 0.8)  # of the cruising speed, for engines that cannot hold it
 PROBE, PROBE_S = 0.25, 0.2  # share of a control's range, and for how long it acts [s]
 LEAST_RAD = 1e-3  # that a quarter of a control's range moves its surface by

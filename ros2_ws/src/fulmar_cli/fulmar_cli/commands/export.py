@@ -24,7 +24,8 @@ def export(
 ) -> None:
     """Write a policy bundle: network, golden vectors and passport; then load it as the robot will.
 
-    `--to jsbsim` takes the name of an aircraft and writes `DIR/NAME/NAME.xml` and the planet it was compared on.
+    `--to jsbsim` takes the name of an aircraft and writes a root folder of JSBSim's: `aircraft/NAME`, `engine`, a
+    script that trims and flies it, and the planet it was compared on.
     """
     if out.exists() and not force and (not out.is_dir() or any(out.iterdir())):
         raise ConfigError(
@@ -35,10 +36,13 @@ def export(
     if to is not None:
         if to != JSBSIM:
             raise UnknownNameError("format", to, (JSBSIM,))
-        from sim_nodes.jsbsim_model import write_aircraft
+        from sim_nodes.jsbsim_root import write_root
 
-        write_line(f"{write_aircraft(load_robot(str(run)), out)}: for JSBSim")
-        write_line(f"{out / 'still_planet.xml'}: its planet")
+        robot = load_robot(str(run))
+        write_line(
+            f"{write_root(robot, out)}: for JSBSim. Trim it and fly it: JSBSim --root={out} "
+            f"--script=scripts/{robot.name}.xml"
+        )
         return
     from fulmar_core.tasks import load_task
     from policy_server.policy import Policy
