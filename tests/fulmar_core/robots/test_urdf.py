@@ -36,7 +36,7 @@ def test_mass_inertia_and_centre_of_mass_are_those_of_the_yaml(name):
     np.testing.assert_array_equal(inertial.origin[:3, 3], body.com)
     np.testing.assert_array_equal(inertial.origin[:3, :3], np.eye(3))
     others = [link for link in model.robot.links if link.name != "base_link"]
-    assert all(link.inertial is None for link in others)
+    assert all(link.inertial.mass == 0.0 and not link.inertial.inertia.any() for link in others)
 
 
 @pytest.mark.parametrize("name", ROBOTS)
@@ -107,3 +107,17 @@ def test_the_hull_has_the_size_of_the_outline(name):
     else:
         np.testing.assert_array_equal(collision.geometry.box.size, (*robot.body.footprint, high - low))
     assert collision.origin[2, 3] == 0.5 * (low + high)
+
+
+@pytest.mark.parametrize("name", ["floating_platform", "turtlebot2", "cubesat_wheels"])
+def test_pybullet_pushes_the_mass_of_the_yaml(name, tmp_path):
+    """It takes a link that says nothing of its mass for 1 kg."""
+    pybullet = pytest.importorskip("pybullet")
+    robot, path = load_robot(name), tmp_path / f"{name}.urdf"  # it keeps what it read by the name of the file
+    path.write_text(urdf_of(robot))
+    client = pybullet.connect(pybullet.DIRECT)
+    body = pybullet.loadURDF(str(path), flags=pybullet.URDF_USE_INERTIA_FROM_FILE)
+    links = range(-1, pybullet.getNumJoints(body))
+    masses = [pybullet.getDynamicsInfo(body, link)[0] for link in links]
+    pybullet.disconnect(client)
+    assert sum(masses) == pytest.approx(robot.body.mass, rel=1e-12)

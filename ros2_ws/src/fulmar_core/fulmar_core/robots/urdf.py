@@ -54,8 +54,10 @@ def body_frames(robot: Robot) -> tuple[BodyFrame, ...]:
 def urdf_of(robot: Robot, frames: Frames = PLAIN) -> str:
     """A robot's model for RViz, Foxglove and other readers of URDF.
 
-    `base_link` has the whole mass, and the inertia tensor about the centre of mass; the other links have none and are
-    fixed to it, so that no joint states are needed to show them.
+    `base_link` has the whole mass, and the inertia tensor about the centre of mass; the other links are fixed to it, so
+    that no joint states are needed to show them, and say that they have neither. PyBullet takes a link that says
+    nothing for 1 kg; zero is read as zero by PyBullet, Drake (which asks for a joint that is fixed), MuJoCo (which
+    merges such links), urdfdom and KDL.
 
     Args:
         robot: The robot.
@@ -66,12 +68,7 @@ def urdf_of(robot: Robot, frames: Frames = PLAIN) -> str:
     """
     root = ElementTree.Element("robot", name=robot.name)
     base = ElementTree.SubElement(root, "link", name=frames.base)
-    inertial = ElementTree.SubElement(base, "inertial")
-    _place(inertial, robot.body.com)
-    ElementTree.SubElement(inertial, "mass", value=_number(robot.body.mass))
-    names = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
-    tensor = dict(zip(names, map(_number, robot.body.tensor), strict=True))
-    ElementTree.SubElement(inertial, "inertia", tensor)
+    _add_inertial(base, robot.body.com, robot.body.mass, robot.body.tensor)
     low, high = robot.hull_span
     for purpose in ("visual", "collision"):
         part = ElementTree.SubElement(base, purpose)
@@ -82,6 +79,7 @@ def urdf_of(robot: Robot, frames: Frames = PLAIN) -> str:
     for frame in body_frames(robot):
         name = frames.named(frame.name)
         link = ElementTree.SubElement(root, "link", name=name)
+        _add_inertial(link, (0.0,) * 3, 0.0, (0.0,) * 6)
         if frame.part is not None:
             _add_part(ElementTree.SubElement(link, "visual"), frame.part)
         joint = ElementTree.SubElement(root, "joint", name=f"{name}_joint", type="fixed")
@@ -90,6 +88,16 @@ def urdf_of(robot: Robot, frames: Frames = PLAIN) -> str:
         ElementTree.SubElement(joint, "child", link=name)
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="unicode", xml_declaration=True) + "\n"
+
+
+def _add_inertial(
+    link: ElementTree.Element, com: Sequence[float], mass: float, tensor: Sequence[float]
+) -> None:
+    inertial = ElementTree.SubElement(link, "inertial")
+    _place(inertial, com)
+    ElementTree.SubElement(inertial, "mass", value=_number(mass))
+    names = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+    ElementTree.SubElement(inertial, "inertia", dict(zip(names, map(_number, tensor), strict=True)))
 
 
 def _add_hull(geometry: ElementTree.Element, robot: Robot, height: float) -> None:
