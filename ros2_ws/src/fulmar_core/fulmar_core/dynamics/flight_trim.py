@@ -12,7 +12,7 @@ from fulmar_core.dynamics.flight_dynamics import FlightDynamics, FlightWorld
 from fulmar_core.dynamics.level_flight import NUDGE, LevelFlight
 from fulmar_core.dynamics.rigid_body import inertia_of, turn_acceleration
 from fulmar_core.robots.robot import Robot
-from fulmar_core.states.attitude import Quaternion, conjugate, euler_of, from_euler, plus, product, turn
+from fulmar_core.states.attitude import conjugate, euler_of, from_euler, plus, product, turn
 from fulmar_core.states.counter_rng import Draws
 from fulmar_core.states.gravity import GRAVITY
 from fulmar_core.states.spatial import SpatialState
@@ -152,7 +152,8 @@ def flying_at(robot: Robot, pose: np.ndarray) -> SpatialState:
     roll, pitch, yaw = euler_of(written.quat)
     zero = 0.0 * yaw
     flight = nominal_flight(robot, np.atleast_1d(written.z))
-    level: Quaternion = tuple(part[0] for part in flight.quat)  # type: ignore[assignment]
+    x, y, z, w = flight.quat
+    level = x[0], y[0], z[0], w[0]
     upset = from_euler(zero, zero, yaw)
     if max(abs(float(roll)), abs(float(pitch))) > NUDGE:
         upset = product(written.quat, conjugate(level))
