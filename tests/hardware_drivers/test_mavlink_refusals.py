@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from pymavlink import mavutil
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from fulmar_core.config.errors import DeviceError
@@ -82,9 +83,7 @@ def test_an_autopilot_whose_modes_mean_something_else_is_a_refusal(state, autopi
 
 
 def test_a_copter_is_neither_set_to_manual_nor_armed(monkeypatch):
-    monkeypatch.setattr(
-        "sim_nodes.emulators.ardupilot.mavlink.MAV_TYPE_SURFACE_BOAT", mavlink.MAV_TYPE_QUADROTOR
-    )
+    monkeypatch.setattr(mavutil.mavlink, "MAV_TYPE_SURFACE_BOAT", mavlink.MAV_TYPE_QUADROTOR)
     with boat() as bench:
         with pytest.raises(DeviceError, match="is no ArduPilot Rover or boat"), driven(bench):
             pass
