@@ -69,8 +69,8 @@ def said_as_run(plan):
     assert numbers_of(parts["length"])[0] == pytest.approx(plant["duration_s"], abs=1e-3)
     assert (parts["pace"] == "in lock step") is plant["lockstep"]
     start = np.asarray(plant["start"], dtype=float)
-    heard = numbers_of(parts["start:"].partition(", drawn")[0])
-    assert heard == pytest.approx(
+    begun = numbers_of(parts["start:"].partition(", drawn")[0])
+    assert begun == pytest.approx(
         list(start[form.AXES :] if not robot.kind.goes_anywhere else start), abs=6e-3
     )
     target = plan.mission.current

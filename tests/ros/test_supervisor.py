@@ -6,6 +6,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 
 import pytest
 import rclpy
@@ -69,6 +70,15 @@ def test_a_run_whose_plant_is_there_twice_is_refused_with_every_node_that_is(ros
         "are there twice, and two of one name would mix. Wait for it to end, give this robot another --name, or set "
         "ROS_DOMAIN_ID to another number."
     )
+
+
+@pytest.mark.parametrize("standing", [False, True])
+def test_a_launcher_whose_goals_come_from_outside_publishes_none_itself(
+    standing: bool, ros_domain: RosDomain
+) -> None:
+    """Its latched publisher would make plain ones warn of the subscriptions that it needs."""
+    with supervisor(replace(PLAN, standing=standing)) as overseer:
+        assert overseer._node.count_publishers(f"{NAMESPACE}/{GOAL_POSE.name}") == (not standing)
 
 
 class Button:
