@@ -187,7 +187,7 @@ class EmulatorNode(Node):
                 self._publish_pose(sent_ns, state)
 
     def _publish_pose(self, sent_ns: int, state: RigidBodyState) -> None:
-        self._mocap.publish(self._write_pose.write(state, sent_ns))
+        self._mocap.publish(self._write_pose.raw(state, sent_ns))
 
 
 def values_of(message: Any) -> list[float]:

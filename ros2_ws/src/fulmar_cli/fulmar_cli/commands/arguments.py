@@ -6,20 +6,15 @@ import functools
 import inspect
 import os
 import sys
-import time
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
 import typer
 
 from fulmar_bringup.console import json_alone, warn
 from fulmar_bringup.node_table import OPTIONS
 from fulmar_core.wires.robot_name import checked_name
-
-if TYPE_CHECKING:
-    from fulmar_bringup.run_plan import RunPlan
 
 Value = TypeVar("Value")
 
@@ -145,15 +140,3 @@ def with_node_options(*, standing: bool) -> Callable[[Callable[..., None]], Call
 def invoked_command() -> str:
     """The command line of this process, for records."""
     return "fulmar " + " ".join(sys.argv[1:])
-
-
-def recorded(plan: RunPlan) -> RunPlan:
-    """A complete plan with a folder for its bag, which is named after what runs; one that was given stays."""
-    return replace(plan, record=plan.record or str(dated_folder("runs", plan.robot_name, plan.controller)))
-
-
-def dated_folder(parent: str, *names: str) -> Path:
-    """A new folder, named by the time and by what is in it; of a class of one's own the module is left out."""
-    return Path(
-        parent, "_".join((time.strftime("%Y%m%d_%H%M%S"), *(name.rpartition(":")[2] for name in names)))
-    )

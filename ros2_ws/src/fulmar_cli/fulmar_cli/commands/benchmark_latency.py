@@ -10,7 +10,8 @@ from rich.table import Table
 
 from fulmar_bringup.console import output, print_result, write_line
 from fulmar_bringup.progress import time_bar, work_bar
-from fulmar_cli.commands.arguments import JsonOption, dated_folder, option
+from fulmar_cli.commands.arguments import JsonOption, option
+from fulmar_cli.commands.folders import dated_folder
 from fulmar_core.config.errors import FAILED, ConfigError
 
 

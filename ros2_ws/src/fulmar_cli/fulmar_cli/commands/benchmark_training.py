@@ -8,7 +8,8 @@ from typing import Annotated, Any
 import typer
 
 from fulmar_bringup.console import print_result, write_line
-from fulmar_cli.commands.arguments import JsonOption, dated_folder, option
+from fulmar_cli.commands.arguments import JsonOption, option
+from fulmar_cli.commands.folders import dated_folder
 from fulmar_core.config.errors import FAILED
 
 

@@ -10,7 +10,8 @@ import typer
 from fulmar_bringup.console import log_line, print_result, write_line
 from fulmar_cli.commands import arguments as cli
 from fulmar_cli.commands import run_help as text
-from fulmar_cli.commands.arguments import flag, option, recorded
+from fulmar_cli.commands.arguments import flag, option
+from fulmar_cli.commands.folders import recorded
 from fulmar_cli.commands.values import read_area, read_goal, read_guards, read_numbers, read_pose
 
 

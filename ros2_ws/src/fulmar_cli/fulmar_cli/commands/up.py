@@ -12,7 +12,8 @@ import typer
 from fulmar_bringup.console import log_line, print_json, write_line
 from fulmar_bringup.progress import live_line
 from fulmar_cli.commands import arguments as cli
-from fulmar_cli.commands.arguments import argument, flag, option, recorded
+from fulmar_cli.commands.arguments import argument, flag, option
+from fulmar_cli.commands.folders import recorded
 from fulmar_cli.commands.values import read_pose
 from fulmar_core.config.errors import DONE, FAILED
 

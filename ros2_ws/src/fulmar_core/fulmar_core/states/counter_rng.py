@@ -86,7 +86,7 @@ def words(keys: Keys, counter: Array | int, count: int) -> Array:
 
 @functools.lru_cache(maxsize=64)
 def _channels(count: int, xp: Any, dtype: Any, where: Any) -> Array:
-    """What tells the words of one counter apart, shape (count, 1)."""
+    """By which the words of one counter differ, shape (count, 1)."""
     return xp.asarray([(i + 1) * GOLDEN & MASK for i in range(count)], dtype=dtype, device=where)[:, None]
 
 

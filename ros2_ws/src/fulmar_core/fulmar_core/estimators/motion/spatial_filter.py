@@ -93,12 +93,14 @@ class SpatialFilter(ExtendedKalmanFilter, Filter):  # type: ignore[misc]
             rate = inertial.angular_velocity - now.rate_bias
         if inertial is not None and has_force:
             force, noise = inertial.specific_force - now.force_bias, s.acceleration_noise
-        quat = tuple(now.quat_xyzw.tolist())
+        x, y, z, w = now.quat_xyzw.tolist()
+        quat = x, y, z, w
         axes = _axes(quat).T  # body to world
         push = axes @ force
         if self._weighs and has_force:
             push = push - np.array([0.0, 0.0, GRAVITY])
-        turned = tuple(map(float, exponential(tuple((t * rate).tolist()))))
+        a, b, c, d = exponential(tuple((t * rate).tolist()))
+        turned = float(a), float(b), float(c), float(d)
         F = _SAME.copy()
         F[PLACE, VELOCITY] = t * _ONE
         if has_force:
@@ -254,10 +256,9 @@ def _noise(s: SpatialMotionSettings, t: float, acceleration: float, *, measured:
     return Q
 
 
-def _axes(quat_xyzw: tuple[float, ...]) -> np.ndarray:
+def _axes(quat_xyzw: tuple[float, float, float, float]) -> np.ndarray:
     """The axes of a body in the world, one a row, shape (3, 3); in plain numbers, for arrays here are short."""
-    x, y, z, w = quat_xyzw
-    return np.array([turn((x, y, z, w), axis) for axis in _AXES])
+    return np.array([turn(quat_xyzw, axis) for axis in _AXES])
 
 
 def _unit(quat: np.ndarray) -> np.ndarray:

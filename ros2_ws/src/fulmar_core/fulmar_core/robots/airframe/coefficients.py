@@ -122,7 +122,8 @@ class Coefficients:
             beyond = alpha - own["alpha"]
             if is_numpy(beyond) and not beyond.any():  # what is traced has no numbers yet
                 beyond = None
-        inside, outside = self._plans  # type: ignore[attr-defined]
+        plans: tuple[_Plan, _Plan] = self._plans  # type: ignore[attr-defined]
+        inside, outside = plans
         found = inside.sums(own, alpha) if beyond is None else outside.sums(own, alpha, beyond)
         for name, table in self.tables.items():
             found[name] = found[name] + table.at(alpha + self.alpha_zero)
@@ -161,7 +162,7 @@ class _Plan:
             self._numbers[factors] = len(self._steps)
         return self._numbers[factors]
 
-    def sums(self, own: Mapping[str, Array], alpha: Array, beyond: Array | None = None) -> dict[str, Array]:
+    def sums(self, own: Mapping[str, Array], alpha: Array, beyond: Array = None) -> dict[str, Array]:
         """Each coefficient without its table, shapes (...,).
 
         Args:
