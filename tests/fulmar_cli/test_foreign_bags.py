@@ -132,3 +132,10 @@ def test_odometry_that_is_chosen_by_its_name_is_that_of_every_reader(theirs):
     assert open_bag(theirs, reading).odometry().name == "/base/odometry"
     with pytest.raises(BagError, match=r"several odometries .* Choose one: --topics odom=TOPIC"):
         open_bag(theirs).odometry()
+
+
+def test_a_bag_of_sqlite3_that_is_to_be_recovered_is_referred_to_sqlite3(theirs):
+    done = asked("bag", "recover", theirs)
+    assert isinstance(done.exception, BagError)
+    assert "only .mcap files are recovered" in str(done.exception)
+    assert ".recover" in str(done.exception)

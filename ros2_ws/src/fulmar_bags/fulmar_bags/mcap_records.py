@@ -62,6 +62,14 @@ def bag_files(bag: Path) -> list[Path]:
         raise BagError(f"{bag}: there is no such bag. Give a bag folder, or the .mcap file in it.")
     named = (*bag.glob("*.mcap"), *bag.glob(f"*.mcap{BEGUN}"))
     files = sorted((path for path in named if path.suffix != BEGUN or path.stat().st_size), key=place_in_bag)
+    other = (
+        next(iter(sorted(path for path in bag.iterdir() if storage_of(path))), None) if not files else None
+    )
+    if other is not None:
+        raise BagError(
+            f"{bag}: holds {other.name}, and only .mcap files are recovered. What is sound of it is read as it is; for "
+            f'more try: sqlite3 "{other}" .recover | sqlite3 recovered.db3'
+        )
     if not files:
         raise BagError(f"{bag}: 0 .mcap files where a bag folder has one or more. Give a bag folder.")
     return files
