@@ -122,8 +122,9 @@ def test_identify_says_in_one_line_what_is_missing(theirs, words, said):
 
 def test_a_satellite_of_another_program_is_asked_for_its_readings(theirs):
     done = asked("identify", theirs, "--robot", "cubesat_wheels")
-    assert "no message on 'imu', which shows the inertia. If it has another name there, give --topics" in str(
-        done.exception
+    assert (
+        "no message on 'imu/data', which shows the inertia. If it has another name there, give --topics"
+        in str(done.exception)
     )
 
 
