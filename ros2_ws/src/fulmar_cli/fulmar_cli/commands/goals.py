@@ -34,7 +34,7 @@ def goals(
         option(
             "X,Y,DEG",
             "One goal instead of a file: x [m], y [m], heading [deg], or x,y for a position; in space "
-            "x,y,z,roll,pitch,yaw [m, deg]; of satellites roll,pitch,yaw.",
+            "x,y,z,roll,pitch,yaw [m, deg], of satellites roll,pitch,yaw; a position x,y,z has --position.",
             "--pose",
         ),
     ] = None,

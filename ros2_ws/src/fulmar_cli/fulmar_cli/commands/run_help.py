@@ -11,11 +11,11 @@ RUN_TASK_HELP = (
 BACKEND_HELP = "mujoco, mock (Fulmar's own dynamics, perfect sensors), jsbsim[:MODEL] (aircraft) or hardware."
 DURATION_HELP = "Simulated seconds; the task's episode by default."
 GOAL_HELP = (
-    "Where to go [m, deg], in space x,y,z,roll,pitch,yaw, or x,y,z with --task go_to_position_3d; of satellites "
+    "Where to go [m, deg], in space x,y,z,roll,pitch,yaw or x,y,z with --task go_to_position_3d; of satellites "
     "roll,pitch,yaw. By default the seed draws it."
 )
 START_HELP = (
-    "Where to begin [m, deg], in space x,y,z or x,y,z,roll,pitch,yaw, of satellites roll,pitch,yaw; by default the "
+    "Where to begin [m, deg], in space x,y,z or x,y,z,roll,pitch,yaw and of satellites roll,pitch,yaw; by default the "
     "seed draws it."
 )
 VELOCITY_HELP = (
