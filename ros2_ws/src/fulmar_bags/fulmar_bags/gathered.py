@@ -53,7 +53,8 @@ class Topic:
     def chosen(self, numbers: np.ndarray) -> Topic:
         """Some of the messages, in the order of their numbers as given; all of them have to be readable."""
         columns = (self.data, self.log_ns, self.publish_ns, self.sequence)
-        return Topic(self.name, self.type, *(picked(column, numbers) for column in columns))
+        data, log_ns, publish_ns, sequence = (picked(column, numbers) for column in columns)
+        return Topic(self.name, self.type, data, log_ns, publish_ns, sequence)
 
 
 class Gathered:

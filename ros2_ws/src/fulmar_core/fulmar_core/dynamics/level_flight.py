@@ -57,7 +57,8 @@ class LevelFlight:
         """Newton's step, shape (k, n)."""
         left = self._accelerations(x)
         slopes = [(self._accelerations(x + NUDGE * unit[:, None]) - left) / NUDGE for unit in np.eye(len(x))]
-        return np.einsum("nki,in->kn", np.linalg.pinv(np.stack(slopes, axis=-1).swapaxes(0, 1)), left)
+        inverse = np.linalg.pinv(np.stack(slopes, axis=-1).swapaxes(0, 1))
+        return np.asarray(np.einsum("nki,in->kn", inverse, left))
 
     def _attitude(self, x: np.ndarray) -> Quaternion:
         """That of a level path: what turns the velocity in the body onto the world's x, then a roll about that."""

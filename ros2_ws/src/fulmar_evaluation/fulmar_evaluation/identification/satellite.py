@@ -51,8 +51,8 @@ def identify_satellite(robot: Robot, bags: Sequence[Path], reading: BagReading =
     for method in METHODS:
         estimator = InertiaEstimator(replace(settings, method=method), robot)
         for run in runs:
-            for _, name, reading in run:
-                estimator.take(name, reading)
+            for _, name, taken in run:
+                estimator.take(name, taken)
         found["estimates"][method] = _document(estimator)
     return found
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -155,7 +155,7 @@ class _Received:
 
 
 def _exchange(
-    raw: dict[str, list[bytes]], record: ControlSteps, namespace: str, group: ProcessGroup
+    raw: dict[str, Sequence[bytes]], record: ControlSteps, namespace: str, group: ProcessGroup
 ) -> tuple[Answers, str | None]:
     init_ros()
     try:
@@ -236,7 +236,11 @@ class _Wires:
 
 
 def _feed(
-    raw: dict[str, list[bytes]], record: ControlSteps, group: ProcessGroup, wires: _Wires, received: _Received
+    raw: dict[str, Sequence[bytes]],
+    record: ControlSteps,
+    group: ProcessGroup,
+    wires: _Wires,
+    received: _Received,
 ) -> tuple[Answers, str | None]:
     def wait(condition: Callable[[], bool], limit_s: float, what: str) -> None:
         until = time.monotonic() + limit_s
@@ -312,7 +316,7 @@ def _answered(received: _Received, stamp: int) -> bool:
         return stamp in received.commands
 
 
-def _raw_messages(bag: Bag, record: ControlSteps, odometry: str | None) -> dict[str, list[bytes]]:
+def _raw_messages(bag: Bag, record: ControlSteps, odometry: str | None) -> dict[str, Sequence[bytes]]:
     return {
         "odometry": bag.odometry(odometry).data,
         "goals": bag.of(GOAL_WIRES[record.task.goal_topic]).data,
@@ -325,7 +329,7 @@ def _raw_messages(bag: Bag, record: ControlSteps, odometry: str | None) -> dict[
 def _publish(
     step: int,
     messages: dict[str, dict[int, list[Received]]],
-    raw: dict[str, list[bytes]],
+    raw: dict[str, Sequence[bytes]],
     wires: _Wires,
     wait: Callable[[Callable[[], bool], float, str], None],
     received: _Received,
