@@ -9,9 +9,10 @@ import pytest
 
 from fulmar_bags.bag_reading import BagReading
 from fulmar_bags.comparison import differing
-from fulmar_bags.contents import Topic, open_bag
+from fulmar_bags.contents import open_bag
 from fulmar_bags.control_steps import control_steps_of
 from fulmar_bags.decode import messages
+from fulmar_bags.gathered import Topic
 from fulmar_bags.message_types import type_store
 from fulmar_bags.run_record import read_any_run, read_run
 from fulmar_bags.writer import BagWriter

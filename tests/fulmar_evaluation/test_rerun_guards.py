@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fulmar_bags.contents import Bag, Topic, open_bag
+from fulmar_bags.contents import Bag, open_bag
 from fulmar_bags.control_steps import ControlSteps, control_steps_of
 from fulmar_bags.figures import describe
+from fulmar_bags.gathered import Topic
 from fulmar_bags.message_types import type_store
 from fulmar_core.config.errors import BagError, RunFailed
 from fulmar_core.controllers.classical import load_classical

@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_bags.contents import Bag, Topic
+from fulmar_bags.contents import Bag
 from fulmar_bags.decode import by_stamp
 from fulmar_bags.figures import provenance
+from fulmar_bags.gathered import Topic
 from fulmar_bags.tables import Row, columns, rows
 from fulmar_core.config.errors import ConfigError, UnknownNameError
 from fulmar_core.robots.topics import CLOCK, DIAGNOSTICS, METADATA, STATUS

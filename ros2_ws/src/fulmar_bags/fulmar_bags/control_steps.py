@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_bags.contents import Bag, Topic, json_object
+from fulmar_bags.contents import Bag
 from fulmar_bags.decode import NS, Odometries, Vectors, by_stamp, odometries
+from fulmar_bags.gathered import Topic, json_object
 from fulmar_bags.reading_messages import reader_of
 from fulmar_bags.recorded_estop import estop_messages
 from fulmar_bags.wire_reader import ABSENT, Received, WireReader

@@ -127,9 +127,7 @@ def joint_vectors(topic: Topic, field: str) -> Vectors:
             values.extend(numbers)
             count += 1
     names = names or ()
-    return Vectors(
-        names, *_columns(times, 3, np.int64), np.array(values).reshape(count, len(names)), len(topic) - count
-    )
+    return Vectors(names, *_stamps(times), np.array(values).reshape(count, len(names)), len(topic) - count)
 
 
 def twist_vectors(topic: Topic) -> Vectors:
@@ -144,7 +142,7 @@ def twist_vectors(topic: Topic) -> Vectors:
         times.extend((log_ns if plain else stamp_of(message), log_ns, publish_ns))
         values.extend((twist.linear.x, twist.angular.z))
     found = np.array(values).reshape(-1, 2)
-    return Vectors(("speed", "yaw_rate"), *_columns(times, 3, np.int64), found, len(topic) - len(found))
+    return Vectors(("speed", "yaw_rate"), *_stamps(times), found, len(topic) - len(found))
 
 
 def odometries(topic: Topic) -> Odometries:
@@ -171,7 +169,7 @@ def odometries(topic: Topic) -> Odometries:
         numbers.extend((*_xyz(m.twist.twist.linear), *_xyz(m.twist.twist.angular)))
     table = np.array(numbers).reshape(-1, 13)
     return Odometries(
-        *_columns(times, 3, np.int64),
+        *_stamps(times),
         tuple(frame for frame, _ in frames),
         tuple(child for _, child in frames),
         table[:, :7],
@@ -191,9 +189,10 @@ def _times(topic: Topic) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return found, np.array(topic.log_ns, dtype=np.int64), np.array(topic.publish_ns, dtype=np.int64)
 
 
-def _columns(values: array[int], width: int, kind: Any) -> np.ndarray:
-    """Columns of a table of so many, shape (width, n)."""
-    return np.array(values, dtype=kind).reshape(-1, width).T
+def _stamps(times: array[int]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """When messages are stamped, logged and published, of triples in a row, shapes (n,) [ns]."""
+    stamp, log, publish = np.array(times, dtype=np.int64).reshape(-1, 3).T
+    return stamp, log, publish
 
 
 @dataclass(frozen=True)

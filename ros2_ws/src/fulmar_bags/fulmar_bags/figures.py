@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_bags.contents import Bag, Topic, json_object, span_ns
+from fulmar_bags.contents import Bag, span_ns
 from fulmar_bags.decode import messages, stamps_ns
+from fulmar_bags.gathered import Topic, json_object
 from fulmar_bags.stored_bytes import lengths_of
 from fulmar_core.config.errors import ConfigError
 from fulmar_core.config.paths import config_path

@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from fulmar_bags.bag_reading import AS_IT_IS, BagReading
-from fulmar_bags.contents import Bag, json_object, open_bag
+from fulmar_bags.contents import Bag, open_bag
 from fulmar_bags.decode import NS, Odometries, Vectors, odometries
 from fulmar_bags.figures import controller_of
+from fulmar_bags.gathered import json_object
 from fulmar_bags.other_readings import NO_INERTIAS, NO_SERIES, Inertias, Series, gyroscope_s, inertias, series
 from fulmar_bags.wire_reader import Received, WireReader
 from fulmar_bags.writer import RUN_RECORD

@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 
 from fulmar_bags.column_store import ColumnStore
-from fulmar_bags.contents import Bag, Topic
+from fulmar_bags.contents import Bag
 from fulmar_bags.decode import has_header, stamp_of, timed_messages
+from fulmar_bags.gathered import Topic
 from fulmar_core.config.errors import BagError
 
 MOST_ENTRIES = 64  # of one array in columns of their own; what is longer stays together

@@ -9,10 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_bags.bag_reading import types_of
-from fulmar_bags.contents import Bag, Topic
+from fulmar_bags.bag_reading import TWIST, types_of
+from fulmar_bags.contents import Bag
 from fulmar_bags.decode import (
-    TWIST,
     Odometries,
     Vectors,
     joint_vectors,
@@ -21,6 +20,7 @@ from fulmar_bags.decode import (
     stamp_of,
     twist_vectors,
 )
+from fulmar_bags.gathered import Topic
 from fulmar_bags.message_reader import goal_of, obstacles_of, thing_of
 from fulmar_core.robots.topics import GOAL_WIRES, OBSTACLES, VELOCITY_COMMAND, Wire, goal_wires
 from fulmar_core.tasks import Task

@@ -15,8 +15,9 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rosgraph_msgs.msg import Clock
 
-from fulmar_bags.contents import Bag, Topic
+from fulmar_bags.contents import Bag
 from fulmar_bags.decode import stamps_ns
+from fulmar_bags.gathered import Topic
 from fulmar_core.config.errors import BagError, ConfigError, UnknownNameError
 from fulmar_core.robots.topics import CLOCK, ODOMETRY, WIRES
 from fulmar_ros.convert import stamp_of

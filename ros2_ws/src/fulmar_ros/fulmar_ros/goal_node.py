@@ -17,7 +17,7 @@ from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 
-from fulmar_bags.contents import json_object
+from fulmar_bags.gathered import json_object
 from fulmar_bags.message_reader import measurement_of, stamp_ns
 from fulmar_core.config.errors import DONE, FAILED
 from fulmar_core.config.paths import config_names

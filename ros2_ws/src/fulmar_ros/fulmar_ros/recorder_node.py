@@ -13,7 +13,8 @@ from pathlib import Path
 from rclpy.node import Node
 from rclpy.subscription import Subscription
 
-from fulmar_bags.contents import json_object, recorded_faults
+from fulmar_bags.contents import recorded_faults
+from fulmar_bags.gathered import json_object
 from fulmar_bags.interrupted_bag import interrupted_bag
 from fulmar_bags.mcap_records import custom_text
 from fulmar_bags.per_goal import BagPerGoal

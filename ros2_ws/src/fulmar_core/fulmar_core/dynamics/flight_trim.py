@@ -158,8 +158,7 @@ def flying_at(robot: Robot, pose: np.ndarray) -> SpatialState:
     if max(abs(float(roll)), abs(float(pitch))) > NUDGE:
         upset = product(written.quat, conjugate(level))
     quat, velocity = product(upset, level), turn(upset, (zero + robot.wings.speed, zero, zero))
-    rest = written.columns()
-    return SpatialState(*rest[:3], *quat, *velocity, *rest[10:]).mapped(np.asarray)
+    return SpatialState(*written.position, *quat, *velocity, *written.rate).mapped(np.asarray)
 
 
 class _Problem:

@@ -15,9 +15,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from fulmar_bags.contents import Bag, Topic
+from fulmar_bags.bag_reading import TWIST
+from fulmar_bags.contents import Bag
 from fulmar_bags.decode import (
-    TWIST,
     Odometries,
     Vectors,
     joint_vectors,
@@ -27,6 +27,7 @@ from fulmar_bags.decode import (
     twist_vectors,
 )
 from fulmar_bags.figures import describe
+from fulmar_bags.gathered import Topic
 from fulmar_core.robots.topics import SENSOR_WIRES
 from fulmar_evaluation.report.page import Part, Plot, cells, html_page, table
 from fulmar_evaluation.report.space_plot import SIDES

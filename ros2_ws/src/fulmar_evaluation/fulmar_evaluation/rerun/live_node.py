@@ -19,8 +19,9 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, String
 from visualization_msgs.msg import MarkerArray
 
-from fulmar_bags.contents import Bag, json_object
+from fulmar_bags.contents import Bag
 from fulmar_bags.control_steps import ControlSteps
+from fulmar_bags.gathered import json_object
 from fulmar_bags.message_reader import stamp_ns
 from fulmar_bags.wire_reader import ABSENT, Received
 from fulmar_bringup.domains import own_domain

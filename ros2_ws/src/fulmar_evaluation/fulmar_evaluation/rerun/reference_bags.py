@@ -10,9 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from fulmar_bags.comparison import Field, first_difference
-from fulmar_bags.contents import Bag, Topic, open_bag
+from fulmar_bags.contents import Bag, open_bag
 from fulmar_bags.control_steps import control_steps_of
 from fulmar_bags.decode import stamps_ns
+from fulmar_bags.gathered import Topic
 from fulmar_bringup.domains import own_domain
 from fulmar_core.config.errors import RunFailed
 from fulmar_core.robots.robot_file import load_robot
