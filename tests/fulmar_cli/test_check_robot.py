@@ -214,7 +214,7 @@ def test_valves_that_no_law_in_space_allocates_are_a_warning_and_refused_before_
     own = path.read_text(encoding="utf-8").replace("name: spacecraft_16", "name: proportional")
     (tmp_path / "robots" / "proportional.yaml").write_text(own, encoding="utf-8")
     monkeypatch.setenv(OWN_FOLDERS, str(tmp_path))
-    code, _, err = fulmar("run", "proportional", "--controller", "lqr", "--goal", "1,0,0")
+    code, _, err = fulmar("run", "proportional", "--controller", "lqr", "--goal", "1,0,0,0,0,0")
     assert code == 2
     assert "no classical law is for 'proportional': valves that open by degrees" in err
 

@@ -96,7 +96,7 @@ def broken_configs(tmp_path, monkeypatch):
         ),
         ([*RUN, "--backend", "hardware", "--hardware", "turtlebot2"], "is the hardware of 'turtlebot2'"),
         ([*RUN, "--goal", "nan,0,0"], "--goal = 'nan,0,0': 'nan' is no finite number. Give x,y or x,y,deg [m, deg]"),
-        ([*RUN, "--goal", "1"], "--goal = '1' has 1 number; 'floating_platform' moves in the plane: 2 (x,y) or"),
+        ([*RUN, "--goal", "1"], "--goal = '1' has 1 number; 'floating_platform' moves in two dimensions: 2 (x,y) or"),
         (["run", "jetbot", "--goal", "1,2,90", "--controller", "policy"], "Say --task go_to_position or --goal x,y"),
         ([*RUN, "--start", "a,b,c"], "--start = 'a,b,c': 'a' is no finite number"),
         ([*RUN, "--area=2,-2,0,1"], "--area = '2,-2,0,1' must be x_min,x_max,y_min,y_max"),

@@ -316,7 +316,8 @@ def test_a_service_is_tried_as_its_user_in_a_folder_of_that_user():
 def test_a_dry_run_of_a_system_finds_what_a_start_would_miss_and_starts_nothing(fulmar, own):
     code, printed, messages = fulmar("up", "mujoco_lqr", "--service", "--dry-run")
     assert (code, printed) == (DONE, ""), messages
-    assert "floating_platform: go_to_pose, lqr at " in messages
+    assert "robot floating_platform; task go_to_pose" in messages
+    assert "controller lqr at " in messages
     chosen = ("--robot", "turtlebot2", "--task", "go_to_position", "--controller", "own_missing:Steer")
     code, _, messages = fulmar("up", "mujoco_classical", "--dry-run", *chosen)
     assert code == BAD_USAGE

@@ -22,16 +22,19 @@ NO_STOP = "it cannot stop at a place. Say --height H [m] or --velocity V [m/s]"
 NONE = "is no finite number"
 WRONG = [
     # Of the wrong length.
-    ((*PLATFORM, "--goal", "1"), f"has 1 number; 'floating_platform' moves in the plane: {PLANE}"),
-    ((*PLATFORM, "--goal", "1,2,3,4"), f"has 4 numbers; 'floating_platform' moves in the plane: {PLANE}"),
+    ((*PLATFORM, "--goal", "1"), f"has 1 number; 'floating_platform' moves in two dimensions: {PLANE}"),
+    (
+        (*PLATFORM, "--goal", "1,2,3,4"),
+        f"has 4 numbers; 'floating_platform' moves in two dimensions: {PLANE}",
+    ),
     (
         (*PLATFORM, "--goal", "1,0,-0.5,0,30,90"),
-        f"has 6 numbers; 'floating_platform' moves in the plane: {PLANE}",
+        f"has 6 numbers; 'floating_platform' moves in two dimensions: {PLANE}",
     ),
-    ((*CAR, "--goal", "1,2,3,4,5"), f"has 5 numbers; 'leatherback' moves in the plane: {PLANE}"),
+    ((*CAR, "--goal", "1,2,3,4,5"), f"has 5 numbers; 'leatherback' moves in two dimensions: {PLANE}"),
     (
         (*PLATFORM, "--start", "1,2,3,4"),
-        "--start = '1,2,3,4' has 4 numbers; 'floating_platform' moves in the plane",
+        "--start = '1,2,3,4' has 4 numbers; 'floating_platform' moves in two dimensions",
     ),
     ((*CRAFT, "--goal", "1,2"), f"has 2 numbers; 'spacecraft_16' moves in space: {SPACE}"),
     ((*CRAFT, "--goal", "1,2,3,4"), f"has 4 numbers; 'spacecraft_16' moves in space: {SPACE}"),
@@ -116,11 +119,11 @@ WRONG = [
     ),
     ((*PLATFORM, "--velocity", "0.1,0,0", "--task", "go_to_pose"), "task 'go_to_pose' has no velocities"),
     # Heights.
-    ((*PLATFORM, "--height", "2"), "--height is not for robots that are pushed in the plane"),
+    ((*PLATFORM, "--height", "2"), "--height is not for robots that are pushed over a floor or water"),
     ((*CRAFT, "--height", "2"), "--height is not for bodies that are pushed in space"),
     ((*NAVION, "--height", "1"), "starts at 0.75 m, where the hull of 'navion' touches the ground"),
     ((*NAVION, "--height", "-5"), "'--height'"),
-    ((*NAVION, "--height", "20000"), "has no trim at 53.64 m/s and 20000 m"),
+    ((*NAVION, "--height", "20000"), "--height = 20000 m is too high: the drawn goal"),
     ((*SHIP, "--height", "5", "--task", "fly_a"), "task 'fly_a' has no height to choose"),
     # Two at once.
     (

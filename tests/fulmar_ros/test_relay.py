@@ -58,7 +58,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     return made
 
 
-def info(number: int = 1, sent_ns: int = 7, received_s: float = 100.0) -> dict[str, int]:
+def info(number: int = 1, sent_ns: int = 100_000_000_007, received_s: float = 100.0) -> dict[str, int]:
     return {
         "source_timestamp": sent_ns,
         "publication_sequence_number": number,
@@ -139,6 +139,7 @@ def test_a_press_that_another_node_alone_received_counts_at_once_and_a_release_n
         ("one of many", info(number=FIRST + 1)),
         ("without a source time", info(sent_ns=0)),
         ("held back by this computer", info(received_s=98.0)),
+        ("kept by its publisher for those to come", info(sent_ns=98_000_000_000)),
     ],
 )
 def test_other_messages_are_not_passed_on(wired, what, details):
@@ -160,3 +161,13 @@ def test_what_is_no_message_of_a_wire_is_ignored(wired, label):
         message.layout.dim[0].label = label
     wired.node.receive(message)
     assert wired.after(2.0 * HOLD_S) == []
+
+
+def test_a_press_that_came_by_way_of_others_is_taken_and_not_passed_on_once_more(wired):
+    taken: list[bool] = []
+    both = Relay(wired.node).relaying(ESTOP, lambda message, _info: taken.append(message.data))
+    wired.listener.receiver(Bool, ESTOP, both)
+    wired.relay.send(ESTOP, Bool(data=True), info(2))
+    wired.node.deliver()
+    assert taken == [True]
+    assert not wired.node.passed_on

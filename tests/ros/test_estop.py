@@ -194,7 +194,8 @@ def test_a_press_that_only_another_node_received_stops_the_robot(
     until(lambda: drive(neighbour) and neighbour.node.count_subscribers(f"{NAMESPACE}/{RELAY.name}") > 0)
     time.sleep(0.3)
     until(lambda: drive(neighbour))
-    info = {"source_timestamp": 7, "publication_sequence_number": 1, "received_timestamp": time.time_ns()}
+    now_ns = time.time_ns()
+    info = {"source_timestamp": now_ns, "publication_sequence_number": 1, "received_timestamp": now_ns}
     relay.send(ESTOP, Bool(data=True), info)
     closed_in_time_and_for_good(neighbour)
     assert "pressed" in neighbour.said["plant"][0]

@@ -336,7 +336,8 @@ def test_a_goal_that_only_another_node_received_is_followed(
 ) -> None:
     relay, goal = Relay(neighbour.node), PoseStamped()
     goal.header.frame_id, goal.pose.position.x, goal.pose.orientation.w = "odom", 2.0, 1.0
-    info = {"source_timestamp": 7, "publication_sequence_number": 1, "received_timestamp": time.time_ns()}
+    now_ns = time.time_ns()
+    info = {"source_timestamp": now_ns, "publication_sequence_number": 1, "received_timestamp": now_ns}
     until(lambda: neighbour.node.count_subscribers(f"{NAMESPACE}/{RELAY.name}") > 0)
     time.sleep(0.3)
     relay.send(GOAL_POSE, goal, info)

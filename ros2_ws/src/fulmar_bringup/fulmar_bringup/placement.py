@@ -71,6 +71,8 @@ def placed(plan: RunPlan, file: GoalFile | None, task: Task) -> tuple[Goal, Pose
             return mission, drawn
         if mission.obstacles.size or task.things:
             break
+    if plan.height:
+        raise ConfigError(f"--height = {plan.height:g} m is too high: {problem}")
     raise ConfigError(f"{problem} Give --start and --goal, another --seed, or a larger area.")
 
 

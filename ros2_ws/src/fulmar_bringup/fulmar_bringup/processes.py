@@ -28,7 +28,7 @@ KILL_S = 2.0  # for a process to be gone after SIGKILL [s]
 GLUE = "fulmar_ros."  # package whose modules have a `main` that runs a node
 YIELDING = "fulmar_ros.yielding_start"
 OWN = "fulmar_core.config.own_module"  # finds modules of users
-PACKAGES = ("fulmar_", "sim_nodes.", "policy_server.", "hardware_drivers.", "tests.")  # of our nodes
+PACKAGES = (GLUE, "sim_nodes.", "policy_server.", "hardware_drivers.", "tests.")  # of our nodes
 LAST_WORDS_S = 1.0  # for what a child that ended has left in the pipe; a grandchild may keep it open
 
 

@@ -95,11 +95,11 @@ class SystemEvents:
             self._emit("goal_refused", time_s=time_s, reason=refused[0])
         self._refused = refused
         goals, done = values.get("goals_received", "0"), int(values.get("goals_done", "0"))
-        if goals != self._goals:
+        stamp = values.get("goal_stamp_ns", "0")
+        # One beyond the geofence is not followed yet.
+        if goals != self._goals and not (refused[0] and refused[1] == stamp):
             self._goals, self._goal_s, self._done, self._inside_s = goals, time_s, 0, None
-            stamp = values.get("goal_stamp_ns", "0")
-            if not refused[0] or refused[1] != stamp:  # one beyond the geofence came, and is not followed
-                self._emit("goal", time_s=time_s, stamp_ns=int(stamp))
+            self._emit("goal", time_s=time_s, stamp_ns=int(stamp))
         if done > self._done:
             self._done = done
             self._emit("target", time_s=time_s, done=done)

@@ -135,7 +135,7 @@ class ControllerWires:
         made = node.create_subscription(Odometry, ODOMETRY.name, on_odometry, odometry_qos, raw=True)
         self._follow(ODOMETRY, made, lockstep=lockstep)
         self._operated(Bool, ESTOP, self._relay.relaying(ESTOP, partial(self._see_estop, on_estop)))
-        self._every(String, ESTOP_RELEASED, on_estop_released)
+        self._every(String, ESTOP_RELEASED, partial(self._see_release, on_estop_released))
         self._every(String, SWAP, on_swap)
         for goal in goal_wires(task.goal_topic):
             self._operated(TYPES[goal.name], goal, on_goal)
@@ -160,6 +160,10 @@ class ControllerWires:
         if message.data:
             self.relayed.forget()
         on_estop(message)
+
+    def _see_release(self, on_released: Callable[[String], None], message: String) -> None:
+        self.relayed.forget()  # what came while the e-stop was pressed is refused, whichever way it comes
+        on_released(message)
 
     def _operated(self, kind: type, wire: Wire, receive: Receive) -> None:
         """Subscribe a wire of an operator, also by way of those who received it first."""

@@ -88,7 +88,7 @@ def subscribe_every(
         if "latched" not in kinds and _is_offered_latched(node, topic or wire.name):
             add_latched()
 
-    on_demand = wire.delivery == "latched" and wire.source == "operator"
+    on_demand = wire.delivery == "latched" and wire.source == "operator" and wire not in AT_ONCE
     events = SubscriptionEventCallbacks(
         incompatible_qos=add_best_effort, matched=on_publisher if on_demand else None
     )

@@ -21,9 +21,10 @@ from fulmar_ros.operator_subscription import Once, destroy_all, subscribe_every
 from fulmar_ros.qos import publisher_qos
 
 PASSED_ON = frozenset((*GOAL_WIRES.values(), GOAL_POSES, OBSTACLES, ESTOP))
+GOALS = frozenset(wire.name for wire in (*GOAL_WIRES.values(), GOAL_POSES))  # of which the newest counts
 FIRST = 100  # messages of a publisher that are passed on; by then every node has found it
 FRESH_NS = (
-    1_000_000_000  # what this computer held back for longer is not passed on: an e-stop may have come since
+    1_000_000_000  # what was sent or received longer ago is not passed on: an e-stop may have come since
 )
 DIGITS = 30  # of a number in a label, at most
 HOLD_S = 0.3  # for a message to come by itself; a newer one on its topic takes its place
@@ -50,7 +51,8 @@ class Relay:
     def send(self, wire: Wire, message: Any, info: dict[str, int]) -> None:
         """Pass a message on, if it is one of the first of its publisher; of an e-stop only what presses it."""
         number, sent_ns = info["publication_sequence_number"], info["source_timestamp"]
-        late = time.time_ns() - info["received_timestamp"] > FRESH_NS
+        # By its sender's clock, too: a latched message may be old when a node begins to listen.
+        late = time.time_ns() - min(info["received_timestamp"], sent_ns) > FRESH_NS
         if number > FIRST or not sent_ns or late:
             return
         data = message if isinstance(message, bytes) else serialize_message(message)
@@ -83,7 +85,8 @@ class RelayedInputs:
         self._inputs[wire.name] = kind, once, wire is not ESTOP
 
         def pass_on(message: Any, info: dict[str, int]) -> None:
-            self._drop(wire.name)  # what others received before is older than this
+            same = GOALS if wire.name in GOALS else {wire.name}
+            self._held = [each for each in self._held if each[1] not in same]  # they are older than this
             once.pass_on(message, info)
 
         return pass_on
@@ -103,16 +106,13 @@ class RelayedInputs:
         """Destroy the subscriptions."""
         destroy_all(node, [self._subscriptions])
 
-    def _drop(self, topic: str) -> None:
-        if self._held:
-            self._held = [each for each in self._held if each[1] != topic]
-
     def _on_relayed(self, relayed: UInt8MultiArray) -> None:
         topic, sent_ns, number = _read_label(relayed)
         if topic not in self._inputs:
             return
         kind, once, holds = self._inputs[topic]
-        info = {"source_timestamp": sent_ns, "publication_sequence_number": number}
+        # Without a time of its own, so that it is not passed on once more.
+        info = {"source_timestamp": sent_ns, "publication_sequence_number": number, "received_timestamp": 0}
         if once.knows(info):
             return
         try:

@@ -86,7 +86,9 @@ class _Refusal(MetaPathFinder):
             fault = ros_fault(os.environ)
             if fault and PathFinder.find_spec(RCLPY):  # that it is missing is said elsewhere
                 raise _refusal(fault)
-            sys.meta_path.remove(self)
+            sys.meta_path = [
+                each for each in sys.meta_path if each is not self
+            ]  # Python goes through the old one
 
 
 def _refusal(fault: Fault) -> ConfigError:

@@ -69,7 +69,7 @@ class ReadingWriter:
         try:
             self._layout = ReadingLayout(self._message, self._paths, values)
         except ValueError:
-            self._has_layout = False
+            self._layout, self._has_layout = None, False
             return self._message
         return self._layout.write(values, time_ns)
 

@@ -28,7 +28,10 @@ def try_once(service: Service, variables: Mapping[str, str], *, as_user: bool) -
     Raises:
         ConfigError: It does not start, with what it says: at boot nobody would read that.
     """
-    about = pwd.getpwnam(service.user) if as_user else pwd.getpwuid(os.geteuid())
+    try:
+        about = pwd.getpwnam(service.user) if as_user else pwd.getpwuid(os.geteuid())
+    except KeyError:
+        raise ConfigError(f"the user id {os.geteuid()} has no name here. Add one to /etc/passwd.") from None
     becoming: dict[str, Any] = {}
     if as_user:
         becoming = {

@@ -101,7 +101,7 @@ def run(
     asked = RunPlan(
         robot, task or "", controller or "", backend, control_hz or 0.0, name=name or "", policy=str(policy or ""),
         hardware=hardware or "", emulated=emulate, arm=arm, goal=read_goal(goal, robot=robot), goals=goals or "",
-        velocity=read_numbers(velocity, "--velocity") or (), height=height or 0.0,
+        velocity=read_numbers(velocity, "--velocity", text.VELOCITY) or (), height=height or 0.0,
         start=read_pose(start, "--start", robot) or (), duration_s=duration or 0.0, lockstep=lockstep, rate=rate,
         scenario=scenario, seed=seed, command=cli.invoked_command(), copies=copies, mocap_hz=mocap_hz,
         record=str(record or ""), recording_mode=recording or "",

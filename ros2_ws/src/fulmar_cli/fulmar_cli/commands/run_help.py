@@ -18,9 +18,9 @@ START_HELP = (
     "Where to begin [m, deg], in space x,y,z or x,y,z,roll,pitch,yaw and of satellites roll,pitch,yaw; by default the "
     "seed draws it."
 )
+VELOCITY = "ahead,left,turning [m/s, deg/s]; in space ahead,left,up,roll,pitch,yaw; of aircraft the airspeed"
 VELOCITY_HELP = (
-    "Velocity to keep: ahead,left,turning [m/s, deg/s]; in space ahead,left,up,roll,pitch,yaw; of aircraft the "
-    "airspeed. The task is then track_velocities, track_velocities_3d, fly_airspeed."
+    f"Velocity to keep: {VELOCITY}. The task is then track_velocities, track_velocities_3d, fly_airspeed."
 )
 HEIGHT_HELP = (
     "Height above the ground that an aircraft holds; with fly_airspeed or fly_attitude it begins there [m]."

@@ -20,7 +20,10 @@ from fulmar_core.config.errors import DONE, FAILED
 SYSTEM_HELP = (
     "A name from `fulmar list systems`; mujoco_policy by default, or what the robot of --robot usually does."
 )
-START_HELP = "Where a simulated robot begins, in space x,y,z[,roll,pitch,yaw]; the origin by default."
+START_HELP = (
+    "Where a simulated robot begins, in space x,y,z[,roll,pitch,yaw], of satellites roll,pitch,yaw; by default the "
+    "origin."
+)
 SERVICE_HELP = (
     "For a start without a person: the e-stop is pressed until `fulmar estop --reset`, and nothing is armed."
 )
