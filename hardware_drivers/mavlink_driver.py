@@ -148,6 +148,7 @@ class MavlinkDriver(DeviceDriver):
             commands.tell(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, float(kind), 1e6 / rate)
         if not self._settings.arm:
             return
+        self._await_heartbeat()
         self._demand(
             mavlink.MAV_CMD_DO_SET_MODE,
             float(mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED),
@@ -155,6 +156,12 @@ class MavlinkDriver(DeviceDriver):
             what="mode MANUAL",
             done=lambda: self._state.mode == MANUAL,
         )
+
+    def _await_heartbeat(self) -> None:
+        """Wait for a while until a heartbeat says what the autopilot is: nothing else may be set or armed."""
+        end_s = time.monotonic() + OBEYS_S
+        while not self._state.beats and time.monotonic() < end_s:
+            time.sleep(0.02)
 
     def _demand(
         self, number: int, first: float, second: float = 0.0, *, what: str, done: Callable[[], bool]
@@ -181,8 +188,8 @@ class MavlinkDriver(DeviceDriver):
             )
 
     def _release(self) -> None:
-        """Stop and disarm, where the boat may be armed; raises OSError."""
-        if self._settings.arm and self._commands is not None:
+        """Stop and disarm a boat that may be armed, and send nothing to a stranger; raises OSError."""
+        if self._settings.arm and self._commands is not None and not self._state.stranger:
             self._drive(0.0, 0.0)
             self._commands.tell(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 import pytest
 from pymavlink import mavutil
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -85,9 +87,15 @@ def test_an_autopilot_whose_modes_mean_something_else_is_a_refusal(state, autopi
 def test_a_copter_is_neither_set_to_manual_nor_armed(monkeypatch):
     monkeypatch.setattr(mavutil.mavlink, "MAV_TYPE_SURFACE_BOAT", mavlink.MAV_TYPE_QUADROTOR)
     with boat() as bench:
+        received, take = [], bench.device._take
+        bench.device._take = lambda message, now_s: (received.append(message), take(message, now_s))
         with pytest.raises(DeviceError, match="is no ArduPilot Rover or boat"), driven(bench):
             pass
+        time.sleep(0.2)  # for what was sent last
         assert not bench.device.armed
+    assert {message.get_type() for message in received} <= {"HEARTBEAT", "COMMAND_LONG"}
+    commands = {message.command for message in received if message.get_type() == "COMMAND_LONG"}
+    assert commands == {mavlink.MAV_CMD_SET_MESSAGE_INTERVAL}
 
 
 def test_without_heartbeats_the_mode_is_not_known(state):
