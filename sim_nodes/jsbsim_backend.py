@@ -91,7 +91,8 @@ class JsbsimBackend:
         self._gust: Gust | None = None
         self._time_s, self._lost = 0.0, False
         actuation = self._world.actuation
-        actuation.hold(self.craft.level(actuation.applied[:, 0])[:, None])
+        level = self.craft.level(actuation.applied[:, 0])[:, None]
+        actuation.hold(level * self._world.world.alive)
         self._begin(episode.start)
         self._truth = self._read()
         return self._sample(self._world.first_measurement(self._truth, seed=seed, number=number))
@@ -149,8 +150,11 @@ class JsbsimBackend:
         for axis, part in zip("pqr", flipped(state.rate), strict=True):
             model[f"ic/{axis}-rad_sec"] = float(part[0])
         self.craft.steer(model, self._world.actuation.applied[:, 0])
-        self._set_wind(self._mean_wind())
         model.run_ic()
+        self._set_wind(self._mean_wind())  # `run_ic` leaves calm air behind
+        model.suspend_integration()
+        model.run()
+        model.resume_integration()
 
     @property
     def _altitude(self) -> float:

@@ -16,6 +16,7 @@ from fulmar_core.safety.watchdog import Watchdog
 from fulmar_core.simulation.episode import draw_episode, draw_episodes
 from fulmar_core.simulation.simulation import BatchSimulation
 from fulmar_core.states.attitude import minus, turn_back
+from fulmar_core.states.gravity import GRAVITY
 from fulmar_core.states.spatial import SpatialState
 from fulmar_core.tasks import load_task
 from fulmar_core.tasks.goal import goal_in_float64
@@ -94,6 +95,14 @@ def test_every_simulator_flies_on_as_it_began(name):
     began = episode.start.to_rigid()
     np.testing.assert_allclose(sample.truth.velocity_in_world, began.velocity_in_world, rtol=0, atol=0.01)
     np.testing.assert_allclose(sample.truth.angular_velocity_in_body, 0.0, rtol=0, atol=2e-3)
+
+
+def test_jsbsim_begins_in_the_wind_that_blows():
+    backend, episode = BACKENDS["jsbsim"](ROBOT), draw_episode(ROBOT, TASK, WINDY, seed=1, number=2)
+    felt = backend.reset(episode, seed=1).readings["imu"].value.specific_force
+    backend.close()
+    # In level flight the air bears the craft, and no more.
+    np.testing.assert_allclose(felt, turn_back(episode.start.quat, (0.0, 0.0, GRAVITY)), rtol=0, atol=0.02)
 
 
 def test_worlds_of_a_batch_begin_in_trim_and_begin_so_again():

@@ -55,6 +55,15 @@ def flown(model, *, offset=(0.0, 0.0, 0.0), throttle=0.7, ticks=100, seed=1, sce
     return [backend.step(command) for _ in range(ticks)][-1]
 
 
+def test_a_dead_motor_does_not_begin_at_the_throttle_of_the_trim():
+    backend, episode = backend_of("L17"), level_start("L17")
+    episode.world.alive[3] = 0.0
+    backend.reset(episode, seed=1)
+    applied = backend._world.actuation.applied[:, 0]
+    assert applied[3] == 0.0
+    assert backend._model["fcs/throttle-cmd-norm[0]"] == 0.0
+
+
 @pytest.mark.parametrize("model", OWN)
 def test_a_start_is_the_episodes_own_whatever_the_models_axes(model):
     pose = SpatialState.target_at((30.0, -20.0, 50.0, 10.0, -5.0, 70.0))
