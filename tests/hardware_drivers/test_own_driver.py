@@ -303,7 +303,11 @@ def test_an_absent_device_is_no_mistake_of_configuration(folder):
         (PLATFORM, "kind: own:Board, odometry: gps", "'odometry' = 'gps' is not known"),
         (PLATFORM, "kind: own:Board, option: {}", "unknown key 'option'. Did you mean 'options'"),
         (PLATFORM, "kind: own:Board, options: [1]", "'options' must be a mapping"),
-        (PLATFORM, "kind: own:Board, options: {a: 2020-01-01}", "'a' = '2020-01-01' must be text, a number"),
+        (
+            PLATFORM,
+            "kind: own:Board, options: {a: 2020-01-01}",
+            "'a' = 2020-01-01 is a date: .*, or quote it",
+        ),
         (PLATFORM, "kind: own:Board, options: {a: {b: 1, b: 2}}", "key 'b' is written twice"),
     ],
 )

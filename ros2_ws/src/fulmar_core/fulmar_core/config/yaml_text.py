@@ -42,7 +42,7 @@ _UNCLEAR = (
     (re.compile(r"[-+]?[0-9.][0-9.]*_[0-9_.eE+-]*|0x[0-9a-fA-F]*_[0-9a-fA-F_]*"), "holds '_': leave it out"),
     (re.compile(r"[-+]?0[bBoO][0-9]+"), "is no decimal number: give one"),
     (re.compile("|".join(SWITCHES), re.IGNORECASE), "may be a word or a truth: write true or false"),
-    (re.compile(r"[0-9]{4}-[0-9]{1,2}-[0-9]{1,2}([Tt ].*)?"), "is a date"),
+    (re.compile(r"[0-9]{4}-[0-9]{1,2}-[0-9]{1,2}([Tt ].*)?"), "is a date: give a number"),
 )
 # What PyYAML's converters let slip where a value is not what its tag says, as in `!!bool maybe` or `!!timestamp x`.
 _STUMBLES = (ValueError, LookupError, AttributeError)
