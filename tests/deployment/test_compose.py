@@ -17,6 +17,7 @@ import yaml
 from fulmar_bringup.domain_status import NODES
 from fulmar_bringup.service.device_rules import device_groups, device_rules
 from fulmar_bringup.system_plan import system_plan
+from fulmar_cli.commands.status import TIMEOUT_S
 from fulmar_cli.main import app
 from hardware_drivers.hardware import load_hardware
 
@@ -106,7 +107,7 @@ def test_a_standing_service_is_restarted_and_its_health_is_checked(name, compose
     assert asked["name"] == runs["name"]
     assert asked["node"] == (runs["only"] or "plant")
     assert asked["node"] in NODES
-    assert asked["timeout"] < float(service["healthcheck"]["timeout"].removesuffix("s"))
+    assert (asked["timeout"] or TIMEOUT_S) < float(service["healthcheck"]["timeout"].removesuffix("s"))
 
 
 def test_training_ends_by_itself_without_a_network(compose):
