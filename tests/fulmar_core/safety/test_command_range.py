@@ -36,6 +36,12 @@ def test_a_few_steps_say_nothing(steps=LEAST_STEPS - 1):
     assert not seen(BASE, np.full((steps, 2), 9.0))
 
 
+def test_one_step_that_is_not_finite_hides_no_others():
+    actions = np.full((40, 2), 9.0)
+    actions[7, 1] = np.nan
+    assert "in 100 % of 39 steps" in seen(BASE, actions)
+
+
 def test_refused_actions_are_not_counted():
     assert not seen(BASE, np.full((40, 3), 9.0))
     assert not seen(BASE, np.full((40, 2), np.nan))

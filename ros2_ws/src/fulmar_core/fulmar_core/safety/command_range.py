@@ -22,9 +22,10 @@ class CommandRange:
         self._farthest, self._worst = 0.0, ""
 
     def see(self, actions: np.ndarray) -> None:
-        """Count actions, shape (n, m); those of another shape, or that are not finite, are refused elsewhere."""
-        if actions.ndim != 2 or actions.shape[1:] != self._low.shape or not np.isfinite(actions).all():
+        """Count actions, shape (n, m); those of another shape, and rows that are not finite, are refused elsewhere."""
+        if actions.ndim != 2 or actions.shape[1:] != self._low.shape:
             return
+        actions = actions[np.isfinite(actions).all(axis=1)]
         over = np.maximum(actions - self._high, self._low - actions) / self._actuators.scale
         self.steps += len(actions)
         self.beyond += int(np.count_nonzero((over > 0.0).any(axis=1)))
