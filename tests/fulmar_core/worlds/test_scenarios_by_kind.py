@@ -70,3 +70,20 @@ def test_every_scenario_that_is_shipped_acts_on_some_robot():
     robots = [load_robot(kind.usual_robot) for kind in KINDS.values()]
     for name in config_names("scenarios"):
         assert any(not without_effect(robot, load_scenario(name)) for robot in robots), name
+
+
+def test_a_broken_file_of_ones_own_does_not_hide_why_a_scenario_is_refused(tmp_path, monkeypatch):
+    folder = tmp_path / "scenarios"
+    folder.mkdir()
+    (folder / "broken.yaml").write_text("title: broken\npush: {forces: 1}\n")
+    monkeypatch.setenv("FULMAR_CONFIGS", str(tmp_path))
+    with pytest.raises(ConfigError, match="orbit_rate would have no effect") as caught:
+        check_scenario(load_robot("navion"), "low_orbit")
+    assert "broken" not in str(caught.value)
+
+
+def test_a_new_kind_of_robot_meets_what_acts_on_bodies_in_space(monkeypatch):
+    monkeypatch.delitem(ACTING, "aircraft")
+    new = load_robot("navion")
+    assert not without_effect(new, load_scenario("low_orbit"))
+    assert "air" in without_effect(new, load_scenario("light_turbulence"))

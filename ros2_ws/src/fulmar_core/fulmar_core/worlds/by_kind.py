@@ -63,7 +63,7 @@ def without_effect(robot: Robot, scenario: Scenario, *, estimated: bool = False)
         estimated: Whether an estimator reads its gyroscope.
     """
     acts = {
-        *ACTING[robot.kind.name], "body", "actuation",
+        *ACTING.get(robot.kind.name, ACTING["free_flyer"]), "body", "actuation",
         *(("gyroscope",) if estimated else ()),
         *(() if robot.kind.always_estimated else ("odometry",)),
         *(("bearing",) if robot.air_bearing else ()),
@@ -88,15 +88,19 @@ def check_scenario(robot: Robot, name: str, *, estimated: bool = False) -> None:
     lost = without_effect(robot, scenario, estimated=estimated)
     if not lost:
         return
-    fitting = [
-        other
-        for other in config_names("scenarios")
-        if not without_effect(robot, load_scenario(other), estimated=estimated)
-    ]
+    fitting = [other for other in config_names("scenarios") if _fits(robot, other, estimated=estimated)]
     raise ConfigError(
         f"scenario '{name}' ({scenario.title}) is not for '{robot.name}', one of the {robot.kind.plural}: "
         f"{', '.join(lost)} would have no effect. Scenarios that fit: {', '.join(fitting)}."
     )
+
+
+def _fits(robot: Robot, name: str, *, estimated: bool) -> bool:
+    """Whether a scenario acts on a robot; one whose file is broken does not."""
+    try:
+        return not without_effect(robot, load_scenario(name), estimated=estimated)
+    except ConfigError:
+        return False
 
 
 def _sticks(robot: Robot, scenario: Scenario) -> bool:
