@@ -198,7 +198,7 @@ def usual_controller(robot: Robot, task: Task, policy: str = "") -> str:
     if policy:
         return POLICY
     law = has_law(robot, task)
-    if robot.usual_controller and law:
+    if robot.usual_controller and (law or is_own(robot.usual_controller)):
         return robot.usual_controller
     if law and shipped_policy(robot.name, task.name) is None:
         return robot.kind.usual_law or CLASSICAL

@@ -67,3 +67,21 @@ def test_each_speed_that_was_tried_is_listed_with_whether_it_trims():
     texts = dict(found.findings.lines())
     assert texts["80.47 m/s, free air"].startswith("no trim: 'cessna_182' has no trim at 80.472 m/s")
     assert texts["67.06 m/s, free air"].startswith("trims: α -0.7")
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("lqrr", "'usual_controller': unknown controller 'lqrr'. Did you mean 'lqr'"),
+        ("mine:", "'usual_controller'"),
+    ],
+)
+def test_a_usual_controller_that_nobody_knows_is_a_problem(tmp_path, name, words):
+    path, _ = altered(tmp_path, "floating_platform", {"usual_controller": name})
+    (problem,) = check_robot(str(path)).problems
+    assert words in problem
+
+
+def test_a_usual_controller_of_ones_own_is_none(tmp_path):
+    path, _ = altered(tmp_path, "floating_platform", {"usual_controller": "mine:Controller"})
+    assert check_robot(str(path)).passed

@@ -9,11 +9,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from fulmar_core.config.errors import ImplausibleError
+from fulmar_core.config.errors import ConfigError, ImplausibleError
+from fulmar_core.config.own_class import check_class_path, is_own
 from fulmar_core.config.plausibility import logger as plausibility
 from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.robot_file import load_robot, load_robot_file
 from fulmar_evaluation.by_kind import CHECKS, Findings
+from policy_server.controllers import controller_entry
 
 UNKNOWN = dict.fromkeys(("actuators", "wrench", "zero_wrench_holdable", "controllable", "least_time"))
 
@@ -76,8 +78,21 @@ def check_robot(
         except ImplausibleError as error:
             return RobotCheck(path.stem, problems=(str(error),), warnings=tuple(warnings))
         findings = CHECKS[robot.kind.name](robot, speed=speed, altitude=altitude, height=height)
-        problems = tuple(findings.problems())
+        problems = (*findings.problems(), *_controller_problems(robot))
     return RobotCheck(robot.name, robot, findings, problems, tuple(warnings))
+
+
+def _controller_problems(robot: Robot) -> list[str]:
+    """That there is no controller of the name that the file gives as the usual one."""
+    name = robot.usual_controller
+    try:
+        if is_own(name):
+            check_class_path(name)
+        elif name:
+            controller_entry(name)
+    except ConfigError as error:
+        return [f"'usual_controller': {error}"]
+    return []
 
 
 @contextmanager
