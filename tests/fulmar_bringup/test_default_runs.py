@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from fulmar_bringup.completion import completed
@@ -104,3 +106,27 @@ def test_a_real_robot_takes_no_scenario():
     with pytest.raises(ConfigError, match="a real robot has its own surroundings"):
         checked(completed(RunPlan("turtlebot2", "", "", "hardware", **asked)))
     assert checked(completed(RunPlan("turtlebot2", "", "", "hardware", emulated=True, **asked)))
+
+
+def test_a_height_that_is_no_number_is_refused():
+    with pytest.raises(ConfigError, match="height = nan must be finite"):
+        planned("airship_v7", height=float("nan"))
+
+
+def test_a_controller_of_ones_own_may_read_the_gyroscope(tmp_path, monkeypatch):
+    file = tmp_path / "scenarios" / "blind.yaml"
+    file.parent.mkdir()
+    file.write_text("title: blind\nsensor_noise: true\nbody: nominal\nsensing: {gyroscope_dies_s: 5.0}\n")
+    own = "class Controller:\n    def reset(self): ...\n    def act(self, inputs): return inputs.previous\n"
+    (tmp_path / "reads_gyroscope.py").write_text(own)
+    monkeypatch.setenv("FULMAR_CONFIGS", str(tmp_path))
+    monkeypatch.syspath_prepend(str(tmp_path))
+    plan = RunPlan("spacecraft_16", "go_to_pose_3d", "reads_gyroscope:Controller", "mujoco", scenario="blind")
+    assert completed(plan).controller == plan.controller
+    with pytest.raises(ConfigError, match="gyroscope would have no effect"):
+        completed(replace(plan, controller="lqr"))
+
+
+def test_a_usual_controller_of_ones_own_is_taken_where_no_law_is():
+    robot = replace(load_robot("floating_platform"), usual_controller="mine:Controller")
+    assert usual_controller(robot, load_task("track_velocities")) == "mine:Controller"

@@ -32,6 +32,7 @@ from fulmar_bringup.system import (
 )
 from fulmar_bringup.task_choice import task_of
 from fulmar_core.config.errors import ConfigError, UnknownNameError
+from fulmar_core.config.own_class import is_own
 from fulmar_core.config.recording import MODES, Mode, Recording
 from fulmar_core.estimators.kinds import default_estimator, estimator_kind
 from fulmar_core.robots.robot import Robot
@@ -58,10 +59,11 @@ def completed(plan: RunPlan) -> RunPlan:
     if plan.mission is not None:
         return plan
     plan = replace(plan, task=task_of(plan))
-    robot, task = load_robot(plan.robot), _asked_task(plan)
+    robot = load_robot(plan.robot)
+    _check_asked(plan, robot)
+    task = _asked_task(plan)
     plan = replace(plan, controller=plan.controller or usual_controller(robot, task, plan.policy))
     check_names(plan.robot, task, plan.controller, plan.backend, plan.hardware or None)
-    _check_asked(plan, robot)
     policy = Path(plan.policy) if plan.policy else None
     if policy is None and controller_entry(plan.controller).runs_bundle:
         policy = shipped_policy(plan.robot, plan.task)
@@ -75,7 +77,8 @@ def completed(plan: RunPlan) -> RunPlan:
         adapter=adapter_path(plan.robot, plan.adapter),
         guards=_guards(plan, robot),
     )
-    check_scenario(robot, plan.scenario, estimated=bool(plan.guards.files))
+    # A controller of one's own may read the gyroscope too.
+    check_scenario(robot, plan.scenario, estimated=bool(plan.guards.files) or is_own(plan.controller))
     return _with_goal(_as_its_system(plan), robot, task)
 
 
