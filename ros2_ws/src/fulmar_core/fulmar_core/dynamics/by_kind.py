@@ -114,11 +114,11 @@ def actuation_of(
     changes: bool = False,
     world: World | None = None,
 ) -> ActuationState:
-    """The actuators of a robot in their safe state.
+    """The actuators of a robot where episodes begin.
 
     Args:
         robot: The robot.
-        safe: Its safe command in every world, shape (n, worlds).
+        safe: What they do then, as in `ActuationState`, shape (n, worlds).
         opens_late: As in `may_open_late`.
         latest_s: As in `longest_delay` [s].
         step_s: Least time between two commands [s].

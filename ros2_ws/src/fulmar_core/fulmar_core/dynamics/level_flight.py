@@ -15,7 +15,7 @@ from fulmar_core.states.gravity import GRAVITY
 from fulmar_core.states.spatial import SpatialState
 
 LOWEST = 0.1  # height above the ground that a trim is solved for at least, by the span [-]
-ROUNDS = 5  # of Newton's method; from free air each more than squares what is left
+ROUNDS = 5  # of Newton's method, which converges quadratically from free air
 NUDGE = 1e-6  # of its derivatives [rad, -]
 GUESS = 0.03, 0.4  # angle of attack [rad] and throttle that it begins at
 

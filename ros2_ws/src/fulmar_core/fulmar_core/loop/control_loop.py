@@ -36,8 +36,8 @@ class ControlLoop:
 
     Attributes:
         goal: Of all robots, leading shape (n,); None before there is one.
-        previous: Command of the step before, after every limit, shape (n, m); where no controller chose one, what
-            actuators do by themselves.
+        previous: Command of the step before, after every limit, shape (n, m); where no controller chose one, the safe
+            command, and from the next measurement on what actuators do by themselves.
         answered_ns: Stamp of the measurement that this was the answer to; -1 before the first [ns].
         estimate: Of the controller's actuator estimator at the newest step; None without one.
     """
@@ -140,7 +140,7 @@ class ControlLoop:
         """Ask the controller, and limit and gate its command, which is the previous one from then on.
 
         Raises:
-            Exception: Whatever the controller raises; the previous command is the safe one then.
+            Exception: Whatever the controller raises; then `previous` is as where no controller chose a command.
         """
         self.rest(inputs.stamp_ns)
         return self.take(inputs, self._controller.act(inputs))

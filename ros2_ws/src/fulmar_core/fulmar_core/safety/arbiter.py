@@ -94,5 +94,5 @@ def arbitrate(flags: Flags, now_ns: int) -> Decision:
 
 
 def asks_for_a_goal(reason: str) -> bool:
-    """Whether a reason not to act means that only a goal, or one that is nearer, is missing."""
+    """Whether a reason not to act means that a goal, obstacles or the place of a thing is missing, or a nearer goal."""
     return reason.endswith(" yet") or BEYOND_GEOFENCE in reason

@@ -46,11 +46,12 @@ class ActuationState(MutableState):
         parts: MovingParts | None = None,
         world: World | None = None,
     ) -> None:
-        """Begin in the safe state, or in another one.
+        """Begin where episodes begin.
 
         Args:
             actuators: Whose delay, slew and lag count; errors of on/off ones act on what they do, not on the command.
-            safe: What they do in every world, shape (n, worlds), of the floating type to compute in.
+            safe: What they do when episodes begin, such as the safe command or the trim, shape (n, worlds), of the
+                floating type to compute in.
             opens_late: Whether closed valves may open later than open ones close; saves the work where none does.
             delay_ticks: Physics ticks by which the latest command may act late, where another command may come
                 meanwhile; 0 otherwise, which costs less. Valves that open late need 0.
@@ -93,7 +94,7 @@ class ActuationState(MutableState):
 
         Args:
             which: Their numbers.
-            safe: What actuators do there, such as the safe command, shape (n, 1 or as many).
+            safe: What actuators do there when it begins, as in `__init__`, shape (n, 1 or as many).
         """
         for name in ("_before", "_wanted", "applied", "_line", *self.FROM_ZERO):
             values = array_namespace(safe).asarray(getattr(self, name), copy=True)
