@@ -160,6 +160,5 @@ def test_paths_of_results_are_never_folded(fulmar, tmp_path):
     code, out, _ = fulmar("export", "navion", "--to", "jsbsim", "--out", folder)
     assert code == 0
     assert [line.partition(":")[0] for line in out.splitlines()] == [
-        str(folder / "navion" / "navion.xml"),
-        str(folder / "still_planet.xml"),
+        str(folder / "aircraft" / "navion" / "navion.xml"),
     ]

@@ -47,7 +47,7 @@ GIVEN = {
     "benchmark latency": ("", ("ros",)),
     "benchmark rans3d": ("", ("sim",)),
     "benchmark roboran": ("", ("policy",)),
-    "benchmark throughput": ("--library torch", ("sim", "train")),
+    "benchmark throughput": ("--library torch", ("sim", "jsbsim", "train")),
     "benchmark training": ("", ("train",)),
     "benchmark estimator": ("", ("hardware",)),
     "benchmark hardware": ("", ("policy", "sim", "hardware")),

@@ -22,7 +22,7 @@ GOAL = (1.0, 0.0, -0.5, 0.0, 0.0, 90.0)
 def test_a_rerun_takes_a_pose_of_the_robot_s_space_and_no_other():
     (goal,) = control_steps_of(open_bag(BAG), goal=(1.0, 2.0, 90.0)).goals
     assert goal.value[0] == pytest.approx([1.0, 2.0, 0.0, 0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)])
-    with pytest.raises(ConfigError, match=r"6 numbers; .* moves in the plane"):
+    with pytest.raises(ConfigError, match=r"6 numbers; .* moves in two dimensions"):
         control_steps_of(open_bag(BAG), goal=GOAL)
 
 

@@ -14,6 +14,7 @@ from rosgraph_msgs.msg import Clock
 from fulmar_bags.contents import open_bag
 from fulmar_bags.decode import stamps_ns
 from fulmar_bags.message_reader import stamp_ns
+from fulmar_bags.stored_bytes import picked
 from fulmar_bringup.player import play, schedule
 from fulmar_core.config.errors import ConfigError
 from fulmar_core.robots.topics import CLOCK, ODOMETRY
@@ -130,7 +131,8 @@ def test_another_controller_behind_the_node_is_found_out(ros_domain: RosDomain, 
 def test_a_stamp_that_comes_twice_does_not_change_the_pace(tmp_path: Path):
     bag = open_bag(POLICY)
     odometry = bag.of(ODOMETRY)
-    odometry.data.insert(11, odometry.data[10])
+    numbers = sorted((*range(len(odometry)), 10))
+    odometry.data = picked(odometry.data, numbers)
     odometry.log_ns.insert(11, odometry.log_ns[10] + 1)
     odometry.publish_ns.insert(11, odometry.publish_ns[10])
     odometry.sequence.insert(11, 0)

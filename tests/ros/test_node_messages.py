@@ -61,8 +61,8 @@ def test_markers_are_drawn_whatever_they_are_made_of(markers: MarkersNode, messa
     takers = {
         DiagnosticArray: markers._on_status,
         JointState: markers._on_applied,
-        PoseStamped: markers._on_goal,
-        MarkerArray: markers._on_obstacles,
+        PoseStamped: lambda message: markers._on_goal(message, {}),
+        MarkerArray: lambda message: markers._on_obstacles(message, {}),
     }
     for message in messages:
         with np.errstate(all="ignore"):
@@ -74,7 +74,7 @@ def test_markers_are_drawn_whatever_they_are_made_of(markers: MarkersNode, messa
 def test_a_status_of_another_program_ends_no_markers(markers: MarkersNode, done: str) -> None:
     goal = PoseStamped()
     goal.header.frame_id, goal.pose.orientation.w = "odom", 1.0
-    markers._on_goal(goal)
+    markers._on_goal(goal, {})
     markers._scene.give_status({"goals_done": done, "goal_stamp_ns": done})
     markers._draw()
 

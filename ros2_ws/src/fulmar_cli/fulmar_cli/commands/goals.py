@@ -91,6 +91,8 @@ def goals(
     from fulmar_core.safety.geofence import NO_AREA, check_area_of
     from fulmar_core.tasks.goal_files import load_goals
     from fulmar_core.tasks.goal_sequence import goal_sequence
+    from fulmar_ros.goal_node import GoalNode
+    from fulmar_ros.runtime import run_node
 
     the_robot = load_robot(robot)
     inside = read_area(area) or NO_AREA
@@ -109,9 +111,6 @@ def goals(
         control_hz=control_hz,
         give_up_s=0.0 if wait else GIVE_UP_S,
     )
-    from fulmar_ros.goal_node import GoalNode
-    from fulmar_ros.runtime import run_node
-
     _, _, _, *arguments = command_line(spec)  # python -m module
     raise typer.Exit(run_node(lambda request_exit: GoalNode(request_exit, goals=single), arguments))
 

@@ -33,7 +33,6 @@ from fulmar_core.config.own_class import is_own
 from fulmar_core.config.written_text import NAME, USER, check_lines, check_written
 from fulmar_core.robots.robot_file import load_robot
 from hardware_drivers.hardware import load_hardware
-from hardware_drivers.presence import check_presence
 
 
 @dataclass(frozen=True)
@@ -208,6 +207,8 @@ def _names_of_root(root: Path) -> set[str]:
 
 def _warn_of_absence(hardware: str) -> None:
     try:
+        from hardware_drivers.presence import check_presence  # of an extra
+
         check_presence(load_hardware(hardware).driver)
     except FulmarError as error:
         warn([f"{error} The service is installed all the same, and tries again when it starts."])
