@@ -77,7 +77,7 @@ class AircraftCheck:
         cruise = next((each for each in self.tried if each.speed == frame.speed), self.tried[0])
         if cruise.trim is None:
             yield cruise.missing
-        elif abs(math.degrees(cruise.trim.alpha)) > frame.stall_deg:
+        elif cruise.speed == frame.speed and abs(math.degrees(cruise.trim.alpha)) > frame.stall_deg:
             yield (
                 f"'airframe.speed' = {frame.speed:g} m/s asks for an angle of attack of "
                 f"{math.degrees(cruise.trim.alpha):.1f}°, beyond 'airframe.stall_deg' = {frame.stall_deg:g}°."

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import cycle
 from typing import Any
 
 import numpy as np
@@ -71,7 +72,7 @@ def flight_rows(runs: Sequence[View]) -> int:
 def draw_flight_motion(rows: Sequence[Axes] | np.ndarray, runs: Sequence[View]) -> None:
     """Speed through the air and over the ground, how it lies in the air, and how it turns, below one another."""
     speed, attitude, rates = rows
-    for stroke, (run, result) in zip(STROKES, evaluated(runs), strict=False):
+    for stroke, (run, result) in zip(cycle(STROKES), evaluated(runs), strict=False):
         motion, air, before = (
             run.record.motion,
             run.record.air_data,

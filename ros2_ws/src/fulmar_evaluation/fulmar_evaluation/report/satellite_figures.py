@@ -143,7 +143,9 @@ def _estimate(run: View) -> str:
     if not len(found):
         return "–"
     pairs = zip(found.tensor[-1, : len(MOMENTS) // 2], SIGMAS * found.std[-1, :3], strict=True)
-    return ", ".join(f"{value:.3f} ± {spread:.3f}" for value, spread in pairs)
+    return ", ".join(
+        f"{value:.3f} ± {spread:.3f}" if np.isfinite(spread) else f"{value:.3f}" for value, spread in pairs
+    )
 
 
 def _one(height: float) -> tuple[Figure, Axes]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import cycle
 from typing import Any, cast
 
 import numpy as np
@@ -40,7 +41,7 @@ ROOM = 0.3  # of a limit: what stays below it is drawn without the limit, which 
 def draw_attitude(rows: Sequence[Axes] | np.ndarray, runs: Sequence[View]) -> None:
     """Error of the attitude in the first row, turn rates in the second, both about the body's axes."""
     errors, rates = rows
-    for stroke, (run, result) in zip(STROKES, evaluated(runs), strict=False):
+    for stroke, (run, result) in zip(cycle(STROKES), evaluated(runs), strict=False):
         turning = np.rad2deg(run.record.motion.angular_velocity_in_body[result.samples])
         for axes, values in ((errors, attitude_errors_deg(run, result)), (rates, turning)):
             _by_axis(axes, result.time_s, values, stroke, run.label if len(runs) > 1 else "")
@@ -116,7 +117,7 @@ def wheels_of(result: RunResult) -> ReactionWheels:
 def draw_wheels(axes: Axes, runs: Sequence[View]) -> None:
     """Speeds of the wheels on the left, their momentum on the right, and the limit of both."""
     fastest = 0.0
-    for stroke, (run, _) in zip(STROKES, evaluated(runs), strict=False):
+    for stroke, (run, _) in zip(cycle(STROKES), evaluated(runs), strict=False):
         wheels, begin_s = run.record.wheels, float(run.record.motion.stamp_s[0])
         for number, name in enumerate(wheels.names):
             label = name.replace("_", " ") if len(runs) == 1 else f"{run.label}, {name.replace('_', ' ')}"
@@ -153,6 +154,8 @@ def draw_torques(rows: Sequence[Axes] | np.ndarray, run: View) -> None:
         torques = 1e3 * result.run.shares[0] * actuators.scale
         groups = [range(actuators.count), range(actuators.count, len(actuators.names))]
         for axes, group, what in zip(rows, groups, ("motor", "unloading"), strict=False):
+            if not len(group):
+                continue
             for order, number in enumerate(group):
                 name = actuators.names[number].replace("_", " ")
                 axes.plot(result.time_s, torques[:, number], color=PARTS[order], linewidth=1.0, label=name)
@@ -176,7 +179,7 @@ def torque_rows(runs: Sequence[View]) -> int:
 
 def draw_inertia(axes: Axes, runs: Sequence[View]) -> None:
     """Estimated moments with the bands in which they lie with 95 %, beside those of the robot's file."""
-    for stroke, (run, result) in zip(STROKES, evaluated(runs), strict=False):
+    for stroke, (run, result) in zip(cycle(STROKES), evaluated(runs), strict=False):
         found, begin_s = run.record.inertia, float(run.record.motion.stamp_s[0])
         for column, name, colour in zip(range(3), MOMENTS, BODY_AXES, strict=False):
             time_s, value, spread = found.stamp_s - begin_s, found.tensor[:, column], found.std[:, column]
