@@ -12,6 +12,7 @@ import numpy as np
 
 PENDING_BYTES = 1 << 25  # that wait in memory
 NUMBER_BYTES = 40  # of a number that waits, about
+LETTER_BYTES = 4  # of a text, in an array
 
 
 @dataclass
@@ -67,6 +68,7 @@ class ColumnStore:
             column.waiting += [None] * (self.count - column.rows - len(column.waiting))
             column.waiting.append(value)
             self._bytes += getattr(value, "nbytes", NUMBER_BYTES)
+            self._bytes += LETTER_BYTES * len(value) if isinstance(value, str) else 0
         self.count += 1
         if self._bytes > PENDING_BYTES:
             self._flush()

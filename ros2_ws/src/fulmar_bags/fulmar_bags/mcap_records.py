@@ -66,9 +66,10 @@ def bag_files(bag: Path) -> list[Path]:
         next(iter(sorted(path for path in bag.iterdir() if storage_of(path))), None) if not files else None
     )
     if other is not None:
+        more = f'; for more try: sqlite3 "{other}" .recover | sqlite3 recovered.db3'
         raise BagError(
-            f"{bag}: holds {other.name}, and only .mcap files are recovered. What is sound of it is read as it is; for "
-            f'more try: sqlite3 "{other}" .recover | sqlite3 recovered.db3'
+            f"{bag}: holds {other.name}, and only .mcap files are recovered. What is sound of it is read as it is"
+            + (more if storage_of(other) == "sqlite3" else ".")
         )
     if not files:
         raise BagError(f"{bag}: 0 .mcap files where a bag folder has one or more. Give a bag folder.")

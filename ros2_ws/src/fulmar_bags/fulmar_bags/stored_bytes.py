@@ -228,6 +228,7 @@ class Payloads(Sequence[bytes]):
         """Begin without a message; `room` is that of the whole bag."""
         self._room = room
         self._sources: list[Source] = []
+        self._numbers: dict[int, int] = {}  # of each source, by its identity
         self._of, self._outer, self._at, self._lengths = array("H"), array("q"), array("q"), array("q")
         self._kept: dict[int, bytes] = {}
         self._sizes: dict[int, int] = {}  # of those that are packed by themselves
@@ -244,11 +245,12 @@ class Payloads(Sequence[bytes]):
             at: The second part of its place.
             stored: How long it is there, which is not its length where it is packed by itself [bytes].
         """
-        if not self._sources or self._sources[-1] is not source:
+        number = self._numbers.setdefault(id(source), len(self._sources))
+        if number == len(self._sources):
             self._sources.append(source)
         if self._room.take(len(data)):
             self._kept[len(self._at)] = data
-        self._of.append(len(self._sources) - 1)
+        self._of.append(number)
         self._outer.append(outer)
         self._at.append(at)
         self._lengths.append(stored)
