@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import sqlite3
 import subprocess
 import sys
 import tracemalloc
@@ -15,10 +17,12 @@ from rosbags.rosbag1 import Writer as Ros1Writer
 from rosbags.rosbag2.enums import CompressionMode, StoragePlugin
 from rosbags.typesys import Stores, get_typestore
 
+from fulmar_bags import mcap_records
 from fulmar_bags.contents import Bag, open_bag
 from fulmar_bags.decode import odometries
 from fulmar_bags.figures import describe
 from fulmar_bags.message_types import message_type, type_store
+from fulmar_bags.stored_bytes import Payloads, Room
 from fulmar_core.config.errors import BagError
 from tests.foreign_bag import NS, ODOMETRY, write_foreign
 
@@ -340,3 +344,74 @@ def test_a_chunk_that_is_larger_than_memory_is_unpacked_beside_it(tmp_path):
     path = big_bag(tmp_path / "bag.mcap", 700, compression=CompressionType.ZSTD, chunk=1 << 30)
     megabytes, printed = memory_of("bag", "info", path)
     assert megabytes < MOST_MB, printed
+
+
+def test_a_log_without_a_whole_transaction_is_neither_read_nor_deleted(tmp_path):
+    bag = written_in_wal(tmp_path / "bag", checkpointed=100, logged=100)
+    (log,) = bag.glob("*-wal")
+    content = bytearray(log.read_bytes())
+    page = int.from_bytes(content[8:12], "big")
+    log.write_bytes(content[: 32 + 24 + page])  # the first page of a transaction of several
+    assert not any(content[36:40])
+    before = {file.name: file.read_bytes() for file in bag.iterdir()}
+    assert counts(open_bag(bag))[TOPIC] == 100
+    assert {file.name: file.read_bytes() for file in bag.iterdir()} == before
+
+
+def test_a_torn_database_is_read_with_its_log(tmp_path):
+    bag = written_in_wal(tmp_path / "bag", checkpointed=100, logged=100)
+    (file,) = bag.glob("*.db3")
+    file.write_bytes(file.read_bytes()[:-1000])
+    assert counts(open_bag(bag))[TOPIC] > 100
+
+
+def test_a_database_whose_first_messages_are_damaged_gives_the_others(tmp_path):
+    bag = write_foreign(tmp_path / "bag", StoragePlugin.SQLITE3, count=400)
+    (file,) = bag.glob("*.db3")
+    database = sqlite3.connect(file)
+    (root,) = database.execute("SELECT rootpage FROM sqlite_schema WHERE name = 'messages'").fetchone()
+    database.close()
+    content = bytearray(file.read_bytes())
+    page = int.from_bytes(content[16:18], "big")
+    begin = (root - 1) * page
+    assert content[begin] == 5  # a page of pages: its first cell has the number of the first leaf
+    cell = begin + int.from_bytes(content[begin + 12 : begin + 14], "big")
+    leaf = (int.from_bytes(content[cell : cell + 4], "big") - 1) * page
+    content[leaf : leaf + page] = b"\xff" * page
+    file.write_bytes(content)
+    assert 380 < sum(counts(open_bag(bag)).values()) < 404
+
+
+def test_messages_of_two_sources_in_turn_are_found_again():
+    class One:
+        def __init__(self, content: bytes) -> None:
+            self.content = content
+
+        def read(self, outer: int, at: int, length: int) -> bytes:
+            return self.content
+
+    sources, messages = (One(b"a"), One(b"b")), Payloads(Room(0))
+    for number in range(70_000):
+        messages.append(b" ", sources[number % 2], 0, number, 1)
+    assert messages[69_998:] == [b"a", b"b"]
+
+
+def test_many_large_chunks_need_one_file(tmp_path, monkeypatch):
+    monkeypatch.setattr(mcap_records, "MOST_CHUNK", 1000)
+    path = tmp_path / "large.mcap"
+    with path.open("wb") as stream:
+        writer = Writer(stream, chunk_size=4000, compression=CompressionType.NONE)
+        writer.start(profile="ros2", library="tests")
+        schema = writer.register_schema("a/msg/A", "ros2msg", b"uint8[] data")
+        channel = writer.register_channel("/large", "cdr", schema)
+        for number in range(100):
+            writer.add_message(channel, number, bytes([number]) * 5000, number)
+        writer.finish()
+    before = len(os.listdir("/proc/self/fd"))
+    file = mcap_records.McapFile(path)
+    damage: list[str] = []
+    placed = [each for each in file.records(damage) if isinstance(each, mcap_records.PlacedMessage)]
+    assert len(os.listdir("/proc/self/fd")) <= before + 1
+    assert not damage
+    assert [file.read(each.outer, each.at, 5000) for each in placed] == [each.data for each in placed]
+    assert [each.data[0] for each in placed] == list(range(100))

@@ -37,12 +37,17 @@ GIVEN = {
     "export": ("runs/one --out bundle", ("policy",)),
     "import": ("agent.pt --robot turtlebot2 --task go_to_position --out bundle", ("policy",)),
     "evaluate": ("floating_platform go_to_pose", ("policy", "sim")),
+    "rates": (f"{POLICY}", ("bags",)),
     "report": (f"{POLICY}", ("bags",)),
     "identify": (f"{POLICY}", ("bags",)),
     "demo": ("", ("ros", "sim", "policy", "bags", "view")),
     "install-tf": ("", ()),
     "install-stars": ("", ()),
     "benchmark drift": ("", ("policy", "sim")),
+    "benchmark events": ("", ("sim",)),
+    "benchmark falcon": ("", ("view",)),
+    "benchmark flights": ("", ("bags",)),
+    "benchmark inertia": ("", ("view",)),
     "benchmark endurance": ("", ("bags",)),
     "benchmark latency": ("", ("ros",)),
     "benchmark rans3d": ("", ("sim",)),
@@ -68,7 +73,7 @@ GIVEN = {
     "bag play": (f"{POLICY}", ("ros",)),
     "bag plot": (f"{POLICY}", ("view",)),
     "check robot": ("jetbot", ()),
-    "service install": ("mujoco_policy --dry-run", ("ros",)),
+    "service install": ("mujoco_policy --dry-run", ("ros", "bags", "policy", "sim")),
     "service status": ("--root root", ()),
 }
 # Commands that would work for long, or move a robot, before they met the missing module, and each of their extras.
@@ -81,8 +86,9 @@ ALONE = [
     ("check robot jetbot --plot plot.png", "view"),
     ("train floating_platform go_to_pose --wandb", "wandb"),
 ]
-# `doctor` measures for seconds (test_extras_alone.py); `service remove` has nothing to remove.
-ELSEWHERE = {"doctor", "service remove"}
+# `doctor` measures for seconds (test_extras_alone.py); `service remove` has nothing to remove. `benchmark
+# descent` flies for minutes without any extra, and `new airframe` has a Python of its own.
+ELSEWHERE = {"doctor", "service remove", "benchmark descent", "new airframe"}
 
 
 def commands(group, words=()):

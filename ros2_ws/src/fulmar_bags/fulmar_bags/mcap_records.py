@@ -118,7 +118,9 @@ class McapFile:
         """
         self.path, self._bytes = path, FileBytes(path)
         self._unpacked: tuple[int, bytes] = (WHOLE, b"")  # the chunk that was looked at last
-        self._spools: dict[int, IO[bytes]] = {}  # contents of chunks that are too large for memory
+        # Contents of chunks that are too large for memory, in one file without a name, and where each begins there.
+        self._spool: IO[bytes] | None = None
+        self._spooled: dict[int, int] = {}
 
     def records(self, damage: list[str]) -> Iterator[Record]:
         """As `read_records`."""
@@ -142,8 +144,8 @@ class McapFile:
         """
         if outer == WHOLE:
             return self._bytes.read(WHOLE, at, length)
-        if outer in self._spools:
-            return os.pread(self._spools[outer].fileno(), length, at)
+        if self._spool is not None and outer in self._spooled:
+            return os.pread(self._spool.fileno(), length, self._spooled[outer] + at)
         if self._unpacked[0] != outer:
             _, size = _HEAD.unpack(self._bytes.read(WHOLE, outer, _HEAD.size))
             body = self._bytes.read(WHOLE, outer + _HEAD.size, size)
@@ -165,7 +167,7 @@ class McapFile:
             if opcode == Opcode.DATA_END:
                 return
             whole = opcode != INVALID and (end is None or at <= end)
-            if whole and opcode == Opcode.CHUNK:
+            if whole and opcode == Opcode.CHUNK and outer == WHOLE:
                 whole = yield from self._chunk(stream, start, length, damage)
             elif whole and opcode not in _READERS:
                 skip(stream, length)
@@ -215,9 +217,11 @@ class McapFile:
         self, stream: IO[bytes], chunk: Chunk, start: int, inner: int, damage: list[str]
     ) -> Iterator[Record]:
         """Records of a chunk that is too large for memory: it is unpacked into a file without a name."""
-        spool = tempfile.TemporaryFile()  # noqa: SIM115 - lives as long as its messages are looked at
         content = Piece(stream, inner)
         try:
+            if self._spool is None:
+                self._spool = tempfile.TemporaryFile()  # noqa: SIM115 - lives as long as its messages are looked at
+            spool, begin = self._spool, self._spool.seek(0, os.SEEK_END)
             size = unpack_into(spool, io.BufferedReader(content), chunk, unpacks_to(inner))
         except OSError as error:
             raise BagError(
@@ -227,10 +231,11 @@ class McapFile:
             where = f"{self.path.name}: the record at byte {start}"
             damage.append(f"{where} is damaged and was left out ({type(error).__name__}).")
             skip(stream, content.left)
+            spool.truncate(begin)
             return
         skip(stream, content.left)
-        self._spools[start] = spool
-        spool.seek(0)
+        self._spooled[start] = begin
+        spool.seek(begin)
         yield from self._region(spool, 0, size, start, damage)
 
 

@@ -10,7 +10,7 @@ import sqlite3
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 from urllib.parse import quote
 
 from mcap.records import Channel, Schema
@@ -20,7 +20,8 @@ from fulmar_bags.stored_bytes import PIECE, WHOLE, FileBytes
 from fulmar_core.config.errors import BagError
 
 LOG, JOURNAL = "-wal", "-journal"  # files of sqlite3 beside its database
-PAGE_SIZE_AT, LEAST_PAGE = 16, 512  # bytes: https://sqlite.org/fileformat.html
+PAGE_SIZE_AT, LEAST_PAGE, MOST_PAGE = 16, 512, 1 << 16  # bytes: https://sqlite.org/fileformat.html
+LOG_HEAD, FRAME_HEAD = 32, 24  # bytes of a log, and of each of its pages
 FARTHEST = 1 << 40  # numbers of messages beyond a damaged part that are tried
 MOST_PARTS = 3  # that are named
 RECOVER = 'for what may be left of them try: sqlite3 "{0}" .recover | sqlite3 recovered.db3'
@@ -40,20 +41,27 @@ class SqliteFile:
         if content.is_packed or _torn_page(path, content.on_disk):
             self._folder = tempfile.TemporaryDirectory()  # goes with this
             path = Path(self._folder.name) / plain_name(path).name
-            try:
-                with content.opened(damage) as stream, path.open("wb") as plain:
-                    shutil.copyfileobj(stream, plain, PIECE)
-                    # A page that is there in part would be read with zeros in the place of the rest.
-                    plain.truncate(plain.tell() - _torn_page(path, plain.tell()))
-            except OSError as error:
-                raise BagError(
-                    f"{self.path}: no room for a copy in {path.parent}: {error.strerror}."
-                ) from error
+            with content.opened(damage) as stream:
+                self._copy(stream, path)
         self._database = self._connected(path)
         if _is_filled(path.with_name(path.name + JOURNAL)):
             damage.append(
                 f"{path.name}: its recorder was killed while it wrote; the last messages may be damaged."
             )
+
+    def _copy(self, content: IO[bytes], path: Path) -> None:
+        """Write the whole pages of the database to `path`, and its log and journal beside it."""
+        try:
+            with path.open("wb") as plain:
+                shutil.copyfileobj(content, plain, PIECE)
+                # A page that is there in part would be read with zeros in the place of the rest.
+                plain.truncate(plain.tell() - _torn_page(path, plain.tell()))
+            for ending in (LOG, JOURNAL):
+                beside = self.path.with_name(path.name + ending)
+                if _is_filled(beside):
+                    shutil.copyfile(beside, path.with_name(beside.name))
+        except OSError as error:
+            raise BagError(f"{self.path}: no room for a copy in {path.parent}: {error.strerror}.") from error
 
     def records(self, damage: list[str]) -> Iterator[Any]:
         """A schema and a channel for each topic, then all messages; `damage` grows as in `read_records`.
@@ -65,7 +73,7 @@ class SqliteFile:
             topics = self._database.execute(
                 "SELECT id, name, type, serialization_format FROM topics"
             ).fetchall()
-            self._database.execute("SELECT id FROM messages NOT INDEXED LIMIT 1")
+            self._database.execute("SELECT id FROM messages NOT INDEXED LIMIT 0")
         except sqlite3.Error as error:
             raise BagError(
                 f"{self.path}: this sqlite3 bag cannot be read: {error}; {RECOVER.format(self.path)}."
@@ -148,8 +156,8 @@ class SqliteFile:
 
     def _connected(self, path: Path) -> sqlite3.Connection:
         # With a log, sqlite3 would make a file of shared memory beside it, unless it has the database for itself; and
-        # a database that is never written needs neither that nor a lock.
-        with_log = _is_filled(path.with_name(path.name + LOG))
+        # a database that is never written needs neither that nor a lock. A log without a transaction it would delete.
+        with_log = _has_commit(path.with_name(path.name + LOG))
         way = "mode=ro&vfs=unix-none" if with_log else "immutable=1"
         try:
             database = sqlite3.connect(f"file:{quote(str(path))}?{way}", uri=True, check_same_thread=False)
@@ -172,6 +180,23 @@ def _torn_page(path: Path, size: int) -> int:
     page = int.from_bytes(head, "big")
     page = 1 << 16 if page == 1 else page
     return size % page if page >= LEAST_PAGE else 0
+
+
+def _has_commit(log: Path) -> bool:
+    """Whether a write-ahead log holds a whole transaction (https://sqlite.org/fileformat.html, "WAL Format")."""
+    if not _is_filled(log):
+        return False
+    try:
+        with log.open("rb") as file:
+            head = file.read(LOG_HEAD)
+            page = int.from_bytes(head[8:12], "big")
+            length = FRAME_HEAD + page if LEAST_PAGE <= page <= MOST_PAGE else 0
+            while length and len(frame := file.read(length)) == length and frame[8:16] == head[16:24]:
+                if any(frame[4:8]):
+                    return True
+    except OSError:  # sqlite3 says what it is
+        return True
+    return False
 
 
 def _is_filled(path: Path) -> bool:
