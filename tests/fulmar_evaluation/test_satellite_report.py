@@ -18,7 +18,7 @@ from fulmar_evaluation.rate_sources import RateSource, gyroscope_ended_s, rate_s
 from fulmar_evaluation.report.bag_report import _drawings
 from fulmar_evaluation.report.run_report import write_report
 from fulmar_evaluation.report.run_view import evaluated, views
-from fulmar_evaluation.report.satellite_figures import inertia, torques, wheels
+from fulmar_evaluation.report.satellite_figures import inertia, table, torques, wheels
 from fulmar_evaluation.report.satellite_plot import (
     attitude_errors_deg,
     draw_attitude,
@@ -164,3 +164,19 @@ def test_small_angles_have_the_digits_that_they_need(turned):
         "–",
     ]
     assert "attitude 0.0° off" not in summary_text(summarise(turned))
+
+
+def test_each_of_many_runs_is_drawn(turned):
+    axes = Figure().subplots()
+    many = views([dataclasses.replace(turned) for _ in range(6)])
+    draw_wheels(axes, many)
+    assert len(axes.lines) >= 6 * len(turned.wheels.names)
+
+
+def test_an_estimate_without_a_spread_is_given_without_one(turned):
+    unknown = dataclasses.replace(turned.inertia, std=np.full_like(turned.inertia.std, np.nan))
+    (row,) = [
+        row for row in table(views([dataclasses.replace(turned, inertia=unknown)])) if "inertia" in row[0]
+    ]
+    assert "nan" not in row[2][0]
+    assert "±" not in row[2][0]

@@ -85,3 +85,8 @@ def test_a_usual_controller_that_nobody_knows_is_a_problem(tmp_path, name, words
 def test_a_usual_controller_of_ones_own_is_none(tmp_path):
     path, _ = altered(tmp_path, "floating_platform", {"usual_controller": "mine:Controller"})
     assert check_robot(str(path)).passed
+
+
+def test_a_speed_that_was_asked_for_is_not_blamed_on_the_file():
+    found = check_robot("navion", speed=26.0)
+    assert not any("'airframe.speed' = " in problem for problem in found.problems)
