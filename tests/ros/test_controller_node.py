@@ -29,6 +29,7 @@ from fulmar_core.robots.topics import (
     GOAL_POSE,
     IMU,
     ODOMETRY,
+    RELAY,
     STATUS,
     SWAP,
     TRUTH,
@@ -178,7 +179,7 @@ def test_a_controller_receives_odometry_and_its_goal_and_never_the_truth(
 ) -> None:
     """What a deployed controller may know; of a robot with thrusters on an air bearing, what these do as well."""
     received = {subscription.topic_name for subscription in controller.subscriptions}
-    wires = (ODOMETRY, GOAL_POSE, ESTOP, ESTOP_RELEASED, SWAP, ACTUATORS_STATE, AIR_BEARING)
+    wires = (ODOMETRY, GOAL_POSE, ESTOP, ESTOP_RELEASED, SWAP, ACTUATORS_STATE, AIR_BEARING, RELAY)
     assert received == {f"{NAMESPACE}/{wire.name}" for wire in wires}
     assert f"{NAMESPACE}/{TRUTH.name}" not in received
     assert {STATUS.name, IMU.name}.isdisjoint(received)
