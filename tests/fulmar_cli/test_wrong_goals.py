@@ -123,7 +123,7 @@ WRONG = [
     ((*CRAFT, "--height", "2"), "--height is not for bodies that are pushed in space"),
     ((*NAVION, "--height", "1"), "starts at 0.75 m, where the hull of 'navion' touches the ground"),
     ((*NAVION, "--height", "-5"), "'--height'"),
-    ((*NAVION, "--height", "20000"), "--height = 20000 m is too high: the drawn goal"),
+    ((*NAVION, "--height", "20000"), "--height = 20000 m is too high: at most 10,000 m"),
     ((*NAVION, "--height", "nan"), "'--height'"),
     ((*SHIP, "--height", "nan"), "'--height'"),
     ((*SHIP, "--height", "5", "--task", "fly_a"), "task 'fly_a' has no height to choose"),

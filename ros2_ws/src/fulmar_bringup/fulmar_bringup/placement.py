@@ -44,6 +44,10 @@ def placed(plan: RunPlan, file: GoalFile | None, task: Task) -> tuple[Goal, Pose
     """
     robot, scenario = load_robot(plan.robot), load_scenario(plan.scenario)
     area, farthest = plan.guards.area, farthest_goal(robot)
+    if plan.height > farthest:
+        raise ConfigError(
+            f"--height = {plan.height:g} m is too high: at most {farthest:,.0f} m from the origin."
+        )
     if plan.goal is not None:  # numbers of a pose, of which a place is at the front
         check_places("the goal", [plan.goal], area, farthest)
         _check_nearness(plan, robot)
@@ -71,8 +75,6 @@ def placed(plan: RunPlan, file: GoalFile | None, task: Task) -> tuple[Goal, Pose
             return mission, drawn
         if mission.obstacles.size or task.things:
             break
-    if plan.height:
-        raise ConfigError(f"--height = {plan.height:g} m is too high: {problem}")
     raise ConfigError(f"{problem} Give --start and --goal, another --seed, or a larger area.")
 
 
