@@ -56,6 +56,7 @@ def placed(plan: RunPlan, file: GoalFile | None, task: Task) -> tuple[Goal, Pose
     fixed = start_of(file) if file is not None else None
     if fixed is not None and not plan.start and not plan.is_real:
         check_places("the start of these goals", [fixed], area, farthest)
+    before = ""
     for number in range(DRAWS):
         episode = draw_episode(robot, task, scenario, seed=plan.seed, number=number)
         mission, drawn = episode.goal, task.state_type.written(episode.start.pose)
@@ -73,8 +74,9 @@ def placed(plan: RunPlan, file: GoalFile | None, task: Task) -> tuple[Goal, Pose
         )
         if not problem:
             return mission, drawn
-        if mission.obstacles.size or task.things:
+        if mission.obstacles.size or task.things or problem == before:  # the same each time, as of wings
             break
+        before = problem
     raise ConfigError(f"{problem} Give --start and --goal, another --seed, or a larger area.")
 
 
