@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 import struct
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
 from itertools import pairwise
 from typing import Any, TypeAlias
 
@@ -115,9 +114,6 @@ class WireImage:
         return seconds * NS + rest, runs
 
 
-MOST_COUNTS = 3  # lengths of sequences that stand between texts and numbers, as in a JointState
-
-
 def numbers_in(message: Any, path: str = "") -> Iterator[tuple[str, Any, str, int | None]]:
     """Fields of doubles in the order of the bytes: path, the part that has it, name and length; None: it is no list."""
     for name, kind in message.get_fields_and_field_types().items():
@@ -146,10 +142,20 @@ def layout_of(message: Any, *texts: str) -> WireImage:
     rest = iter(run)
     for _, part, name, count in fields:
         setattr(part, name, next(rest) if count is None else [next(rest) for _ in range(count)])
-    for counts in range(MOST_COUNTS + 1 if run else 0):
-        with suppress(ValueError):
-            return WireImage(message, run, texts=texts, counts=counts)
-    raise ValueError(f"{type(message).__name__} is more than texts, then numbers.")
+    if not run:
+        raise ValueError(f"{type(message).__name__} holds no number.")
+    return WireImage(message, run, texts=texts, counts=_lengths_before_numbers(message))
+
+
+def _lengths_before_numbers(message: Any) -> int:
+    """How many lengths of sequences stand before the first double, as in a JointState of velocities alone."""
+    found = 0
+    for name, kind in message.get_fields_and_field_types().items():
+        if kind.startswith("sequence<double"):
+            found += 1
+        if kind.startswith("double") or (kind.startswith("sequence<double") and len(getattr(message, name))):
+            break
+    return found
 
 
 def canonical_bytes(message: Any) -> bytes:
