@@ -81,7 +81,7 @@ def placed(plan: RunPlan, file: GoalFile | None, task: Task) -> tuple[Goal, Pose
 
 
 def _check_nearness(plan: RunPlan, robot: Robot) -> None:
-    """Refuse a goal so far away that metres are hardly meant, where nobody has said that the robot is near it."""
+    """Refuse a goal that is so many geofences away that its unit is probably wrong, unless a start is given, too."""
     assert plan.goal is not None
     farthest = FAR * robot.limits.geofence
     away = math.hypot(*plan.goal[: robot.state_type.AXES])

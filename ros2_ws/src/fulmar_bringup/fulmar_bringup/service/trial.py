@@ -26,7 +26,7 @@ def try_once(service: Service, variables: Mapping[str, str], *, as_user: bool) -
         as_user: Whether its user is one of this computer, and we may become it.
 
     Raises:
-        ConfigError: It does not start, with what it says: at boot nobody would read that.
+        ConfigError: It does not start; the message has what the service printed.
     """
     try:
         about = pwd.getpwnam(service.user) if as_user else pwd.getpwuid(os.geteuid())

@@ -69,7 +69,7 @@ class OpeningAllocation:
         Args:
             wanted: Wrench [F_x, F_y, M_z] in the body frame, shape (..., 3) [N, N, N·m].
             alive: 1, or 0 for valves that are dead, shape (..., n); all live by default.
-            dearer: As in `ValveAllocation.best`; openings cost so little each that nobody needs it here.
+            dearer: As in `ValveAllocation.best`; not used here, where each opening costs little.
 
         Returns:
             Openings from 0 to 1 that add up to at most 1, shape (..., n).

@@ -13,7 +13,7 @@ VELOCITY = {3: ("ahead", "to the left"), 6: ("ahead", "to the left", "up")}
 
 
 def number(value: float, digits: int = 3) -> str:
-    """A number without digits that nobody reads, and without the sign of a zero."""
+    """A number rounded to some digits; a negative zero is printed as 0."""
     return f"{round(float(value), digits) + 0.0:.9g}"
 
 
