@@ -1,4 +1,4 @@
-"""What keeps ROS from working in an environment is found before rclpy is loaded, with the command that mends it."""
+"""Settings with which ROS does not work are found before rclpy is loaded, with the command that corrects them."""
 
 from __future__ import annotations
 

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TextIO
 
 from fulmar_core.config.errors import ConfigError
+from fulmar_ros.ros_check import domain_problem
 
 
 @contextlib.contextmanager
@@ -29,7 +30,6 @@ def environment(values: Mapping[str, str]) -> Iterator[None]:
                 os.environ[name] = value
 
 
-LARGEST = 232  # of DDS
 DOMAINS = range(1, 102)  # up to 101 the ports of a domain lie below those that Linux hands out to others
 
 
@@ -68,10 +68,13 @@ def claimed_domain(name: str, part: str = "") -> Iterator[int]:
     Raises:
         ConfigError: Another run of this user has the name in it, or ROS_DOMAIN_ID is no domain.
     """
-    text = os.environ.get("ROS_DOMAIN_ID", "") or "0"
-    if not text.isdecimal() or int(text) > LARGEST:
-        raise ConfigError(f"ROS_DOMAIN_ID = '{text}' must be a whole number from 0 to {LARGEST}.")
-    domain, folder, own = int(text), _lock_folder(), ".".join(filter(None, (name, part)))
+    if problem := domain_problem(os.environ):
+        raise ConfigError(f"{problem}.")
+    domain, folder, own = (
+        int(os.environ.get("ROS_DOMAIN_ID") or 0),
+        _lock_folder(),
+        ".".join(filter(None, (name, part))),
+    )
     with _run_lock_file(folder, domain) as shared, (folder / f"{domain}.{own}.run").open("w") as lock:
         fcntl.flock(shared, fcntl.LOCK_SH)  # waits for no more than a look of `reserved_domains`
         if not _locked(lock):

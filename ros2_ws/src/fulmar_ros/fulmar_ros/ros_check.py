@@ -28,7 +28,7 @@ LOADED_S = 30.0  # for another process to load rclpy on a busy computer
 
 @dataclass(frozen=True)
 class Fault:
-    """What keeps ROS from working in an environment, and the command that mends it."""
+    """A setting of an environment with which ROS does not work, and the command that corrects it."""
 
     found: str
     fix: str
@@ -134,8 +134,13 @@ def _another_middleware(environment: Mapping[str, str]) -> Fault | None:
 
 def _domain(environment: Mapping[str, str]) -> Fault | None:
     """Whether the domain is one of DDS."""
+    found = domain_problem(environment)
+    return Fault(found, f"export {DOMAIN}=0") if found else None
+
+
+def domain_problem(environment: Mapping[str, str]) -> str:
+    """Why ROS_DOMAIN_ID is no domain of DDS; empty if it is one, or not set."""
     given = environment.get(DOMAIN, "")
     if not given or (given.isdecimal() and int(given) <= LARGEST_DOMAIN):
-        return None
-    found = f"{DOMAIN} = '{given}' must be a whole number from 0 to {LARGEST_DOMAIN}"
-    return Fault(found, f"export {DOMAIN}=0")
+        return ""
+    return f"{DOMAIN} = '{given}' must be a whole number from 0 to {LARGEST_DOMAIN}"

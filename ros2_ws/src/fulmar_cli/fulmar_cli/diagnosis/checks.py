@@ -33,7 +33,7 @@ from fulmar_cli.diagnosis.network import (
     check_running_robots,
 )
 from fulmar_cli.diagnosis.sockets import check_sockets
-from fulmar_ros.ros_check import ros_fault
+from fulmar_ros.ros_check import domain_problem, ros_fault
 
 PURPOSES = ("hardware", "sim")
 EXTRAS_OF_A_ROBOT = ("ros", "policy", "bags")
@@ -63,7 +63,7 @@ def diagnose(purpose: str | None = None, name: str | None = None) -> list[Findin
         check_tf,
         check_configuration,
         check_policies,
-        partial(check_discovery, environment, hardware=hardware),
+        *(() if domain_problem(environment) else (partial(check_discovery, environment, hardware=hardware),)),
         partial(check_multicast, environment),
         partial(check_profile, environment),
         check_receive_buffer,

@@ -7,7 +7,7 @@ import socket
 from collections.abc import Mapping
 from pathlib import Path
 
-from fulmar_bringup.domains import DOMAINS, LARGEST
+from fulmar_bringup.domains import DOMAINS
 from fulmar_cli.diagnosis.check_result import Finding
 from fulmar_ros.middleware import (
     DISCOVERY_RANGE,
@@ -18,6 +18,7 @@ from fulmar_ros.middleware import (
     static_peers,
 )
 from fulmar_ros.middleware import OWN_HOST as OURS
+from fulmar_ros.ros_check import domain_problem
 
 RANGES = ("SUBNET", "LOCALHOST", "OFF", "SYSTEM_DEFAULT")
 GROUP = "239.255.0.1"  # of DDS discovery (OMG DDSI-RTPS 2.5, 9.6.2)
@@ -42,9 +43,8 @@ def check_discovery(environment: Mapping[str, str], *, hardware: bool) -> Findin
     if reach not in RANGES:
         found = f"{DISCOVERY_RANGE} = '{reach}' must be one of {', '.join(RANGES)}"
         return Finding(what, "wrong", found, f"export {DISCOVERY_RANGE}={OURS}")
-    if not domain.isdecimal() or int(domain) > LARGEST:
-        found = f"ROS_DOMAIN_ID = '{domain}' must be a whole number from 0 to {LARGEST}"
-        return Finding(what, "wrong", found, "export ROS_DOMAIN_ID=0")
+    if problem := domain_problem(environment):
+        return Finding(what, "wrong", problem, "export ROS_DOMAIN_ID=0")
     if reach == "OFF":
         return Finding(what, "wrong", f"{found}: no node finds another", f"export {DISCOVERY_RANGE}={OURS}")
     if environment.get("ROS_LOCALHOST_ONLY", "0") == "1":
