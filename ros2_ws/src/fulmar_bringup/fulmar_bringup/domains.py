@@ -70,11 +70,8 @@ def claimed_domain(name: str, part: str = "") -> Iterator[int]:
     """
     if problem := domain_problem(os.environ):
         raise ConfigError(f"{problem}.")
-    domain, folder, own = (
-        int(os.environ.get("ROS_DOMAIN_ID") or 0),
-        _lock_folder(),
-        ".".join(filter(None, (name, part))),
-    )
+    domain, folder = int(os.environ.get("ROS_DOMAIN_ID") or 0), _lock_folder()
+    own = ".".join(filter(None, (name, part)))
     with _run_lock_file(folder, domain) as shared, (folder / f"{domain}.{own}.run").open("w") as lock:
         fcntl.flock(shared, fcntl.LOCK_SH)  # waits for no more than a look of `reserved_domains`
         if not _locked(lock):

@@ -2,8 +2,8 @@
 
 A publisher may send one message as soon as it has one subscriber, as `ros2 topic pub --once` does. Where that is the
 recorder, the message never comes to the controller, which is found a moment later: volatile messages are for those that
-are there. So the recorder, the markers and the controller publish the first messages of each publisher once more, on the
-wire `relay`, and a node that did not receive a message itself takes it from there.
+are there. So the recorder, the markers and the controller publish the first messages of each publisher once more, on
+the wire `relay`, and a node that did not receive a message itself takes it from there.
 """
 
 from __future__ import annotations
