@@ -8,7 +8,7 @@ import pytest
 from fulmar_core.estimators.actuator_health.applied import AppliedHistory
 from fulmar_core.loop.controller_settings import ControllerSettings
 from fulmar_core.loop.fallback import ControllerSwitch, Standby
-from fulmar_core.loop.guarded_loop import ENDED, GuardedLoop
+from fulmar_core.loop.guarded_loop import ENDED, GuardedLoop, Refusal
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.safety.arbiter import BEARING_OFF, Mode
 from fulmar_core.safety.geofence import OUT_OF_BOUNDS
@@ -271,6 +271,27 @@ def test_a_goal_beyond_the_geofence_is_not_driven_to():
     bench = Bench()
     bench.give(goal_at((ROBOT.limits.geofence + 1.0, 0.0, 0.0)))
     assert "beyond the geofence" in bench.step()[0].reason
+
+
+def test_a_goal_beyond_the_geofence_is_reported_as_refused_with_its_first_distance():
+    bench = Bench()
+    bench.give()
+    assert bench.step()[0].may_act
+    bench.give(goal_at((ROBOT.limits.geofence + 1.0, 0.0, 0.0)), stamp_ns=8)
+    reason = bench.step()[0].reason
+    bench.step(x=-0.5)
+    assert bench.guard.too_far == Refusal(8, reason)
+    bench.give(stamp_ns=9)
+    assert bench.step()[0].may_act and bench.guard.too_far == Refusal()
+
+
+def test_a_robot_that_is_carried_away_from_a_goal_that_it_followed_refuses_nothing():
+    bench = Bench()
+    bench.give()
+    assert bench.step()[0].may_act
+    bench.step(x=-ROBOT.limits.geofence - 2.0)  # a jump, where a new epoch begins
+    decision, _ = bench.step(x=-ROBOT.limits.geofence - 2.0)
+    assert "beyond the geofence" in decision.reason and bench.guard.too_far == Refusal()
 
 
 def test_an_air_bearing_has_to_be_known_to_be_on_and_once_on_again_the_past_is_forgotten():

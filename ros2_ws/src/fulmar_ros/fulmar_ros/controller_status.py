@@ -6,9 +6,9 @@ import time
 from collections.abc import Mapping
 
 from fulmar_core.estimators.actuator_health.beliefs import Beliefs
-from fulmar_core.loop.guarded_loop import GuardedLoop, Refusal
+from fulmar_core.loop.guarded_loop import GuardedLoop
 from fulmar_core.robots.wire_check import BETWEEN, WIRE_WARNINGS
-from fulmar_core.safety.arbiter import BEYOND_GEOFENCE, Decision, Mode
+from fulmar_core.safety.arbiter import Decision, Mode
 from fulmar_ros.deadline import Deadlines, Spread
 from fulmar_ros.fallback import PolicySwap
 from fulmar_ros.health import Health
@@ -38,7 +38,6 @@ class ControllerStatus:
         self.inputs_refused = 0, ""
         self._said: tuple[object, ...] = ()
         self._said_at = 0.0
-        self._beyond, self._followed = Refusal(), 0  # and the number of the newest goal that was followed
 
     def repeat(self) -> None:
         """Publish the next time whether or not anything changed."""
@@ -57,7 +56,8 @@ class ControllerStatus:
 
         `decision` is the arbiter's for now, `beliefs` are warnings about actuators.
         """
-        mission, switch, refusal = guard.mission, guard.switch, self._refusal(decision, guard)
+        mission, switch = guard.mission, guard.switch
+        refusal = guard.refusal if guard.refusal.reason else guard.too_far
         standby, last_input_ns = switch.current, guard.flags.last_input_ns
         changed = (
             decision.mode,
@@ -127,18 +127,3 @@ class ControllerStatus:
         its = unconverged, self.contested, guard.input_warning
         warned = [*beliefs.warnings, *(words for words in its if words)]
         health.publish(level, message, values, warnings=warned)
-
-    def _refusal(self, decision: Decision, guard: GuardedLoop) -> Refusal:
-        """Why the newest goal does not count; of one beyond the geofence its first distance, which changes.
-
-        A robot that is carried away from a goal that it followed refuses nothing.
-        """
-        number = guard.mission.goals_received
-        self._followed = number if decision.mode is Mode.ACTIVE else self._followed
-        if guard.refusal.reason or BEYOND_GEOFENCE not in decision.reason or number == self._followed:
-            self._beyond = Refusal()
-            return guard.refusal
-        stamp_ns = guard.mission.goal_stamp_ns
-        if self._beyond.stamp_ns != stamp_ns or not self._beyond.reason:
-            self._beyond = Refusal(stamp_ns, decision.reason)
-        return self._beyond

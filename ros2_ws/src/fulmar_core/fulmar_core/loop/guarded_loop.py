@@ -17,7 +17,7 @@ from fulmar_core.loop.controller_settings import ControllerSettings
 from fulmar_core.loop.fallback import ControllerSwitch, Standby
 from fulmar_core.loop.mission import STREAM_NS, Mission
 from fulmar_core.robots.robot import Robot
-from fulmar_core.safety.arbiter import Decision, Flags, arbitrate
+from fulmar_core.safety.arbiter import BEYOND_GEOFENCE, Decision, Flags, arbitrate
 from fulmar_core.safety.convergence import ConvergenceWatch
 from fulmar_core.safety.geofence import OUT_OF_BOUNDS, check_area_of, farthest_goal, outside, unreachable
 from fulmar_core.safety.input_gate import InputGate, Measurement
@@ -65,6 +65,7 @@ class GuardedLoop:
         acted: Control steps with a command of the controller's own since the activation.
         refusal: Why the newest goal does not count: it is invalid or out of bounds, or the e-stop refused it or took it
             away.
+        too_far: Likewise, of a goal beyond the geofence, with its first distance.
     """
 
     def __init__(
@@ -103,7 +104,8 @@ class GuardedLoop:
         self.readings: Readings = {}
         self._newest_state: State  # of `newest`, shapes (1,)
         self.acted = 0
-        self.refusal = Refusal()
+        self.refusal = self.too_far = Refusal()
+        self._followed = 0  # the number of the newest goal on which the controller acted
         self._settings, self._estop = settings, estop
         self._control_ns = round(1e9 / settings.control_rate(robot))
         self._flags = replace(settings.flags(robot), configured=True)
@@ -349,7 +351,19 @@ class GuardedLoop:
             self._follow_mission()
             self._change(outside=self._outside(), unconverged="")
         self._change(estop=stopped, active_s=self.acted * self._control_ns / 1e9)
-        return arbitrate(self._flags, now_ns)
+        decision = arbitrate(self._flags, now_ns)
+        self._heed_distance(decision)
+        return decision
+
+    def _heed_distance(self, decision: Decision) -> None:
+        """Report a goal that lies beyond the geofence; not one that was followed before the robot was carried away."""
+        number, stamp_ns = self.mission.goals_received, self.mission.goal_stamp_ns
+        if decision.may_act:
+            self._followed = number
+        if BEYOND_GEOFENCE not in decision.reason or number == self._followed:
+            self.too_far = Refusal()
+        elif self.too_far.stamp_ns != stamp_ns or not self.too_far.reason:
+            self.too_far = Refusal(stamp_ns, decision.reason)
 
     def _follow_mission(self, **changes: object) -> None:
         """Let the flags say what the mission lacks, and how far its goal is away."""
