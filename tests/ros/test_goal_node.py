@@ -422,7 +422,9 @@ def test_a_simulated_platform_goes_where_the_command_states_it(
     tmp_path, neighbour: Neighbour, plant: Any, controller: Any, ros_domain: RosDomain
 ) -> None:
     """`fulmar goals` in a process of its own, with a plant and an LQR that go to poses."""
-    neighbour.withdraw_command()  # a plant obeys no two nodes
+    neighbour.withdraw_command()  # of each wire only one node may publish
+    neighbour.withdraw_odometry()
+    neighbour.node.destroy_publisher(neighbour.bearing)
     (tmp_path / "near.yaml").write_text("kind: poses\ntitle: near\nposes: [[0.3, 0.0, 0.0]]\n")
     command = start_fulmar(
         "goals", "near.yaml", "--robot", "floating_platform", env=ros_domain.env, cwd=tmp_path
