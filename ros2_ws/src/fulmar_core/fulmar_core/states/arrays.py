@@ -7,8 +7,10 @@ from typing import Any
 import array_api_compat
 import numpy as np
 
-# Of each kind of array that was met; plain numbers are NumPy's.
-_NAMESPACES: dict[type, Any] = {float: array_api_compat.array_namespace(np.float64(0.0))}
+from fulmar_core.states import plain_numbers
+
+# Of each kind of array that was met.
+_NAMESPACES: dict[type, Any] = {float: plain_numbers}
 FEW = 8  # robots side by side up to which copying an array twice costs less than `stack`
 
 
@@ -25,6 +27,11 @@ def is_numpy(array: Any) -> bool:
     return isinstance(array, (np.ndarray, np.generic))
 
 
+def is_number(value: Any) -> bool:
+    """Whether it is a plain number, as of one robot, and no array or number of NumPy's."""
+    return type(value) is float
+
+
 def side_by_side(*parts: Any) -> Any:
     """Arrays of one shape along a new last axis, in C order; of one robot at an eighth of the cost of `stack`."""
     first = parts[0]
@@ -36,7 +43,12 @@ def side_by_side(*parts: Any) -> Any:
 
 def clip(x: Any, low: Any, high: Any) -> Any:
     """Values cut to [low, high]; None leaves an end open. A tenth of the wrapped function's cost on short arrays."""
-    return x.clip(low, high)
+    return plain_numbers.clip(x, low, high) if is_number(x) else x.clip(low, high)
+
+
+def power(x: Any, exponent: float) -> Any:
+    """Numbers to some power, with the bits of an array for plain ones, whose operator is another function."""
+    return plain_numbers.pow(x, exponent) if is_number(x) else x**exponent
 
 
 def sum_of(parts: list[Any]) -> Any:

@@ -133,6 +133,14 @@ class State(ABC):
         """The state with every array changed."""
         return type(self)(*map(change, self.columns()))
 
+    def in_numbers(self) -> Self:
+        """The same of a batch of one, shapes (1,), in plain numbers, of which arrays of one cost ten times as much."""
+        return self.mapped(_number)
+
+    def in_arrays(self) -> Self:
+        """The same of plain numbers as a batch of one, shapes (1,)."""
+        return self.mapped(_array)
+
     def write(self, index: Any, other: Self) -> None:
         """Overwrite some worlds of a batch in place, as a reset does."""
         for mine, theirs in zip(self.columns(), other.columns(), strict=True):
@@ -158,6 +166,14 @@ class State(ABC):
     def unknown(cls) -> Self:
         """State of one robot of which nothing is known: NaN, shapes (1,)."""
         return cls(*(np.full(1, np.nan) for _ in cls.COLUMNS))
+
+
+def _number(values: np.ndarray) -> float:
+    return float(values[0])
+
+
+def _array(number: float) -> np.ndarray:
+    return np.array([number])
 
 
 def _float64(values: Any) -> np.ndarray:

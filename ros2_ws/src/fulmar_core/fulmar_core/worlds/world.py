@@ -80,6 +80,10 @@ class Drawn:
         assert self._packing is not None and other._packing is not None
         self._packing[0][..., index] = other._packing[0][..., index]
 
+    def in_numbers(self) -> Self:
+        """The same of one world, shapes (1,) and (k, 1), in plain numbers and lists of them."""
+        return self.mapped(lambda part: part[..., 0].tolist())
+
     def mapped(self, change: Callable[[Array], Array]) -> Self:
         """The same with every array changed; not packed."""
         return type(self)(*map(change, self.parts()))

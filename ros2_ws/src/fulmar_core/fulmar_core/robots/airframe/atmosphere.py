@@ -5,6 +5,7 @@ International Standard Atmosphere, troposphere (ISO 2533:1975): T = T0 − L h, 
 
 from __future__ import annotations
 
+from fulmar_core.states.arrays import power
 from fulmar_core.states.rotation import Array
 
 SEA_LEVEL = 1.225  # density [kg/m³]
@@ -15,4 +16,4 @@ TOP = 11_000.0  # of the troposphere [m]
 
 def air_density(altitude: Array | float) -> Array:
     """Density at an altitude above mean sea level, from below it up to `TOP` [kg/m³]."""
-    return SEA_LEVEL * (1.0 - LAPSE * altitude) ** EXPONENT
+    return SEA_LEVEL * power(1.0 - LAPSE * altitude, EXPONENT)
