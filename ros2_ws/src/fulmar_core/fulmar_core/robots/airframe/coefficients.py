@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from fulmar_core.config.errors import did_you_mean
-from fulmar_core.states.arrays import clip, is_numpy
+from fulmar_core.states.arrays import clip, is_number, is_numpy
 from fulmar_core.states.rotation import Array
 
 NAMES = ("CL", "CD", "CY", "Cl", "Cm", "Cn")
@@ -120,8 +120,8 @@ class Coefficients:
             low, high = (end - self.alpha_zero for end in self.alpha_range)
             own["alpha"] = clip(alpha, low, high)
             beyond = alpha - own["alpha"]
-            if is_numpy(beyond) and not beyond.any():  # what is traced has no numbers yet
-                beyond = None
+            if beyond == 0.0 if is_number(beyond) else is_numpy(beyond) and not beyond.any():
+                beyond = None  # but what is traced has no numbers yet
         plans: tuple[_Plan, _Plan] = self._plans  # type: ignore[attr-defined]
         inside, outside = plans
         found = inside.sums(own, alpha) if beyond is None else outside.sums(own, alpha, beyond)
@@ -172,15 +172,16 @@ class _Plan:
         """
         products: list[Any] = [1.0]
         for shorter, name in self._steps:
-            value = own.get(name, 0.0)
+            value = own[name] if name in own else 0.0
             products.append(products[shorter] * value if shorter else value)
         sums = {}
         for name, terms in self._terms.items():
             found = 0.0 * alpha
             for number, product, slopes in terms:
                 found = found + number * products[product]
-                for slope, rest in slopes:
-                    found = found + beyond * slope * products[rest]
+                if slopes:
+                    for slope, rest in slopes:
+                        found = found + beyond * slope * products[rest]
             sums[name] = found
         return sums
 
