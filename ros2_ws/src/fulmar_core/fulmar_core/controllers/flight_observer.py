@@ -19,6 +19,7 @@ from fulmar_core.dynamics.flight_dynamics import FlightDynamics
 from fulmar_core.dynamics.flight_schedule import MOTION, RATE, SPEED, flight_model
 from fulmar_core.dynamics.flight_trim import find_trim, still_air
 from fulmar_core.robots.robot import Robot
+from fulmar_core.states.arrays import array_namespace
 from fulmar_core.states.attitude import (
     euler_of,
     exponential,
@@ -81,25 +82,30 @@ class FlightObserver:
 
     def reset(self) -> None:
         """Forget the past."""
-        self._state: SpatialState | None = None
+        self._state: SpatialState | None = None  # of one craft in plain numbers
 
     def update(self, measured: SpatialState, previous: np.ndarray) -> SpatialState:
         """See `StateObserver.update`."""
-        if self._state is None or len(self._state.x) != len(measured.x):
-            self._state = measured
-            self._world: Any = still_air(self._robot, len(measured.x))
+        count = len(measured.x)
+        now = measured.in_numbers() if count == 1 else measured
+        if self._state is None or count != self._count:
+            self._state, self._count = now, count
+            self._world: Any = still_air(self._robot, count)
+            self._air = self._world.in_numbers() if count == 1 else self._world
             self._actuation = actuation_of(self._robot, previous.T.copy())
             return measured
         self._actuation.begin(previous.T, self._world, None)
+        nothing: Any = 0.0 if count == 1 else np.zeros(count)
         ahead = self._dynamics.move(
-            self._state, self._actuation, self._world, (np.zeros(len(measured.x)),) * 3, Steps(self._substeps)
+            self._state, self._actuation, self._air, (nothing,) * 3, Steps(self._substeps)
         )
-        self._state = self._corrected(ahead, measured)
-        return self._state
+        self._state = self._corrected(ahead, now)
+        return self._state.in_arrays() if count == 1 else self._state
 
     def _corrected(self, ahead: SpatialState, measured: SpatialState) -> SpatialState:
         heading = euler_of(ahead.quat)[2] if self._any_heading else 0.0 * ahead.x
-        c, s = np.cos(heading), np.sin(heading)
+        xp = array_namespace(heading)
+        c, s = xp.cos(heading), xp.sin(heading)
         away, velocity = (
             (c * v[0] + s * v[1], c * v[1] - s * v[0], v[2])
             for v in (
@@ -109,7 +115,7 @@ class FlightObserver:
         )
         turned = rotation_error(ahead.quat, measured.quat)
         off = np.stack((*away[1:], *turned, *velocity, *minus(measured.rate, ahead.rate)))
-        step = self._gain @ off
+        step: Any = (self._gain @ off[:, None])[:, 0].tolist() if off.ndim == 1 else self._gain @ off
         # Along x the filter of the other places holds.
         place = float(self._gain[0, 0]) * away[0], step[0], step[1]
         moved, faster = (

@@ -19,7 +19,7 @@ from fulmar_core.robots.airframe.atmosphere import air_density
 from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.sensors.air_data import NAME as AIR
 from fulmar_core.robots.sensors.air_data import AirData, AirDataSpec
-from fulmar_core.states.arrays import array_namespace
+from fulmar_core.states.arrays import array_namespace, is_number
 from fulmar_core.states.attitude import (
     Vector,
     cross,
@@ -92,13 +92,18 @@ class FlightDynamics(SpatialDynamics):
     def move(
         self, state: SpatialState, actuation: ActuationState, world: SpatialWorld, outside: Push, steps: Steps
     ) -> SpatialState:
-        """See `Dynamics.move`; a file's centre of mass is the body's origin."""
+        """See `Dynamics.move`; a file's centre of mass is the body's origin.
+
+        State and world of one craft without turbulence may be plain numbers.
+        """
         assert isinstance(world, FlightWorld)
         dt = self.robot.timing.physics_dt
         inertia = inertia_of(tuple(world.inertia)[: 6 if self._full else 3])
         push: Vector = (outside[0], outside[1], outside[2])
         for _ in range(steps.count):
             applied = actuation.advance(dt, latest_s=steps.latest_s) * actuation.gain
+            if is_number(state.x):
+                applied = applied[:, 0].tolist()
             gust = self.gust(state, actuation, world, dt)
             state = self.where_it_flies(state, self._step(state, applied, gust, world, inertia, push, dt))
         return state
@@ -106,6 +111,8 @@ class FlightDynamics(SpatialDynamics):
     def where_it_flies(self, before: SpatialState, after: SpatialState) -> SpatialState:
         """The state after a step, or, of a craft that flies no longer, where it was, at rest."""
         xp, flying = array_namespace(after.x), self.is_aloft(after)
+        if is_number(after.x):
+            return after if flying else before.stopped()
         stopped = before.stopped()
         columns = zip(after.columns(), stopped.columns(), strict=True)
         return SpatialState(*(xp.where(flying, new, old) for new, old in columns))
@@ -169,11 +176,12 @@ class FlightDynamics(SpatialDynamics):
         return {AIR: self.air_data(state, gust, world), **actuation.truths()}
 
     def air_data(self, state: SpatialState, gust: Gust | None, world: FlightWorld) -> AirData:
-        """What air probes without errors measure, of a batch of one."""
-        u, v, w = (float(part[0]) for part in self.through_the_air(state, gust, world))
+        """What air probes without errors measure, of a batch of one or in plain numbers."""
+        parts = *self.through_the_air(state, gust, world), state.z
+        u, v, w, height = (part if is_number(part) else float(part[0]) for part in parts)
         speed = math.sqrt(u * u + v * v + w * w)
         side = math.asin(v / speed) if speed else 0.0
-        return AirData(AirDataSpec.NAMES, np.array([speed, math.atan2(w, u), side, float(state.z[0])]))
+        return AirData(AirDataSpec.NAMES, np.array([speed, math.atan2(w, u), side, height]))
 
     @staticmethod
     def density(state: SpatialState, world: FlightWorld) -> Array:
