@@ -11,6 +11,8 @@ from fulmar_core.dynamics.actuators.actuation import ActuationState
 from fulmar_core.dynamics.flight_dynamics import FlightDynamics
 from fulmar_core.dynamics.rigid_body import inertia_of
 from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.sensors.air_data import NAME as AIR
+from fulmar_core.states.attitude import plus
 from fulmar_core.states.gravity import GRAVITY
 from fulmar_core.states.spatial import SpatialState
 from fulmar_core.worlds.turbulence import Gust
@@ -57,39 +59,43 @@ class Aircraft(FreeBody):
     def fly_in(self, world: Any, actuation: ActuationState) -> None:
         """Take the air of an episode, a `FlightWorld`, and what remembers its gusts, each of a batch of one."""
         self._world, self._actuation = world, actuation
-        self._inertia = inertia_of(tuple(world.inertia))
+        self._air, self._turbulent = world.in_numbers(), bool(world.turbulence.any())
+        self._inertia = inertia_of(tuple(self._air.inertia))
         self._tick, self._gust = -1, None
 
     def own_truth(self, data: mujoco.MjData) -> dict[str, Any]:
-        """What air probes and servos would measure without errors."""
-        assert self._actuation is not None  # as in `fly_in`
-        return self._dynamics.truths(self._state(data), self._actuation, self._world, self._gust)
+        """What air probes would measure without errors."""
+        return {AIR: self._dynamics.air_data(self._state(data), self._gust, self._air)}
 
     def drive(
         self, model: mujoco.MjModel, data: mujoco.MjData, applied: np.ndarray, gain: np.ndarray, outside: Any
     ) -> None:
         """Set the forces of the coming step; see `RobotModel.drive`. What flies no longer stops there."""
-        assert self._actuation is not None  # as in `fly_in`
-        state, dt = self._state(data), self._robot.timing.physics_dt
-        if not self._dynamics.is_aloft(state)[0]:
+        state = self._state(data)
+        if not self._dynamics.is_aloft(state):
             data.qvel[:] = 0.0
             data.xfrc_applied[self._body] = 0.0, 0.0, model.body_mass[self._body] * GRAVITY, 0.0, 0.0, 0.0
             return
         tick = round(data.time / model.opt.timestep) // STEPS
         if tick != self._tick:
-            self._tick, self._gust = tick, self._dynamics.gust(state, self._actuation, self._world, dt)
-        force, torque = self._dynamics.wrench(
-            state, (applied * gain)[:, None], self._gust, self._world, self._inertia
-        )
+            self._tick, self._gust = tick, self._blown(state)
+        applied_now = (applied * gain).tolist()
+        force, torque = self._dynamics.wrench(state, applied_now, self._gust, self._air, self._inertia)
         push, turn = np.empty(3), np.empty(3)
-        mujoco.mju_rotVecQuat(push, np.array([float(part[0]) for part in force]), data.qpos[3:7])
-        steady = np.asarray(self._world.torque, dtype=float)[:, 0]
-        mujoco.mju_rotVecQuat(turn, np.array([float(part[0]) for part in torque]) + steady, data.qpos[3:7])
+        mujoco.mju_rotVecQuat(push, np.array(force), data.qpos[3:7])
+        mujoco.mju_rotVecQuat(turn, np.array(plus(torque, tuple(self._air.torque))), data.qpos[3:7])
         data.xfrc_applied[self._body] = *(push + outside[:3]), *turn
 
+    def _blown(self, state: SpatialState) -> Gust | None:
+        """The gust of a tick in plain numbers; None in calm air, where it is nothing."""
+        assert self._actuation is not None  # as in `fly_in`
+        if not self._turbulent:
+            return None
+        dt = self._robot.timing.physics_dt
+        gust = self._dynamics.gust(state.in_arrays(), self._actuation, self._world, dt)
+        return None if gust is None else tuple(float(part[0]) for part in gust)  # type: ignore[return-value]
+
     def _state(self, data: mujoco.MjData) -> SpatialState:
-        """Of a batch of one."""
-        x, y, z = data.qpos[:3]
-        w, qx, qy, qz = data.qpos[3:7]
-        columns = (x, y, z, qx, qy, qz, w, *data.qvel[:6])
-        return SpatialState(*(np.array([float(value)]) for value in columns))
+        """In plain numbers."""
+        x, y, z, w, qx, qy, qz = data.qpos[:7].tolist()
+        return SpatialState(x, y, z, qx, qy, qz, w, *data.qvel[:6].tolist())
