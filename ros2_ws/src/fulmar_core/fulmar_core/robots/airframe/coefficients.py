@@ -172,7 +172,7 @@ class _Plan:
         """
         products: list[Any] = [1.0]
         for shorter, name in self._steps:
-            value = own[name] if name in own else 0.0
+            value = own.get(name, 0.0)
             products.append(products[shorter] * value if shorter else value)
         sums = {}
         for name, terms in self._terms.items():
