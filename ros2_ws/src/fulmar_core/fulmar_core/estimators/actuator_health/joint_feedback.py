@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from operator import itemgetter
 
 import numpy as np
 
@@ -78,7 +79,7 @@ class SurfaceFeedback:
             return
         self._seen.append((seconds, positions))
         _keep(self._seen, STANDS_S)
-        recent = np.stack([modelled for _, modelled in self._recent])
+        recent = np.array([modelled for _, modelled in self._recent])
         low, high = recent.min(axis=0), recent.max(axis=0)
         low = np.minimum(low, (1.0 - GAIN) * low) - self._off
         high = np.maximum(high, (1.0 - GAIN) * high) + self._off
@@ -89,6 +90,8 @@ class SurfaceFeedback:
         self._note()
 
     def _note(self) -> None:
+        if not self._found and self._off_s.max() <= OFF_S:
+            return
         seen = np.stack([positions for _, positions in self._seen])
         span = seen.max(axis=0) - seen.min(axis=0)
         for i, name in enumerate(self.names):
@@ -178,5 +181,5 @@ class ReactionWheelFeedback:
 
 def _keep(recent: deque[tuple[float, np.ndarray]], window_s: float) -> None:
     """Forget what is older than a window [s], but for the newest."""
-    while len(recent) > 1 and sum(seconds for seconds, _ in recent) - recent[0][0] > window_s:
+    while len(recent) > 1 and sum(map(itemgetter(0), recent)) - recent[0][0] > window_s:
         recent.popleft()
