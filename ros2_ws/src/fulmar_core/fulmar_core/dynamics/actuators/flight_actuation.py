@@ -11,7 +11,7 @@ from array_api_compat import device
 from fulmar_core.dynamics.actuators.actuation import ActuationState
 from fulmar_core.robots.actuators.control_surfaces import ControlSurfaces
 from fulmar_core.robots.sensors.surfaces import NAME, SurfacePositions
-from fulmar_core.states.arrays import array_namespace, clip
+from fulmar_core.states.arrays import array_namespace, clip, is_single
 from fulmar_core.states.rotation import Array
 from fulmar_core.worlds.turbulence import FILTERS, Gust, gust_step
 
@@ -42,7 +42,8 @@ class FlightActuation(ActuationState):
         self._most = xp.asarray(actuators.scale[: self._count, None], **self._kwargs)
         fastest = np.where(np.isfinite(actuators.rates), actuators.rates, 1e6)
         self._fastest = xp.asarray(fastest[:, None], **self._kwargs)
-        self._servo: dict[float, np.ndarray] = {}
+        self._limits = fastest.tolist(), actuators.scale[: self._count].tolist()
+        self._servo: dict[float, tuple[float, ...]] = {}
 
     def truths(self) -> dict[str, Any]:
         """Where surfaces and throttles are; see `ActuationState.truths`."""
@@ -60,23 +61,32 @@ class FlightActuation(ActuationState):
             Deflections and thrust levels in the middle of the step, shape (n, worlds).
         """
         target = self._target(dt, latest_s=latest_s)
-        xp, count = array_namespace(target), self._count
+        xp, count, before = array_namespace(target), self._count, self.applied
         if dt not in self._servo:
-            self._servo[dt] = self._actuators.servo_matrix(dt)
-        matrix = self._servo[dt]
-        before, off = self.applied, self.applied[:count] - target[:count]
-        place = target[:count] + float(matrix[0, 0]) * off + float(matrix[0, 1]) * self.servo_rates
-        rate = float(matrix[1, 0]) * off + float(matrix[1, 1]) * self.servo_rates
-        rate = clip(rate, -self._fastest, self._fastest)
-        place = clip(place, before[:count] - dt * self._fastest, before[:count] + dt * self._fastest)
-        stopped = clip(place, -self._most, self._most)
-        self.servo_rates = xp.where(stopped == place, rate, xp.zeros_like(rate))
+            self._servo[dt] = tuple(self._actuators.servo_matrix(dt).ravel().tolist())
+        servo = self._servo[dt]
+        if is_single(target[0]):
+            now, wanted = before[:, 0].tolist(), target[:, 0].tolist()
+            own = zip(now, wanted, self.servo_rates[:, 0].tolist(), *self._limits, strict=False)
+            moved = [_turned(*each, servo, dt) for each in own]
+            self.servo_rates = np.array([[rate] for _, rate in moved]).reshape(count, 1)
+            levels = self._levels(now, wanted, dt)
+            self.applied = np.array([*(place for place, _ in moved), *levels])[:, None]
+        else:
+            place, self.servo_rates = _turned(
+                before[:count], target[:count], self.servo_rates, self._fastest, self._most, servo, dt
+            )
+            levels = self._levels(before, target, dt)
+            self.applied = xp.concat((place, xp.stack(levels))) if levels else place
+        return 0.5 * (before + self.applied)
+
+    def _levels(self, before: Any, target: Any, dt: float) -> list[Any]:
+        """Thrust levels of the motors after a time step, of what all actuators did and are to do."""
         levels = []
-        for i, motor in enumerate(self._actuators.motors, start=count):
+        for i, motor in enumerate(self._actuators.motors, start=self._count):
             keep = math.exp(-dt / motor.lag_s) if motor.lag_s > 0.0 else 0.0
             levels.append(target[i] + keep * (before[i] - target[i]))
-        self.applied = xp.concat((stopped, xp.stack(levels))) if levels else stopped
-        return 0.5 * (before + self.applied)
+        return levels
 
     def blow(
         self, keys: Array, wind: Array, *, airspeed: Array, height: Array, span: float, dt: float
@@ -87,3 +97,16 @@ class FlightActuation(ActuationState):
         )
         self.gust_steps = self.gust_steps + 1
         return gust
+
+
+def _turned(
+    before: Any, target: Any, rate: Any, fastest: Any, most: Any, servo: tuple[float, ...], dt: float
+) -> tuple[Any, Any]:
+    """Where surfaces are after a time step, and how fast they move; of arrays, or of one surface in plain numbers."""
+    off = before - target
+    place = target + servo[0] * off + servo[1] * rate
+    rate = clip(servo[2] * off + servo[3] * rate, -fastest, fastest)
+    place = clip(place, before - dt * fastest, before + dt * fastest)
+    stopped = clip(place, -most, most)
+    xp = array_namespace(rate)
+    return stopped, xp.where(stopped == place, rate, xp.zeros_like(rate))

@@ -20,7 +20,7 @@ from fulmar_core.robots.actuators.response import Response
 from fulmar_core.robots.airframe.coefficients import SURFACES
 from fulmar_core.robots.airframe.plausible_airframe import AIRCRAFT, derivative_ranges
 from fulmar_core.robots.airframe.propulsion import ElectricMotor, PistonEngine
-from fulmar_core.states.arrays import array_namespace, clip
+from fulmar_core.states.arrays import array_namespace, clip, is_numpy
 from fulmar_core.states.rotation import Array
 
 Vector3 = tuple[float, float, float]
@@ -104,7 +104,7 @@ class ControlSurfaces(Actuators):
         """Deflections, and shares of full throttle; see `Actuators.units`."""
         return ("rad",) * self.positions + ("of full throttle",) * (len(self.names) - self.positions)
 
-    @property
+    @functools.cached_property
     def names(self) -> tuple[str, ...]:
         """Names of the surfaces, then those of the throttles."""
         return (*(surface.name for surface in self.surfaces), *(motor.name for motor in self.motors))
@@ -124,7 +124,7 @@ class ControlSurfaces(Actuators):
         """Largest deflection [rad] or throttle of each, shape (n,)."""
         return np.array([math.radians(s.limit_deg) for s in self.surfaces] + [1.0] * len(self.motors))
 
-    @property
+    @functools.cached_property
     def lowest(self) -> np.ndarray:
         """Smallest command of each, shape (n,)."""
         low = -self.scale
@@ -138,6 +138,8 @@ class ControlSurfaces(Actuators):
 
     def limited(self, command: Array) -> Array:
         """Nearest command that the hardware can carry out, shape (..., n)."""
+        if is_numpy(command) and command.dtype == np.float64:
+            return command.clip(self.lowest, self.scale)
         xp, kwargs = array_namespace(command), {"dtype": command.dtype, "device": device(command)}
         return clip(command, xp.asarray(self.lowest, **kwargs), xp.asarray(self.scale, **kwargs))
 
