@@ -12,7 +12,7 @@ import numpy as np
 from fulmar_core.dynamics.flight_trim import nominal_flight
 from fulmar_core.robots.kinds.aircraft import AIRCRAFT
 from fulmar_core.robots.robot import Robot
-from fulmar_core.states.arrays import array_namespace, clip
+from fulmar_core.states.arrays import array_namespace, clip, is_single
 from fulmar_core.states.attitude import euler_of, exponential, length, product, scaled, uniform_direction
 from fulmar_core.states.counter_rng import Draws
 from fulmar_core.states.rotation import Array
@@ -181,6 +181,8 @@ class FollowReference(FileTask[SpatialState]):
         here = targets[..., 0, :]
         zero = 0.0 * here[..., 0]
         time = time_s + zero
+        if last and is_single(time):
+            return self._of_one(targets[0], float(time[0]))
         if last == 0:
             return xp.stack((time, *(here[..., i] for i in range(3)), zero, zero, zero), axis=-1)
         share = clip(time / self.spacing_s, 0.0, float(last))
@@ -192,6 +194,17 @@ class FollowReference(FileTask[SpatialState]):
         place = (low[..., i] + part * (high[..., i] - low[..., i]) for i in range(3))
         rate = (going * (high[..., i] - low[..., i]) / self.spacing_s for i in range(3))
         return xp.stack((time, *place, *rate), axis=-1)
+
+    def _of_one(self, targets: np.ndarray, time: float) -> np.ndarray:
+        """As `_now`, of one craft that follows two places or more, shape (1, 7)."""
+        last = len(targets) - 1
+        share = clip(time / self.spacing_s, 0.0, float(last))
+        before = clip(float(math.floor(share + 1e-6)), 0.0, last - 1.0)
+        ends = targets[int(before) : int(before) + 2, :3].tolist()
+        part, going = share - before, 1.0 if time < last * self.spacing_s else 0.0
+        place = [low + part * (high - low) for low, high in zip(*ends, strict=True)]
+        rate = [going * (high - low) / self.spacing_s for low, high in zip(*ends, strict=True)]
+        return np.array([[time, *place, *rate]])
 
     def advance(self, goal: Goal, state: SpatialState, time_s: Array) -> Goal:
         """The reference moves on; see `Task.advance`."""
@@ -214,17 +227,21 @@ class FollowReference(FileTask[SpatialState]):
 
         Angles of attack and sideslip are against still air.
         """
-        side, above = off_reference(state, goal)
-        now = reference_of(goal)
-        climb, drift = now[..., 6] - state.vz, now[..., 5] - state.vy
+        now, wanted = reference_of(goal), self.speed_of(goal)
+        _, _, y, z, _, rate_y, rate_z = (now[..., i] for i in range(7))
+        if is_single(state.x):
+            state, wanted = state.in_numbers(), float(wanted[0])
+            _, _, y, z, _, rate_y, rate_z = now[0].tolist()
+        side, above = y - state.y, z - state.z
+        climb, drift = rate_z - state.vz, rate_y - state.vy
         left = state.velocity_in_body[1]
         roll, pitch, yaw = euler_of(state.quat)
         speed = length(state.velocity)
         return (
             clip(above / COARSE, -3.0, 3.0), clip(above / FINE, -1.0, 1.0), clip(above / FINEST, -1.0, 1.0),
             clip(side / COARSE, -3.0, 3.0), clip(side / FINE, -1.0, 1.0),
-            climb / FAST, drift / FAST, now[..., 6] / FAST, now[..., 5] / FAST, 0.2 * now[..., 3],
-            0.1 * (self.speed_of(goal) - speed), 10.0 * angle_of_attack(state), 10.0 * left / clip(speed, 1.0, None),
+            climb / FAST, drift / FAST, rate_z / FAST, rate_y / FAST, 0.2 * z,
+            0.1 * (wanted - speed), 10.0 * angle_of_attack(state), 10.0 * left / clip(speed, 1.0, None),
             2.0 * roll, 5.0 * pitch, 5.0 * yaw, *(rate / QUICK for rate in state.rate),
         )  # fmt: skip
 

@@ -6,7 +6,7 @@ import numpy as np
 from array_api_compat import device
 
 from fulmar_core.robots.robot import Robot
-from fulmar_core.states.arrays import array_namespace, clip, is_numpy
+from fulmar_core.states.arrays import array_namespace, clip, is_number, is_numpy
 from fulmar_core.states.rotation import Array
 from fulmar_core.states.state import State
 from fulmar_core.tasks import Task
@@ -39,6 +39,9 @@ class Observer:
             Terms in the order of `names`, shape (..., n).
         """
         terms = self._task.observe(state, goal)
+        if is_number(terms[0]):  # of one robot
+            own = shares(previous_command, self._scale)[0].tolist() if self._remembers else ()
+            return np.array([[*terms, *own]])
         xp = array_namespace(state.like)
         shape, place = state.like.shape, device(state.like)
         columns = [
