@@ -9,6 +9,7 @@ from fulmar_core.controllers.flight_law import FlightLaw
 from fulmar_core.controllers.flight_observer import ObserverNoise
 from fulmar_core.controllers.flight_reference import Aim, SmoothReference
 from fulmar_core.dynamics.flight_schedule import Schedule
+from fulmar_core.states.arrays import array_namespace, is_single, side_by_side
 from fulmar_core.states.attitude import from_euler, product, rotation_error
 from fulmar_core.states.gravity import GRAVITY
 from fulmar_core.states.spatial import SpatialState
@@ -51,10 +52,14 @@ class FlightFollowing(FlightLaw):
 
         A climb takes pitch, a drift heading, and a bend bank.
         """
-        (drift, climb), bend, speed = aim.rate.T, aim.bend, self._speed
-        heading, rise, bank = np.arctan2(drift, speed), -climb / speed, -bend[:, 0] / GRAVITY
-        aimed = product(from_euler(bank, rise, heading), tuple(schedule.quat(state.z).T))
+        (drift, climb), (aside, up), quat = aim.rate.T, aim.bend.T, schedule.quat(state.z).T
+        if is_single(state.x):
+            state, quat = state.in_numbers(), quat[:, 0].tolist()
+            drift, climb, aside, up = (float(part[0]) for part in (drift, climb, aside, up))
+        speed = self._speed
+        heading, rise, bank = array_namespace(drift).atan2(drift, speed), -climb / speed, -aside / GRAVITY
+        aimed = product(from_euler(bank, rise, heading), tuple(quat))
         turned = rotation_error(aimed, state.quat)
         velocity = state.vx - speed, state.vy - drift, state.vz - climb
-        rates = state.wx, state.wy + bend[:, 1] / speed, state.wz - bend[:, 0] / speed
-        return np.stack((*turned, *velocity, *rates), axis=-1)
+        rates = state.wx, state.wy + up / speed, state.wz - aside / speed
+        return side_by_side(*turned, *velocity, *rates).reshape(len(aim.rate), -1)

@@ -19,6 +19,7 @@ from fulmar_core.controllers.flight_servos import FlightServos
 from fulmar_core.controllers.lqr import regulator
 from fulmar_core.dynamics.flight_schedule import FlightModel, Schedule
 from fulmar_core.robots.robot import Robot
+from fulmar_core.states.arrays import clip, side_by_side
 from fulmar_core.states.spatial import SpatialState
 
 
@@ -175,7 +176,7 @@ class FlightLqi(FlightFollowing):
     def _departures(self, state: SpatialState, aim: Aim, servos: np.ndarray, level: np.ndarray) -> np.ndarray:
         """Departures from level flight along an aim, those of the place cut, shape (n, k)."""
         limit = self.gains.error_limit
-        off = np.clip(np.stack((state.y, state.z), axis=-1) - aim.place, -limit, limit)
+        off = clip(side_by_side(state.y, state.z) - aim.place, -limit, limit)
         parts = off, self.motion(self.schedule, state, aim), self._servos.departures(servos, level)
         return np.concatenate(parts, axis=-1)
 

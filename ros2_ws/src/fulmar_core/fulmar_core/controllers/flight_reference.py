@@ -49,11 +49,7 @@ class SmoothReference:
         if targets.shape[-2] == 1:
             still = np.zeros((len(now), 2))
             return [Aim(now[:, 2:4], now[:, 5:7], still)] * len(times_s)
-        if (
-            self._targets is None
-            or self._targets.shape != targets.shape
-            or not np.array_equal(self._targets, targets)
-        ):
+        if self._targets is None or self._targets.shape != targets.shape or (self._targets != targets).any():
             self._targets = targets.copy()
             self._paths = self._smoothed(targets[..., 1:3])
         last, each, found = self._paths[0].shape[1] - 1, np.arange(len(now)), []

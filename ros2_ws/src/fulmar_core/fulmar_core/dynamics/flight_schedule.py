@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -11,6 +12,7 @@ from fulmar_core.dynamics.flight_modes import continuous_model
 from fulmar_core.dynamics.flight_trim import Trim, find_trim
 from fulmar_core.robots.actuators.control_surfaces import ControlSurfaces
 from fulmar_core.robots.robot import Robot
+from fulmar_core.states.arrays import clip, is_single
 from fulmar_core.states.attitude import turn
 
 # Where trims are solved, of the span; from the last one on it is nearly free air [-].
@@ -117,6 +119,11 @@ def between(values: np.ndarray, places: np.ndarray, at: np.ndarray) -> np.ndarra
     """Values at ascending places, at other ones (n,): linear between them, held beyond, shape (n, ...)."""
     if len(places) == 1:
         return np.repeat(values, len(at), axis=0)
+    if is_single(at):
+        inside_of = clip(at.item(), float(places[0]), float(places[-1]))
+        first = min(max(bisect_right(places, inside_of) - 1, 0), len(places) - 2)
+        part = float((inside_of - places[first]) / (places[first + 1] - places[first]))
+        return np.asarray((1.0 - part) * values[first] + part * values[first + 1])[None]
     inside = np.clip(at, places[0], places[-1])
     low = np.clip(np.searchsorted(places, inside, side="right") - 1, 0, len(places) - 2)
     share = (inside - places[low]) / (places[low + 1] - places[low])
