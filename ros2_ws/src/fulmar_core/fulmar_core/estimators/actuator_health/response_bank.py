@@ -10,9 +10,10 @@ of a constant push and of shares that are not quite 1, is the prior of them all.
 from __future__ import annotations
 
 import functools
+import math
 from collections import deque
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Collection
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -50,6 +51,29 @@ class _Measured:
     rows: np.ndarray  # what each coefficient adds to each value, shape (m, c)
     values: np.ndarray  # shape (m,)
     std: np.ndarray  # shape (m,)
+    scaled: np.ndarray  # rows in standard deviations, shape (m, c)
+
+
+@dataclass(frozen=True, slots=True)
+class _Prior:
+    """What is believed of the coefficients before they are measured, a Gaussian, in the form that evidence takes."""
+
+    precision: np.ndarray  # shape (c, c)
+    weighed: np.ndarray  # the mean times that, shape (c,)
+    volume: float  # logarithm of the precision's determinant
+    square: float  # of the mean, in units of the covariance
+
+
+@dataclass(frozen=True, slots=True)
+class _Channel:
+    """One value over time, in its standard deviations."""
+
+    number: int
+    std: np.ndarray  # shape (t,)
+    rows: np.ndarray  # shape (t, c)
+    whiten: (
+        np.ndarray | None
+    )  # what makes the sums of its values independent, shape (t, t); None: they are not summed
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,7 +150,7 @@ class ResponseBank:
         self._jumps = deque([usual] * CALM, maxlen=JUMPS)
         self._variance, self._kicks = 1.0, 0.0  # of a value; of what adds up, in the measurements' own [-]
         self._deviations = np.zeros(0)
-        self._prior = self._mean, self._covariance
+        self._believe(self._mean, self._covariance)
         self._likeliest: tuple[int, ...] = ()
         self._lasts_s, self._doubtful = 0.0, False
         self.fault: tuple[int, ...] = ()
@@ -141,7 +165,7 @@ class ResponseBank:
             std: Standard deviation of each, or of what it is the change of, > 0, shape (m,).
         """
         self._take_noise((values - rows @ self._prior[0]) / std)
-        self._recent.append(_Measured(seconds, rows, values, std))
+        self._recent.append(_Measured(seconds, rows, values, std, rows / std[:, None]))
         length_s = sum(each.seconds for each in self._recent)
         while length_s > self._onsets_s[-1] + 1e-6 and len(self._recent) > 1:
             length_s -= self._recent[0].seconds
@@ -156,9 +180,9 @@ class ResponseBank:
         self._gone.append(gone)
         gone_s = sum(each.seconds for each in self._gone)
         if gone_s >= LEARNT_S:
-            keep, gone_by = np.exp(-gone_s / MEMORY_S), self._sums(self._gone)
+            keep, gone_by = np.exp(-gone_s / MEMORY_S), self._sums(self._channels(self._gone), self._gone)
             self._past = keep * self._past[0] + gone_by.matrix, keep * self._past[1] + gone_by.vector
-            self._prior = self._learned()
+            self._believe(*self._learned())
             self._gone.clear()
 
     def _take_noise(self, deviations: np.ndarray) -> None:
@@ -169,7 +193,7 @@ class ResponseBank:
         if len(deviations) == len(self._deviations):
             jumps = deviations - self._deviations
             self._jumps.append(float(jumps @ jumps) / len(jumps) / MEDIANS[min(len(jumps), 2) - 1])
-            self._take_variance(float(np.median(self._jumps)))
+            self._take_variance(_median(self._jumps))
         self._deviations = deviations
 
     def _take_variance(self, jumps: float) -> None:
@@ -202,14 +226,21 @@ class ResponseBank:
     def _gains(self) -> dict[tuple[int, ...], float]:
         """By how much, as a logarithm, faults of parts explain the newest seconds better than sound parts do."""
         gains: dict[tuple[int, ...], float] = {}
-        priors = [(fault, *self._under(fault)) for fault in self._faults]
+        asked: list[tuple[_Prior, _Sums]] = []
         for onset_s in self._onsets_s:
             since = self._since(onset_s)
-            usual = self._sums(since)
-            sound = _evidence(*self._prior, usual)
-            for fault, mean, covariance in priors:
-                sums = self._sums(self._without(since, fault.parts[0])) if fault.fades else usual
-                gain = _evidence(mean, covariance, sums) - sound
+            channels = self._channels(since)
+            usual = self._sums(channels, since)
+            asked.append((self._sound, usual))
+            asked += [
+                (prior, self._sums(channels, self._without(since, fault.parts[0])) if fault.fades else usual)
+                for fault, prior in zip(self._faults, self._faulty, strict=True)
+            ]
+        evidences = iter(_evidences(asked))
+        for _ in self._onsets_s:
+            sound = next(evidences)
+            for fault in self._faults:
+                gain = next(evidences) - sound
                 gains[fault.parts] = max(gains.get(fault.parts, -np.inf), gain - RARER * fault.stuck)
         return gains
 
@@ -230,20 +261,39 @@ class ResponseBank:
         for each in measured:
             faded = max(0.0, 1.0 - (past_s + 0.5 * each.seconds) / self._fades_s)
             does = faded * each.seconds / first.seconds * first.rows[: len(each.values), part]
-            left.append(_Measured(each.seconds, each.rows, each.values - does, each.std))
+            left.append(replace(each, values=each.values - does))
             past_s += each.seconds
         return left
 
-    def _sums(self, measured: list[_Measured]) -> _Sums:
-        """What measurements say of the coefficients."""
-        matrix, vector, squares = np.zeros_like(self._covariance), np.zeros_like(self._mean), 0.0
-        for rows, values in _channels(measured):
+    def _channels(self, measured: list[_Measured]) -> list[_Channel]:
+        """Each channel of measurements over time."""
+        found = []
+        for number in range(max(len(each.values) for each in measured)):
+            there = [each for each in measured if number < len(each.values)]
+            rows, whiten = np.array([each.scaled[number] for each in there]), None
             if self._adds_up:
-                whiten = _whitening(len(values), round(self._kicks, 1))
-                rows, values = whiten @ np.cumsum(rows, axis=0), whiten @ np.cumsum(values)
+                whiten = _whitening(len(there), round(self._kicks, 1))
+                rows = whiten @ rows.cumsum(axis=0)
+            found.append(_Channel(number, np.array([each.std[number] for each in there]), rows, whiten))
+        return found
+
+    def _sums(self, channels: list[_Channel], measured: list[_Measured]) -> _Sums:
+        """What measurements say of the coefficients; their channels have their rows."""
+        matrix, vector, squares = np.zeros_like(self._covariance), np.zeros_like(self._mean), 0.0
+        for each in channels:
+            there = [one.values[each.number] for one in measured if each.number < len(one.values)]
+            rows, values = each.rows, np.array(there) / each.std
+            if each.whiten is not None:
+                values = each.whiten @ values.cumsum()
             matrix, vector = matrix + rows.T @ rows, vector + rows.T @ values
             squares += float(values @ values)
         return _Sums(matrix / self._variance, vector / self._variance, squares / self._variance)
+
+    def _believe(self, mean: np.ndarray, covariance: np.ndarray) -> None:
+        """Take a prior of sound parts, and those of each fault that follow from it."""
+        self._prior = mean, covariance
+        self._sound = _prior(mean, covariance)
+        self._faulty = [_prior(*self._under(fault)) for fault in self._faults]
 
     def _learned(self) -> tuple[np.ndarray, np.ndarray]:
         """Mean and covariance of the coefficients of sound parts, with the pushes of the time before."""
@@ -279,19 +329,29 @@ def _whitening(count: int, kicks: float) -> np.ndarray:
     return np.asarray(np.linalg.inv(np.linalg.cholesky(covariance)))
 
 
-def _channels(measured: list[_Measured]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Rows and values of each channel over time, in its standard deviations."""
-    for channel in range(max(len(each.values) for each in measured)):
-        there = [each for each in measured if channel < len(each.values)]
-        std = np.array([each.std[channel] for each in there])
-        rows = np.stack([each.rows[channel] for each in there])
-        yield rows / std[:, None], np.array([each.values[channel] for each in there]) / std
+def _median(numbers: Collection[float]) -> float:
+    """As of NumPy, which takes five times as long for so few; NaN if one of them is."""
+    if any(number != number for number in numbers):
+        return math.nan
+    ordered, middle = sorted(numbers), len(numbers) // 2
+    return (ordered[middle - 1] + ordered[middle]) / 2.0 if len(ordered) % 2 == 0 else ordered[middle]
 
 
-def _evidence(mean: np.ndarray, covariance: np.ndarray, sums: _Sums) -> float:
-    """Logarithm of the evidence of measurements under a Gaussian prior, up to what is the same for all priors."""
+def _prior(mean: np.ndarray, covariance: np.ndarray) -> _Prior:
     precision = np.linalg.inv(covariance)
-    posterior, evidence = precision + sums.matrix, precision @ mean + sums.vector
-    volume = np.linalg.slogdet(precision)[1] - np.linalg.slogdet(posterior)[1]
-    fit = float(evidence @ np.linalg.solve(posterior, evidence))
-    return 0.5 * (float(volume) - sums.squares - float(mean @ precision @ mean) + fit)
+    volume = np.linalg.slogdet(precision)[1]
+    return _Prior(precision, precision @ mean, float(volume), float(mean @ precision @ mean))
+
+
+def _evidences(asked: list[tuple[_Prior, _Sums]]) -> list[float]:
+    """Logarithms of the evidence of measurements under Gaussian priors, up to what is the same for all priors."""
+    posteriors = np.array([prior.precision + sums.matrix for prior, sums in asked])
+    evidences = np.array([prior.weighed + sums.vector for prior, sums in asked])
+    volumes = np.linalg.slogdet(posteriors)[1].tolist()
+    solved = np.linalg.solve(posteriors, evidences[:, :, None])[
+        :, :, 0
+    ]  # all at once: calls cost more than numbers
+    return [
+        0.5 * (prior.volume - volume - sums.squares - prior.square + float(evidence @ solution))
+        for (prior, sums), volume, evidence, solution in zip(asked, volumes, evidences, solved, strict=True)
+    ]
