@@ -40,13 +40,36 @@ class PeriodInbox(Generic[T]):
         self._sources = (PLANT, *upstream)
         self._items: dict[str, dict[int, T]] = {topic: {} for topic in topics}
         self._taken_ns = dict.fromkeys(topics, -1)
+        self._newest_ns = dict.fromkeys(topics, -1)
+        # Of the period under way, by topic: stamps of what `ready` has handed over.
+        self._early: dict[str, set[int]] = {topic: set() for topic in topics}
         self._expected: dict[str, tuple[int, dict[str, int]]] = {}
         self.answered_ns = -1
 
     def add(self, topic: str, stamp_ns: int, item: T) -> None:
         """Keep what came on a topic; a repetition of what is there or was handed over is left out."""
-        if stamp_ns > self._taken_ns[topic]:
+        if stamp_ns > self._taken_ns[topic] and stamp_ns not in self._early[topic]:
             self._items[topic].setdefault(stamp_ns, item)
+            self._newest_ns[topic] = max(self._newest_ns[topic], stamp_ns)
+
+    def ready(self) -> list[tuple[str, T]]:
+        """Hand over what belongs first into the period under way, before the period is complete; ordered as by `take`.
+
+        The messages of a topic arrive in order, so nothing comes any more that is older than the newest of each topic.
+        That holds from the first answer on: the first messages can get lost while endpoints still find each other.
+        Outputs of other nodes come when they will.
+        """
+        if self.answered_ns < 0 or len(self._sources) > 1:
+            return []
+        until_ns = min(self._newest_ns.values())
+        if until_ns <= self.answered_ns:
+            return []
+        found = []
+        for topic, items in self._items.items():
+            for stamp in [stamp for stamp in items if stamp <= until_ns]:
+                found.append((stamp, self._topics[topic], items.pop(stamp)))
+                self._early[topic].add(stamp)
+        return _in_order(found)
 
     def expect(self, source: str, stamp_ns: int, counts: Mapping[str, int]) -> None:
         """Note how much a source has published on each topic in the period that ends at a stamp; of others nothing."""
@@ -54,11 +77,16 @@ class PeriodInbox(Generic[T]):
         if source in self._sources and stamp_ns >= newest_ns:
             self._expected[source] = stamp_ns, {name: n for name, n in counts.items() if name in self._topics}
 
+    @property
+    def is_asked(self) -> bool:
+        """Whether the end of a period was announced that was not handed over; cheaper than `take`."""
+        return any(stamp_ns > self.answered_ns for stamp_ns, _ in self._expected.values())
+
     def take(self) -> tuple[int, list[tuple[str, T]]] | None:
         """Hand over the next period once it is complete: its stamp, and readings with their names by stamp, then name.
 
         Returns:
-            None while something is missing.
+            None while something is missing. What `ready` has handed over does not come again.
         """
         if len(self._expected) < len(self._sources):
             return None
@@ -70,11 +98,17 @@ class PeriodInbox(Generic[T]):
             for topic, count in counts.items():
                 wanted[topic] += count
         here = {topic: [s for s in items if s <= stamp_ns] for topic, items in self._items.items()}
-        if any(len(here[topic]) < count for topic, count in wanted.items()):
+        if any(len(here[topic]) + len(self._early[topic]) < count for topic, count in wanted.items()):
             return None
         found = []
         for topic, stamps in here.items():
             found += [(stamp, self._topics[topic], self._items[topic].pop(stamp)) for stamp in stamps]
-            self._taken_ns[topic] = max(stamps, default=self._taken_ns[topic])
+            self._taken_ns[topic] = max(*stamps, *self._early[topic], self._taken_ns[topic], -1)
+            self._early[topic].clear()
         self.answered_ns = stamp_ns
-        return stamp_ns, [(name, item) for _, name, item in sorted(found, key=lambda one: one[:2])]
+        return stamp_ns, _in_order(found)
+
+
+def _in_order(found: list[tuple[int, str, T]]) -> list[tuple[str, T]]:
+    """Names and items by stamp, then name."""
+    return [(name, item) for _, name, item in sorted(found, key=lambda one: one[:2])]
