@@ -118,18 +118,20 @@ class VectorWriter:
         image: Layout of its messages in bytes.
     """
 
-    def __init__(self, names: Sequence[str], field: str = "effort") -> None:
+    def __init__(self, names: Sequence[str], field: str = "effort", *, frame: str = "") -> None:
         """Fill in the names.
 
         Args:
             names: Of the entries, in order.
             field: Which array of the message carries the values.
+            frame: Of the header.
         """
         values = marks(len(names))
         self._message = JointState(name=list(names), **{field: values})
+        self._message.header.frame_id = frame
         self._field = field
         counts = 1 + ("position", "velocity", "effort").index(field)
-        self.image = WireImage(self._message, values, texts=("", *names), counts=counts)
+        self.image = WireImage(self._message, values, texts=(frame, *names), counts=counts)
 
     def raw(self, values: np.ndarray, time_ns: int) -> bytes:
         """The message of `write` as bytes; one value for each name."""

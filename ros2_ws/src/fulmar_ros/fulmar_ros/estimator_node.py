@@ -32,6 +32,7 @@ from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.robots.topics import ODOMETRY, Wire
 from fulmar_core.robots.wire_check import BETWEEN, WIRE_WARNINGS
 from fulmar_core.wires.reading import Reading
+from fulmar_ros.bytes_reader import BytesReader
 from fulmar_ros.deadline import Spread
 from fulmar_ros.estimator_wires import WRITERS, Write
 from fulmar_ros.frame_wires import odometry_transform
@@ -118,6 +119,7 @@ class EstimatorNode(Node):
                 topics,
                 self._compute,
                 [publisher for publisher, _ in self._outputs],
+                take=self._take_early,
                 upstream=[node for node in settings.upstream if node],
                 wait_for_subscribers=settings.wait_for_subscribers,
             )
@@ -135,7 +137,8 @@ class EstimatorNode(Node):
         receive = partial(self._on_message, name, self.resolve_topic_name(wire.name), read)
         if lockstep:
             qos = subscriber_qos(wire, reliable=True, depth=depth, lossless=True)
-            return [self.create_subscription(kind, wire.name, receive, qos)]
+            receive = BytesReader(kind).passing(receive)
+            return [self.create_subscription(kind, wire.name, receive, qos, raw=True)]
         return subscribe_every(self, kind, wire, receive, depth=depth)
 
     def _on_message(self, name: str, topic: str, read: Read, message: Any) -> None:
@@ -196,13 +199,17 @@ class EstimatorNode(Node):
     def _compute(self, period_ns: int, readings: list[tuple[str, Any]]) -> list[tuple[Publisher, Any]]:
         """Take the readings of a period of lock step; returns the estimate at its end, to be published."""
         for name, reading in readings:
-            if reading is not None:
-                self._take(name, reading)
+            self._take_early(name, reading)
         estimate = self._estimate(period_ns)
         if self._contested or estimate is None or not self._is_new(estimate):
             return []
         self._note(estimate)
         return [(publisher, write(estimate)) for publisher, write in self._outputs]
+
+    def _take_early(self, name: str, reading: Reading | str | None) -> None:
+        """Take a reading of a period that is under way, while the plant measures the next ones."""
+        if reading is not None:
+            self._take(name, reading)
 
     def _is_new(self, estimate: Estimate) -> bool:
         """Whether an estimate is newer than the last one by as much as its kind says, or of a new epoch."""

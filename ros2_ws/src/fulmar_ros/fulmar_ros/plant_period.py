@@ -15,18 +15,20 @@ from typing import Any
 import numpy as np
 from rclpy.node import Node
 from rclpy.publisher import Publisher
+from rclpy.serialization import serialize_message
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 
-from fulmar_bags.message_reader import stamp_ns
+from fulmar_bags.message_reader import NS, stamp_ns
 from fulmar_core.robots.topics import ANSWER, ODOMETRY, PERIOD
 from fulmar_core.wires.lockstep_period import counts_of
-from fulmar_ros.convert import VectorWriter, stamp_of
+from fulmar_ros.bytes_reader import BytesReader
+from fulmar_ros.convert import VectorWriter
 from fulmar_ros.qos import EVERYTHING, publish_patiently, publisher_qos, subscriber_qos
 from fulmar_ros.wire_image import canonical_bytes
 
 STAMP = struct.Struct("<iI")  # seconds and nanoseconds, first in a message with a header
-STAMP_AT = 4  # bytes of encapsulation before it
+STAMP_AT = 4  # bytes of encapsulation before it; a message of the clock has nothing else
 
 
 class PlantPeriod:
@@ -54,10 +56,12 @@ class PlantPeriod:
         )
         self._truth: Publisher | None = None
         self._clock: Publisher | None = None
+        self._time = bytearray(serialize_message(Clock())[: STAMP_AT + STAMP.size])  # a message of the clock
         self._at_end_only: set[Publisher] = set()
         self.publisher = node.create_publisher(JointState, PERIOD.name, publisher_qos(PERIOD, lockstep=True))
         every = subscriber_qos(ANSWER, reliable=True, depth=EVERYTHING)
-        self.answers = node.create_subscription(JointState, ANSWER.name, self._on_answer, every)
+        receive = BytesReader(JointState).passing(self._on_answer)
+        self.answers = node.create_subscription(JointState, ANSWER.name, receive, every, raw=True)
 
     def distinguish(
         self,
@@ -90,7 +94,8 @@ class PlantPeriod:
     def close(self, time_ns: int) -> None:
         """Publish the clock and what the period holds, which ends at a time [ns]."""
         if self._clock is not None:
-            publish_patiently(self._clock, Clock(clock=stamp_of(time_ns)))
+            STAMP.pack_into(self._time, STAMP_AT, *divmod(time_ns, NS))
+            publish_patiently(self._clock, bytes(self._time))
         topics = tuple(sorted(self._counts))
         if topics not in self._writers:
             self._writers[topics] = VectorWriter(topics, "position")

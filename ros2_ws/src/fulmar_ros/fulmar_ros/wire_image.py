@@ -83,6 +83,9 @@ class WireImage:
                 f"{type(message).__name__}: {len(texts)} texts and {counts} counts are not its all."
             )
         del self._image[length:]
+        self._keep(
+            image, self._places[-1] + self._runs[-1].size, length
+        )  # such as lengths of empty sequences
 
     def _keep(self, image: bytes, begin: int, end: int) -> None:
         self._image[begin:end] = image[begin:end]
