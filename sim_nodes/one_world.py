@@ -136,8 +136,7 @@ class OneWorld:
     def _measure(self, truth: RigidBodyState) -> RigidBodyState:
         if not (self._noisy or self._blurred):
             return truth
-        true = self.dynamics.state_type.from_rigid(truth)
-        steps = np.array([self._measured])
+        columns, steps = self.dynamics.state_type.columns_of(truth), np.array([self._measured])
         self._measured += 1
-        batch = self._odometer.measure(true[None], self.world, self._numbers, self._repeats, steps)
-        return self.dynamics.reported(batch[0], truth)
+        found = self._odometer.measure_columns(columns, self.world, self._numbers, self._repeats, steps)
+        return self.dynamics.reported_columns(found, truth)

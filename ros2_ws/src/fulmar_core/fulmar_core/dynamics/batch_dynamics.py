@@ -139,6 +139,10 @@ class Dynamics(ABC, Generic[W, S]):
     def reported(self, measured: S, truth: RigidBodyState) -> RigidBodyState:
         """Odometry of one body, without a batch axis: what is measured, and of the rest the truth."""
 
+    def reported_columns(self, measured: np.ndarray, truth: RigidBodyState) -> RigidBodyState:
+        """The same of the columns of what is measured, shape (k, 1), as in `State.columns_of`."""
+        return self.reported(self.state_type(*measured[:, 0]), truth)
+
     def push_things(self, things: Sequence[Thing], poses: Poses, before: S, after: S) -> tuple[Poses, S]:
         """Move the things of a task; arguments and result as in `things.push_things`. By default they stay."""
         return poses, after
@@ -317,6 +321,11 @@ class SpatialDynamics(Dynamics[SpatialWorld, SpatialState]):
     def reported(self, measured: SpatialState, truth: RigidBodyState) -> RigidBodyState:
         """See `Dynamics.reported`."""
         return measured.to_rigid()
+
+    def reported_columns(self, measured: np.ndarray, truth: RigidBodyState) -> RigidBodyState:
+        """See `Dynamics.reported_columns`."""
+        column = measured[:, 0]
+        return RigidBodyState(column[:3], column[3:7], column[7:10], column[10:])
 
 
 class GyrostatDynamics(SpatialDynamics):

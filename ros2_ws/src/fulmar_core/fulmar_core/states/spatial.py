@@ -86,6 +86,17 @@ class SpatialState(State):
         )
         return cls(*(part[..., i] for part in parts for i in range(part.shape[-1])))
 
+    @classmethod
+    def columns_of(cls, state: RigidBodyState) -> np.ndarray:
+        """See `State.columns_of`."""
+        parts = (
+            state.position_in_world,
+            state.quat_xyzw,
+            state.velocity_in_world,
+            state.angular_velocity_in_body,
+        )
+        return np.concatenate(parts)[:, None]
+
     def to_rigid(self) -> RigidBodyState:
         """The same thirteen numbers."""
         parts = (self.position, self.quat, self.velocity, self.rate)

@@ -75,6 +75,11 @@ class State(ABC):
     def from_rigid(cls, state: RigidBodyState) -> Self:
         """What this form keeps of a rigid-body state, of the same leading shape."""
 
+    @classmethod
+    def columns_of(cls, state: RigidBodyState) -> np.ndarray:
+        """The arrays of one body, one a row, shape (columns, 1)."""
+        return np.stack(cls.from_rigid(state)[None].columns())
+
     @abstractmethod
     def to_rigid(self) -> RigidBodyState:
         """The rigid-body state that this form describes, of the same leading shape."""

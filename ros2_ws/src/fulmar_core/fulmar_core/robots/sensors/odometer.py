@@ -9,7 +9,7 @@ import numpy as np
 from array_api_compat import device
 
 from fulmar_core.robots.sensors.kind import SensorKind
-from fulmar_core.states.arrays import array_namespace, clip
+from fulmar_core.states.arrays import array_namespace, clip, is_numpy
 from fulmar_core.states.counter_rng import (
     NOISE,
     Keys,
@@ -77,6 +77,24 @@ class OdometrySpec:
             raise ValueError("rate_hz and delay_s must not be negative.")
 
 
+AHEAD = (
+    64  # measurements of a lone world whose numbers are drawn at once: the calls cost more than the numbers
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Drawn:
+    """What is random in one measurement of each world, or in some measurements of one."""
+
+    bits: Array  # words, shape (words, n)
+    normal: Array | None  # standard normal numbers of the channels, shape (k, n); None: no channel is noisy
+
+    def at(self, index: int) -> Drawn:
+        """One measurement out of some, as a batch of one."""
+        normal = None if self.normal is None else self.normal[:, index : index + 1]
+        return Drawn(self.bits[:, index : index + 1], normal)
+
+
 @dataclass(frozen=True, slots=True)
 class FirstReading:
     """What is measured before the first step, and what the noise of all later measurements hangs on."""
@@ -132,6 +150,7 @@ class Odometer(MutableState, Generic[S]):
         self._past: list[Array] = []  # readings, newest first
         self._held: Array | None = None
         self._keys: Keys | None = None
+        self._ahead: tuple[Keys, int, Drawn] | None = None  # of which keys, from which measurement on
 
     def measure(
         self,
@@ -155,29 +174,48 @@ class Odometer(MutableState, Generic[S]):
         """
         if self._perfect:
             return truth
-        xp = array_namespace(truth.like)
-        columns = self._columns(truth)
+        return self._state(truth, self.measure_columns(self._columns(truth), world, numbers, repeats, steps))
+
+    def measure_columns(
+        self, columns: Array, world: SensorErrors, numbers: Array, repeats: Array, steps: Array
+    ) -> Array:
+        """The same of the columns of the true state, shape (k, n), of sensors that err; not to be changed."""
+        xp = array_namespace(columns)
         if self._keys is None:
             self._keys = world_keys(self._seed, numbers, repeats, NOISE)
-        bits = words(self._keys, steps, self._words)
-        reading = self._disturbed(columns, world, bits)
+        drawn = self._drawn_at(self._keys, steps, columns)
+        reading = self._disturbed(columns, world, drawn)
         if self._depth > 1:
             reading = self._delayed(reading, world)
-        lost = uniform_from(bits[self.LOST], columns.dtype) < (world.dropout if self._noisy else 0.0)
+        lost = uniform_from(drawn.bits[self.LOST], columns.dtype) < (world.dropout if self._noisy else 0.0)
         if self._share < 1.0:
             due = xp.astype(steps, columns.dtype) * self._share + 1e-4
             lost = lost | (xp.floor(due) == xp.floor(due - self._share))
         if self._held is not None:
             reading = xp.where(lost & (steps != 0), self._held, reading)
         self._held = reading
-        return self._state(truth, reading)
+        return reading
+
+    def _drawn_at(self, keys: Keys, steps: Array, like: Array) -> Drawn:
+        """What is random in the measurements of these numbers."""
+        if len(steps) > 1 or not is_numpy(steps):
+            return self._drawn(keys, steps, like)
+        step = int(steps[0])
+        if self._ahead is None or self._ahead[0] is not keys or not 0 <= step - self._ahead[1] < AHEAD:
+            self._ahead = keys, step, self._drawn(keys, np.arange(step, step + AHEAD), like)
+        return self._ahead[2].at(step - self._ahead[1])
+
+    def _drawn(self, keys: Keys, steps: Array | int, like: Array) -> Drawn:
+        bits = words(keys, steps, self._words)
+        noisy = "std" in self._used
+        return Drawn(bits, normal_from(bits[: len(self._channels)], like.dtype) if noisy else None)
 
     def first(self, truth: S, world: SensorErrors, numbers: Array, repeats: Array) -> FirstReading:
         """First measurement of episodes that are to begin; arguments as in `measure`. Changes nothing."""
         keys = world_keys(self._seed, numbers, repeats, NOISE)
         columns = self._columns(truth)
         if not self._perfect:
-            columns = self._disturbed(columns, world, words(keys, 0, self._words))
+            columns = self._disturbed(columns, world, self._drawn(keys, 0, columns))
         return FirstReading(columns, keys)
 
     def restart(self, truth: S, which: Array, first: FirstReading) -> S:
@@ -195,6 +233,7 @@ class Odometer(MutableState, Generic[S]):
             return truth
         assert self._held is not None and self._keys is not None
         write_keys(self._keys, which, keys_at(first.keys, which))
+        self._ahead = None
         # Who was given readings keeps them; what is still under way nobody was given.
         self._held = array_namespace(self._held).asarray(self._held, copy=True)
         for old in (self._held, *self._past):
@@ -224,8 +263,8 @@ class Odometer(MutableState, Generic[S]):
             self._constants[part] = xp.asarray(self._column(part), dtype=like.dtype, device=device(like))
         return self._constants[part]
 
-    def _disturbed(self, columns: Array, world: Any, bits: Array) -> Array:
-        """Columns, shape (6, n), with the errors that worlds (`World`) have, and with random bits."""
+    def _disturbed(self, columns: Array, world: Any, drawn: Drawn) -> Array:
+        """Columns, shape (6, n), with the errors that worlds (`World`) have, and with random ones."""
         xp = array_namespace(columns)
         if self._wraps:
             columns = xp.stack([wrap_angle(column) if i == 2 else column for i, column in enumerate(columns)])
@@ -234,10 +273,10 @@ class Odometer(MutableState, Generic[S]):
         if "bias_std" in self._used:
             columns = columns + self._constant("bias_std", columns) * world.sensor_bias
         if "std" in self._used:
-            noise = normal_from(bits[:6], columns.dtype) * world.noise
+            noise = drawn.normal * world.noise
             columns = columns + self._constant("std", columns) * noise
         if self._blurred:
-            share = 2.0 * uniform_from(bits[7:10], columns.dtype) - 1.0
+            share = 2.0 * uniform_from(drawn.bits[7:10], columns.dtype) - 1.0
             error = (
                 world.velocity_noise * share[0],
                 world.velocity_noise * share[1],
