@@ -23,6 +23,7 @@ from fulmar_core.estimators.motion.reading_times import ReadingTimes
 from fulmar_core.estimators.motion.settings import MotionSettings
 from fulmar_core.estimators.motion.strangers import CONTRADICT_NS, TO_BEGIN_ANEW_NS, Stranger, Strangers
 from fulmar_core.robots.robot import Limits
+from fulmar_core.states.rotation import size_of
 from fulmar_core.wires.reading import Reading
 
 S = TypeVar("S", bound=MotionSettings)
@@ -210,7 +211,7 @@ class HistoryEstimator(ABC, Generic[S]):
             return ""
         if not np.isfinite(value).all():
             return f"{WHAT[kind]} holds a value that is not finite"
-        norm = float(np.linalg.norm(value[-4:]))
+        norm = size_of(value[-4:])
         return (
             ""
             if abs(norm - 1.0) <= 0.01
@@ -221,7 +222,7 @@ class HistoryEstimator(ABC, Generic[S]):
         """Why the turn rate of an inertial reading is saturated; empty if it is not, or there is none."""
         if not reading.value.is_finite or not reading.value.has_rate:
             return ""
-        largest = float(np.max(np.abs(reading.value.angular_velocity)))
+        largest = max(map(abs, reading.value.angular_velocity.tolist()))
         if largest < self._gyroscope_range:
             return ""
         return (
@@ -313,7 +314,7 @@ class HistoryEstimator(ABC, Generic[S]):
     def _believe(self, event: Event) -> bool:
         """Insert a pose or an attitude if it is no outlier."""
         assert self._filter is not None
-        at = bisect.bisect_right(self._history, event.key, key=lambda past: past.key)
+        at = self._place_of(event)
         if at == 0:  # captured before everything that is remembered: too late to matter, but no lie
             return not self._contradiction
         self._rewind(at)
@@ -322,7 +323,7 @@ class HistoryEstimator(ABC, Generic[S]):
         if not (is_pose and self._contradiction) and (
             self._filter.distance2(event.kind, event.value) <= self._gate
         ):
-            self._insert(event)
+            self._insert(event, is_there=at == len(self._history))
             return not is_pose or self._is_consistent()
         self.outliers += 1
         stranger = self._stranger(event) if is_pose else None
@@ -377,15 +378,28 @@ class HistoryEstimator(ABC, Generic[S]):
         self._history = [Event(prediction.stamp_ns, IMU, prediction.inertial, after)]
         self._predictions.forget()
 
-    def _insert(self, event: Event) -> None:
-        at = bisect.bisect_right(self._history, event.key, key=lambda past: past.key)
+    def _insert(self, event: Event, *, is_there: bool = False) -> None:
+        """Take an event in at its time; `is_there`: it is the newest, and the filter has moved to it."""
+        assert self._filter is not None
+        at = len(self._history) if is_there else self._place_of(event)
         if at == 0:
             return
         self._history.insert(at, event)
-        self._replay(at)
+        if is_there:
+            self._filter.correct(event.kind, event.value)
+            event.after = self._filter.snapshot()
+        else:
+            self._replay(at)
         oldest = self._history[-1].stamp_ns - KEPT_NS
         while self._history[0].stamp_ns < oldest and len(self._history) > 1:
             del self._history[0]
+
+    def _place_of(self, event: Event) -> int:
+        """Where an event belongs in the history: after those of its time and kind. Most are the newest."""
+        history = self._history
+        if history and history[-1].key <= event.key:
+            return len(history)
+        return bisect.bisect_right(history, event.key, key=lambda past: past.key)
 
     def _rewind(self, at: int) -> None:
         """Believe what was believed before event number `at`."""
@@ -410,9 +424,9 @@ class HistoryEstimator(ABC, Generic[S]):
 
     def _inertial_for(self, at: int, stamp_ns: int) -> Any:
         """The first reading at or after the end of the span, else the last before it, if it is near enough."""
-        later = (event for event in self._history[at : at + 3] if event.kind == IMU)
-        earlier = (event for event in self._history[max(0, at - 20) : at][::-1] if event.kind == IMU)
-        for event in (*later, *earlier):
-            if abs(event.stamp_ns - stamp_ns) <= READING_LASTS_NS:
+        history = self._history
+        for number in (*range(at, min(at + 3, len(history))), *range(at - 1, max(0, at - 20) - 1, -1)):
+            event = history[number]
+            if event.kind == IMU and abs(event.stamp_ns - stamp_ns) <= READING_LASTS_NS:
                 return event.value
         return None

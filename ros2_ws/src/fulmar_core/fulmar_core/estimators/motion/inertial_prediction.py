@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from fulmar_core.estimators.motion.filter import IMU, Filter
+from fulmar_core.states.rotation import size_of
 
 LASTS_NS = 4_000_000_000  # how long a prediction is compared: its spread grows
 EVERY_NS = 2_000_000_000  # a new one begins, so that one of at least this age is there
@@ -41,8 +42,8 @@ class Prediction:
             self.filter.move_on(seconds, inertial)
             self.filter.correct(IMU, inertial)
             after = self.filter.velocity()
-            acceleration = float(np.linalg.norm(after - before)) / seconds
-            now = np.array([np.linalg.norm(after), acceleration, self.filter.turn_rate()])
+            acceleration = size_of(after - before) / seconds
+            now = np.array([size_of(after), acceleration, self.filter.turn_rate()])
             self.most = np.maximum(self.most, now)
             self.stamp_ns, self.inertial = stamp_ns, inertial
 
@@ -53,9 +54,10 @@ class Prediction:
         off, spread = believed.separation(self.filter)
         self.filter.restore(now)
         each = len(off) // 3 if len(off) % 3 == 0 else 2  # axes of place and of velocity; what is left turns
-        late = (self.late_std_s * self.most) ** 2
-        allowed = np.repeat(late, (each, each, len(off) - 2 * each))
-        return float(off @ np.linalg.solve(spread + np.diag(allowed), off))
+        place, speed, turn = ((self.late_std_s * self.most) ** 2).tolist()
+        allowed = spread.copy()
+        allowed.flat[:: len(off) + 1] += [place] * each + [speed] * each + [turn] * (len(off) - 2 * each)
+        return float(off @ np.linalg.solve(allowed, off))
 
 
 class InertialPredictions:

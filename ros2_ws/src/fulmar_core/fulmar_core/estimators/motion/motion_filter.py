@@ -11,10 +11,10 @@ import math
 from typing import Any
 
 import numpy as np
-from filterpy.kalman import ExtendedKalmanFilter
 
 from fulmar_core.estimators.motion import filter as events
 from fulmar_core.estimators.motion.filter import Filter, Placed
+from fulmar_core.estimators.motion.kalman import LeanKalmanFilter
 from fulmar_core.estimators.motion.settings import PlanarMotionSettings
 from fulmar_core.states.rotation import from_yaw
 
@@ -31,7 +31,7 @@ Snapshot = tuple[np.ndarray, np.ndarray]
 Inertial = tuple[np.ndarray | None, float | None]
 
 
-class MotionFilter(ExtendedKalmanFilter, Filter):  # type: ignore[misc]
+class MotionFilter(LeanKalmanFilter, Filter):
     """Position, heading, velocity and turn rate, with the biases of the inertial unit.
 
     `x` holds (x, y) [m], yaw [rad], (v_x, v_y) in the world [m/s], turn rate [rad/s], then the biases of the

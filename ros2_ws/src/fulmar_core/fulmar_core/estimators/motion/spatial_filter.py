@@ -8,19 +8,19 @@ the model is that of section 5 with the attitude's error in the body's frame; co
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from filterpy.kalman import ExtendedKalmanFilter
 
 from fulmar_core.estimators.motion import filter as events
 from fulmar_core.estimators.motion.filter import Filter, Placed
+from fulmar_core.estimators.motion.kalman import LeanKalmanFilter
 from fulmar_core.estimators.motion.settings import SpatialMotionSettings
 from fulmar_core.robots.sensors.imu import ImuSample
 from fulmar_core.states.attitude import exponential, normalised, product, rotation_error, turn
 from fulmar_core.states.gravity import GRAVITY
+from fulmar_core.states.rotation import size_of
 
 ERRORS = 15
 PLACE, VELOCITY, TURN, FORCE_BIAS, RATE_BIAS = (slice(i, i + 3) for i in range(0, ERRORS, 3))
@@ -32,8 +32,7 @@ _POSE_ROWS = np.eye(ERRORS)[[0, 1, 2, 6, 7, 8]]
 _TURN_ROWS = np.eye(ERRORS)[TURN]
 
 
-@dataclass(frozen=True, slots=True)
-class Belief:
+class Belief(NamedTuple):
     """What is believed beside the covariance."""
 
     position: np.ndarray  # (3,) [m]
@@ -47,7 +46,7 @@ class Belief:
     )
 
 
-class SpatialFilter(ExtendedKalmanFilter, Filter):  # type: ignore[misc]
+class SpatialFilter(LeanKalmanFilter, Filter):
     """Position, velocity, attitude and biases; `x` holds their errors, which are zero between corrections.
 
     A turn rate that comes from no inertial reading is off by the negative of the error in the place of the gyroscope's
@@ -93,21 +92,20 @@ class SpatialFilter(ExtendedKalmanFilter, Filter):  # type: ignore[misc]
             rate = inertial.angular_velocity - now.rate_bias
         if inertial is not None and has_force:
             force, noise = inertial.specific_force - now.force_bias, s.acceleration_noise
-        x, y, z, w = now.quat_xyzw.tolist()
-        quat = x, y, z, w
+        quat = _quat(now.quat_xyzw)
         axes = _axes(quat).T  # body to world
         push = axes @ force
         if self._weighs and has_force:
             push = push - np.array([0.0, 0.0, GRAVITY])
         a, b, c, d = exponential(tuple((t * rate).tolist()))
         turned = float(a), float(b), float(c), float(d)
-        F = _SAME.copy()
-        F[PLACE, VELOCITY] = t * _ONE
+        F = _steady(t).copy()
         if has_force:
             lever = -axes @ _skew(force)
-            F[PLACE, TURN], F[VELOCITY, TURN] = 0.5 * t * t * lever, t * lever
-            F[PLACE, FORCE_BIAS], F[VELOCITY, FORCE_BIAS] = -0.5 * t * t * axes, -t * axes
-        F[TURN, RATE_BIAS] = -t * _ONE
+            np.multiply(0.5 * t * t, lever, out=F[PLACE, TURN])
+            np.multiply(t, lever, out=F[VELOCITY, TURN])
+            np.multiply(-0.5 * t * t, axes, out=F[PLACE, FORCE_BIAS])
+            np.multiply(-t, axes, out=F[VELOCITY, FORCE_BIAS])
         F[TURN, TURN] = _axes(turned)  # of the inverse rotation: rows are turned axes
         self.F, self.Q = F, _noise(s, t, noise, measured=has_rate)
         self.belief = Belief(
@@ -126,21 +124,11 @@ class SpatialFilter(ExtendedKalmanFilter, Filter):  # type: ignore[misc]
 
     def correct(self, kind: int, value: Any) -> None:
         """Correct by an event; an inertial reading has moved the filter to its time already."""
-        if kind == events.IMU and not value.has_rate:
-            return
         if kind == events.IMU:
-            self._begin_to_measure()
-        now = self.belief
-        if kind == events.IMU:
-            self.belief = Belief(
-                now.position,
-                now.velocity,
-                now.quat_xyzw,
-                now.force_bias,
-                now.rate_bias,
-                value.angular_velocity - now.rate_bias,
-                measured=True,
-            )
+            if value.has_rate:
+                self._begin_to_measure()
+                rate = value.angular_velocity - self.belief.rate_bias
+                self.belief = self.belief._replace(rate=rate, measured=True)
             return
         residual, rows, noise = self._residual(kind, value)
         self.update(residual, lambda _x: rows, lambda x: rows @ x, R=noise)
@@ -161,11 +149,11 @@ class SpatialFilter(ExtendedKalmanFilter, Filter):  # type: ignore[misc]
 
     def speed_std(self) -> float:
         """See `Filter.speed_std`."""
-        return math.sqrt(float(np.diag(self.P)[VELOCITY].max()))
+        return math.sqrt(max(self.P.diagonal()[VELOCITY].tolist()))
 
     def rate_std(self) -> float:
         """See `Filter.rate_std`."""
-        return math.sqrt(float(np.diag(self.P)[RATE_BIAS].max()))
+        return math.sqrt(max(self.P.diagonal()[RATE_BIAS].tolist()))
 
     def placed(self) -> Placed:
         """See `Filter.placed`."""
@@ -173,14 +161,13 @@ class SpatialFilter(ExtendedKalmanFilter, Filter):  # type: ignore[misc]
 
     def biases(self) -> tuple[float, float]:
         """See `Filter.biases`."""
-        return float(np.linalg.norm(self.belief.force_bias)), float(np.linalg.norm(self.belief.rate_bias))
+        return size_of(self.belief.force_bias), size_of(self.belief.rate_bias)
 
     def keep_biases(self, other: SpatialFilter) -> None:
         """See `Filter.keep_biases`; the turn rate, too, which has the error of the gyroscope's bias."""
         theirs, P, biases = other.belief, self.P.copy(), slice(FORCE_BIAS.start, RATE_BIAS.stop)
         P[biases, biases] = other.P[biases, biases]
-        self.belief = replace(
-            self.belief,
+        self.belief = self.belief._replace(
             force_bias=theirs.force_bias,
             rate_bias=theirs.rate_bias,
             rate=theirs.rate,
@@ -194,26 +181,27 @@ class SpatialFilter(ExtendedKalmanFilter, Filter):  # type: ignore[misc]
 
     def turn_rate(self) -> float:
         """See `Filter.turn_rate`."""
-        return float(np.linalg.norm(self.belief.rate))
+        return size_of(self.belief.rate)
 
     def separation(self, other: SpatialFilter) -> tuple[np.ndarray, np.ndarray]:
         """See `Filter.separation`."""
         a, b = self.belief, other.belief
-        angle = rotation_error(tuple(b.quat_xyzw), tuple(a.quat_xyzw))
+        angle = rotation_error(_quat(b.quat_xyzw), _quat(a.quat_xyzw))
         return np.concatenate((a.position - b.position, a.velocity - b.velocity, angle)), other.P[:9, :9]
 
     def _residual(self, kind: int, value: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Measured less expected, the rows of the errors that it shows, and its noise."""
         if kind == events.POSE:
-            angle = rotation_error(tuple(self.belief.quat_xyzw), tuple(_unit(value[3:])))
+            angle = rotation_error(_quat(self.belief.quat_xyzw), _quat(_unit(value[3:])))
             return np.concatenate((value[:3] - self.belief.position, angle)), _POSE_ROWS, self._pose_noise
         quat, noise = value
-        return np.asarray(rotation_error(tuple(self.belief.quat_xyzw), tuple(_unit(quat)))), _TURN_ROWS, noise
+        angle = rotation_error(_quat(self.belief.quat_xyzw), _quat(_unit(quat)))
+        return np.asarray(angle), _TURN_ROWS, noise
 
     def _inject(self) -> None:
         """Move the errors that were found into the belief (Solà eq. 282 to 286)."""
         error, now = self.x, self.belief
-        turned = product(tuple(now.quat_xyzw), exponential(tuple(error[TURN])))
+        turned = product(_quat(now.quat_xyzw), exponential(tuple(error[TURN].tolist())))
         self.belief = Belief(
             now.position + error[PLACE],
             now.velocity + error[VELOCITY],
@@ -235,7 +223,15 @@ class SpatialFilter(ExtendedKalmanFilter, Filter):  # type: ignore[misc]
         P = self.P.copy()
         P[RATE_BIAS], P[:, RATE_BIAS] = 0.0, 0.0
         P[RATE_BIAS, RATE_BIAS] = RATE_BIAS_STD**2 * np.eye(3)
-        self.belief, self.P = replace(self.belief, measured=True), P
+        self.belief, self.P = self.belief._replace(measured=True), P
+
+
+@lru_cache(maxsize=64)
+def _steady(t: float) -> np.ndarray:
+    """Derivative of a motion without force and turn in a time [s]. Not to be changed."""
+    F = _SAME.copy()
+    F[PLACE, VELOCITY], F[TURN, RATE_BIAS] = t * _ONE, -t * _ONE
+    return F
 
 
 @lru_cache(maxsize=64)
@@ -261,11 +257,17 @@ def _axes(quat_xyzw: tuple[float, float, float, float]) -> np.ndarray:
     return np.array([turn(quat_xyzw, axis) for axis in _AXES])
 
 
+def _quat(quat_xyzw: np.ndarray) -> tuple[float, float, float, float]:
+    """In plain numbers, as `_axes`."""
+    x, y, z, w = quat_xyzw.tolist()
+    return x, y, z, w
+
+
 def _unit(quat: np.ndarray) -> np.ndarray:
-    return np.asarray(quat / np.linalg.norm(quat))
+    return np.asarray(quat / size_of(quat))
 
 
 def _skew(v: np.ndarray) -> np.ndarray:
     """Matrix of the vector product with v."""
-    x, y, z = v
+    x, y, z = v.tolist()
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])

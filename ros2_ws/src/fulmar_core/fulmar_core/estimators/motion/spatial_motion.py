@@ -20,9 +20,12 @@ from fulmar_core.estimators.motion.spatial_filter import PLACE, RATE_BIAS, TURN,
 from fulmar_core.robots.kinds.kind import Kind
 from fulmar_core.robots.robot import Limits
 from fulmar_core.robots.sensors.imu import ImuSample
-from fulmar_core.states.rotation import rotate
+from fulmar_core.states.rotation import rotate, size_of
 from fulmar_core.states.state import RigidBodyState
 from fulmar_core.wires.reading import Reading
+
+_ERRORS = np.arange(15)
+_SHOWN = np.ix_(*2 * (np.concatenate([_ERRORS[part] for part in (PLACE, TURN, VELOCITY, RATE_BIAS)]),))
 
 
 class SpatialMotionEstimator(HistoryEstimator[SpatialMotionSettings]):
@@ -50,14 +53,14 @@ class SpatialMotionEstimator(HistoryEstimator[SpatialMotionSettings]):
         ) if noise is None else noise
 
     def _turn_rate(self, reading: Reading) -> float:
-        return float(np.linalg.norm(reading.value.angular_velocity))
+        return size_of(reading.value.angular_velocity)
 
     def _new_filter(self, pose: np.ndarray) -> SpatialFilter:
         speed = 0.0 if self._kind.stays else self._limits.speed
         return SpatialFilter(self._settings, pose, weighs=self._kind.weighs, speed=speed)
 
     def _placed(self, pose: np.ndarray) -> Placed:
-        return pose[:3], pose[3:] / np.linalg.norm(pose[3:])
+        return pose[:3], pose[3:] / size_of(pose[3:])
 
     def _value(self) -> tuple[RigidBodyState, np.ndarray]:
         """State, and covariance of shape (12, 12)."""
@@ -65,10 +68,7 @@ class SpatialMotionEstimator(HistoryEstimator[SpatialMotionSettings]):
         now, P = self._filter.snapshot()
         state = RigidBodyState(now.position, now.quat_xyzw, now.velocity, now.rate)
         axes = rotate(now.quat_xyzw, np.eye(3)).T  # body to world
-        chosen = np.r_[
-            np.arange(15)[PLACE], np.arange(15)[TURN], np.arange(15)[VELOCITY], np.arange(15)[RATE_BIAS]
-        ]
-        covariance = P[np.ix_(chosen, chosen)].copy()
+        covariance = P[_SHOWN]
         turn = np.eye(12)
         turn[3:6, 3:6] = axes
         covariance = turn @ covariance @ turn.T

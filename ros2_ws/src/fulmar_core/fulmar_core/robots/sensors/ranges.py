@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -40,7 +41,7 @@ def in_order(names: Sequence[str], values: np.ndarray, wanted: Sequence[str]) ->
 def size_problem(values: Iterable[tuple[str, float, float]]) -> str:
     """Why numbers, each with its name and its largest size, lie outside of what a device can say."""
     for name, value, most in values:
-        if not np.isfinite(value):
+        if not math.isfinite(value):
             return f"{name} reports a value that is not finite"
         if abs(value) > most:
             return f"{name} reports {value:.6g}, and can report {most:.6g} at most"
