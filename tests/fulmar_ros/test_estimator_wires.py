@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 from geometry_msgs.msg import InertiaStamped, TwistWithCovarianceStamped
 from nav_msgs.msg import Odometry
@@ -12,6 +14,7 @@ from fulmar_core.robots.topics import INERTIA, ODOMETRY, RATE
 from fulmar_core.states.rotation import rotate_inverse
 from fulmar_core.states.state import RigidBodyState
 from fulmar_core.wires.robot_name import Frames
+from fulmar_ros.estimator_node import EstimatorNode
 from fulmar_ros.estimator_wires import WRITERS
 
 FRAMES = Frames("alpha/")
@@ -59,3 +62,12 @@ def test_an_inertia_has_its_six_entries_in_their_places():
     found = [[its.ixx, its.ixy, its.ixz], [its.ixy, its.iyy, its.iyz], [its.ixz, its.iyz, its.izz]]
     np.testing.assert_array_equal(found, tensor)
     assert InertiaStamped().inertia.m == its.m
+
+
+def test_what_a_controller_waits_for_goes_out_before_the_transform():
+    estimate = Estimate("state", None, 5)
+    transform = SimpleNamespace(publisher="tf", message=lambda value, stamp_ns: (value, stamp_ns))
+    node = SimpleNamespace(_outputs=[("odom", lambda it: it.stamp_ns)], _transform=transform)
+    assert EstimatorNode._messages(node, estimate) == [("odom", 5), ("tf", ("state", 5))]
+    node._transform = None
+    assert EstimatorNode._messages(node, estimate) == [("odom", 5)]

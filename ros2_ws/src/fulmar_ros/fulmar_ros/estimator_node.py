@@ -192,8 +192,8 @@ class EstimatorNode(Node):
         estimate = self._estimate(None)
         if estimate is None or not self._is_new(estimate):
             return
-        for publisher, write in self._outputs:
-            publisher.publish(write(estimate))
+        for publisher, message in self._messages(estimate):
+            publisher.publish(message)
         self._note(estimate)
 
     def _compute(self, period_ns: int, readings: list[tuple[str, Any]]) -> list[tuple[Publisher, Any]]:
@@ -204,7 +204,15 @@ class EstimatorNode(Node):
         if self._contested or estimate is None or not self._is_new(estimate):
             return []
         self._note(estimate)
-        return [(publisher, write(estimate)) for publisher, write in self._outputs]
+        return self._messages(estimate)
+
+    def _messages(self, estimate: Estimate) -> list[tuple[Publisher, Any]]:
+        """What an estimate is published as: first what others wait for, then the transform."""
+        found = [(publisher, write(estimate)) for publisher, write in self._outputs]
+        if self._transform is not None:
+            transform = self._transform.message(estimate.value, estimate.stamp_ns)
+            found.append((self._transform.publisher, transform))
+        return found
 
     def _take_early(self, name: str, reading: Reading | str | None) -> None:
         """Take a reading of a period that is under way, while the plant measures the next ones."""
@@ -225,8 +233,6 @@ class EstimatorNode(Node):
         return estimate
 
     def _note(self, estimate: Estimate) -> None:
-        if self._transform is not None:
-            self._transform.publish(estimate.value, estimate.stamp_ns)
         self._published_ns = estimate.stamp_ns
         self._published += 1
 

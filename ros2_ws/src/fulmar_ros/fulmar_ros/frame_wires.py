@@ -56,8 +56,11 @@ class OdometryTransform:
 
     def publish(self, state: RigidBodyState, time_ns: int) -> None:
         """Publish a pose, measured at a time [ns]."""
-        pose = (*state.position_in_world.tolist(), *state.quat_xyzw.tolist())
-        self._publish(self.publisher, self._image.write(time_ns, pose))
+        self._publish(self.publisher, self.message(state, time_ns))
+
+    def message(self, state: RigidBodyState, time_ns: int) -> bytes:
+        """The message that `publish` sends."""
+        return self._image.write(time_ns, (*state.position_in_world.tolist(), *state.quat_xyzw.tolist()))
 
 
 def odometry_transform(

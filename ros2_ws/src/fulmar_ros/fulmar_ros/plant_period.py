@@ -50,6 +50,7 @@ class PlantPeriod:
         self._kept: list[tuple[Publisher, bytes]] = []
         self._counts: dict[str, int] = {}
         self._newest_ns: dict[str, int] = {}  # by topic
+        self._topics: dict[Publisher, str] = {}  # asking a publisher takes as long as packing a message
         self._writers: dict[tuple[str, ...], VectorWriter] = {}  # of a period, by its topics
         self.within = (
             False  # whether what is published belongs to a physics step before the last of the period
@@ -84,7 +85,7 @@ class PlantPeriod:
         if publisher is self._truth:
             return  # only simulated sensors may read it
         self._kept.append((publisher, data))
-        topic = publisher.topic_name
+        topic = self._topics.get(publisher) or self._topics.setdefault(publisher, publisher.topic_name)
         seconds, nanoseconds = STAMP.unpack_from(data, STAMP_AT)
         time_ns = 1_000_000_000 * seconds + nanoseconds
         if time_ns > self._newest_ns.get(topic, -1):  # who counts by stamps leaves repetitions out

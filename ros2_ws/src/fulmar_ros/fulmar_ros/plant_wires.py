@@ -5,7 +5,6 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -205,15 +204,18 @@ class PlantWires:
                 return  # a device that has nothing else that is new; further back, the clock was set
             time_ns = self._captured_ns = sample.stamp_ns
         self._publish_things(sample, time_ns)
-        self._sensors.publish(sample.readings, time_ns)
-        if self._mocap is not None and sample.odometry is not None:
-            for stamp, state in self._mocap.see(sample.odometry, time_ns):
-                self._publish_pose(stamp, state)
+        self._publish_readings(sample, time_ns)
         self.publish_truth(sample, time_ns)
         now = time.monotonic_ns()
         if self._clock is not None and now - self._clock_ns >= CLOCK_PERIOD_NS:
             self._publish(self._clock, Clock(clock=stamp_of(time_ns)))
             self._clock_ns = now
+
+    def _publish_readings(self, sample: Sample, time_ns: int) -> None:
+        self._sensors.publish(sample.readings, time_ns)
+        if self._mocap is not None and sample.odometry is not None:
+            for stamp, state in self._mocap.see(sample.odometry, time_ns):
+                self._publish_pose(stamp, state)
 
     def repeat_sample(self, sample: Sample, time_ns: int, *, whole: bool) -> None:
         """Publish a sample of lock step again.
@@ -277,7 +279,9 @@ class PlantWires:
         """Publish the readings of a physics step within a period; see `PlantPeriod`."""
         assert self._period is not None
         self._period.within = True
-        self.publish_sample(replace(sample, things={}), time_ns)
+        with self.lock:
+            self._sent.note(time_ns, time.monotonic_ns())
+        self._publish_readings(sample, time_ns)
         self._period.within = False
 
     def publish_period(self, sample: Sample, time_ns: int) -> None:
