@@ -13,7 +13,7 @@ from fulmar_core.estimators.motion.history import HistoryEstimator
 from fulmar_core.estimators.motion.kalman import LeanKalmanFilter
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.robots.sensors.imu import ImuSample
-from fulmar_core.states.rotation import size_of
+from fulmar_core.states.rotation import cross, size_of
 from fulmar_core.wires.reading import Reading
 
 BEGIN_NS, TICK_NS = 1_000_000_000, 20_000_000
@@ -80,3 +80,10 @@ def test_the_newest_pose_is_taken_where_the_filter_is_as_after_a_replay(robot, k
     np.testing.assert_array_equal(found, estimates(robot, kind))
     assert len(found) > 30
     assert fewer < counts["now"] - fewer
+
+
+@pytest.mark.parametrize("shape", [(3,), (1, 3), (9, 3)])
+def test_a_vector_product_has_the_bits_of_numpy(shape):
+    a, b = np.random.default_rng(7).normal(size=(2, *shape))
+    np.testing.assert_array_equal(cross(a, b), np.cross(a, b))
+    np.testing.assert_array_equal(cross(a[..., :], np.broadcast_to(b, shape)), np.cross(a, b))

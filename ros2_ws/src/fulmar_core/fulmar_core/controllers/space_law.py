@@ -14,6 +14,7 @@ from fulmar_core.controllers.law import Law
 from fulmar_core.controllers.space_frame import SpaceFrame, SpaceMotion
 from fulmar_core.controllers.target_motion import TargetMotion
 from fulmar_core.robots.actuators.pushing import Pushing
+from fulmar_core.states.rotation import cross
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,7 +87,7 @@ class SpaceLaw(Law):
             now = self.frame.less_target(now, inputs, *motion)
         wrench = self.wrench(self._way(inputs, now), now)
         # Allocations count torques about the body's origin.
-        wrench[..., 3:] += np.cross(self._com, wrench[..., :3])
+        wrench[..., 3:] += cross(self._com, wrench[..., :3])
         best = self.allocation if self._modulation is None else self._modulation
         return np.asarray(best.best(wrench, now.alive))
 
@@ -110,11 +111,11 @@ class SpaceLaw(Law):
 
     def turning_force(self, now: SpaceMotion) -> np.ndarray:
         """Force that keeps a velocity in the body's frame while it turns, m ω × v, shape (n, 3) [N]."""
-        return np.asarray(self.robot.body.mass * np.cross(now.turning, now.moving))
+        return np.asarray(self.robot.body.mass * cross(now.turning, now.moving))
 
     def gyroscopic(self, now: SpaceMotion) -> np.ndarray:
         """ω × J ω, shape (n, 3) [N·m]."""
-        return np.asarray(np.cross(now.turning, now.turning @ self._inertia))
+        return np.asarray(cross(now.turning, now.turning @ self._inertia))
 
     def _way(self, inputs: Inputs, now: SpaceMotion) -> np.ndarray:
         """Way to aim at, beyond waypoints where the path goes straight on, cut to the limits."""

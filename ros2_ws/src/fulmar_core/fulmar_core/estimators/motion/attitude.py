@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from functools import partial
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -28,12 +28,13 @@ from fulmar_core.robots.actuators.reaction_wheels import ReactionWheels
 from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.sensors.imu import NO_GYROSCOPE
 from fulmar_core.states.attitude import exponential, normalised, product, rotation_error
-from fulmar_core.states.rotation import rotate
+from fulmar_core.states.rotation import cross, rotate
 from fulmar_core.states.state import RigidBodyState
 from fulmar_core.wires.reading import Reading
 
 TURN, RATE, BIAS = slice(0, 3), slice(3, 6), slice(6, 9)  # of the errors
 ERRORS = 9
+_ONE, _SAME = np.eye(3), np.eye(ERRORS)
 KEPT_NS = 2_000_000_000  # how late a reading may come
 LATE_SHARE = 0.1  # of what a rate changed since its reading: how far the reading may be off by that
 GATE = 16.3  # 1 good reading of 1,000 lies beyond it: chi-squared, 3 degrees of freedom
@@ -110,7 +111,7 @@ class AttitudeEstimator:
         if self.problem:
             return None
         state = RigidBodyState(np.zeros(3), self._quat.copy(), np.zeros(3), self._turning.copy())
-        axes = rotate(self._quat, np.eye(3)).T  # body to world
+        axes = rotate(self._quat, _ONE).T  # body to world
         covariance = np.zeros((12, 12))
         covariance[3:6, 3:6] = axes @ self._P[TURN, TURN] @ axes.T
         covariance[9:, 9:] = self._P[RATE, RATE]
@@ -218,7 +219,7 @@ class AttitudeEstimator:
 
     def _use_gyroscope(self, rate: np.ndarray, stamp_ns: int) -> str:
         self._move_to(stamp_ns)
-        noise = self._settings.gyroscope_std**2 * np.eye(3)
+        noise = self._settings.gyroscope_std**2 * _ONE
         self._correct(rate - self._turning - self._bias, (RATE, BIAS), noise, gated=False)
         self._gyroscope_ns = stamp_ns
         return ""
@@ -297,7 +298,8 @@ class AttitudeEstimator:
         """
         half_s = 0.5 * min(passed_s, SPIN_GAP_NS / 1e9)
         self._turning = self._turning - lost
-        self._quat = np.asarray(normalised(product(tuple(self._quat), exponential(tuple(-half_s * lost)))))
+        turned = exponential(tuple((-half_s * lost).tolist()))
+        self._quat = np.asarray(normalised(product(tuple(self._quat.tolist()), turned)))
         spread = self._settings.wheel_std * self._wheels.spin_inertia
         noise = 2.0 * spread**2 * self._lightness @ self._lightness.T
         noise = noise + self._settings.inertia_share**2 * np.outer(lost, lost)
@@ -315,21 +317,16 @@ class AttitudeEstimator:
         self._past.append((self._stamp_ns, self._quat, self._turning))
         momentum = np.zeros(3) if self._momentum is None else self._momentum
         rate = self._turning
-        gyroscopic = -self._lightness @ np.cross(rate, self._inertia @ rate + momentum)
+        gyroscopic = -self._lightness @ cross(rate, self._inertia @ rate + momentum)
         after = rate + t * gyroscopic
-        turned = exponential(tuple(0.5 * t * (rate + after)))
-        self._quat = np.asarray(normalised(product(tuple(self._quat), turned)))
+        turned = exponential(tuple((0.5 * t * (rate + after)).tolist()))
+        self._quat = np.asarray(normalised(product(tuple(self._quat.tolist()), turned)))
         self._turning = after
-        F = np.eye(ERRORS)
-        F[TURN, TURN] = rotate(np.asarray(turned), np.eye(3))  # of the inverse rotation: rows are turned axes
-        F[TURN, RATE] = t * np.eye(3)
-        Q, one, s = np.zeros((ERRORS, ERRORS)), np.eye(3), self._settings
+        F = _SAME.copy()
+        F[TURN, TURN] = rotate(np.asarray(turned), _ONE)  # of the inverse rotation: rows are turned axes
+        F[TURN, RATE] = t * _ONE
         measured = stamp_ns <= self._spin_ns + (0 if self._blind else SPIN_GAP_NS)
-        spin = (s.rate_spread if measured else s.rate_spread_blind) ** 2
-        Q[TURN, TURN], Q[RATE, RATE] = spin * t**3 / 3.0 * one, spin * t * one
-        Q[TURN, RATE] = Q[RATE, TURN] = spin * t * t / 2.0 * one
-        Q[BIAS, BIAS] = s.gyroscope_drift**2 * t * one
-        self._P = F @ self._P @ F.T + Q
+        self._P = F @ self._P @ F.T + _noise(self._settings, t, measured=measured)
         self._stamp_ns = stamp_ns
         while self._past and self._past[0][0] < stamp_ns - KEPT_NS:
             self._past.popleft()
@@ -351,19 +348,35 @@ class AttitudeEstimator:
 
     def _correct(self, residual: np.ndarray, part: Any, noise: np.ndarray, *, gated: bool) -> bool:
         """Correct by a residual of one part of the errors, or of the sum of several; whether it passed the gate."""
-        parts = part if isinstance(part, tuple) else (part,)
-        H = np.zeros((3, ERRORS))
-        for each in parts:
-            H[:, each] = np.eye(3)
+        H = _rows(*(each.start for each in (part if isinstance(part, tuple) else (part,))))
         spread = H @ self._P @ H.T + noise
         if gated and float(residual @ np.linalg.solve(spread, residual)) > GATE:
             self.outliers += 1
             return False
         gain = np.linalg.solve(spread, H @ self._P).T
         error = gain @ residual
-        left = np.eye(ERRORS) - gain @ H
+        left = _SAME - gain @ H
         self._P = left @ self._P @ left.T + gain @ noise @ gain.T  # Joseph's form stays symmetric
-        turned = exponential(tuple(error[TURN]))
-        self._quat = np.asarray(normalised(product(tuple(self._quat), turned)))
+        turned = exponential(tuple(error[TURN].tolist()))
+        self._quat = np.asarray(normalised(product(tuple(self._quat.tolist()), turned)))
         self._turning, self._bias = self._turning + error[RATE], self._bias + error[BIAS]
         return True
+
+
+@lru_cache(maxsize=64)
+def _noise(s: AttitudeSettings, t: float, *, measured: bool) -> np.ndarray:
+    """What noise adds to the covariance in a time [s]; `measured`: the wheels are. Not to be changed."""
+    Q, spin = np.zeros((ERRORS, ERRORS)), (s.rate_spread if measured else s.rate_spread_blind) ** 2
+    Q[TURN, TURN], Q[RATE, RATE] = spin * t**3 / 3.0 * _ONE, spin * t * _ONE
+    Q[TURN, RATE] = Q[RATE, TURN] = spin * t * t / 2.0 * _ONE
+    Q[BIAS, BIAS] = s.gyroscope_drift**2 * t * _ONE
+    return Q
+
+
+@lru_cache(maxsize=8)
+def _rows(*starts: int) -> np.ndarray:
+    """Derivative of the sum of parts of the errors that begin at some numbers, shape (3, 9). Not to be changed."""
+    H = np.zeros((3, ERRORS))
+    for start in starts:
+        H[:, start : start + 3] = _ONE
+    return H
