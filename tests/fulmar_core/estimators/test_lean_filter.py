@@ -86,4 +86,3 @@ def test_the_newest_pose_is_taken_where_the_filter_is_as_after_a_replay(robot, k
 def test_a_vector_product_has_the_bits_of_numpy(shape):
     a, b = np.random.default_rng(7).normal(size=(2, *shape))
     np.testing.assert_array_equal(cross(a, b), np.cross(a, b))
-    np.testing.assert_array_equal(cross(a[..., :], np.broadcast_to(b, shape)), np.cross(a, b))

@@ -69,10 +69,10 @@ class _Layout:
         ] = []  # part, field, how it is listed, and where it is
         self._count = 0
         texts: list[str] = []
-        self._message = self._same(message, texts)
-        self._stamp = getattr(getattr(self._message, "header", None), "stamp", None)
-        if self._stamp is None:
+        if next(iter(message.get_fields_and_field_types()), "") != "header":
             raise ValueError(f"{type(message).__name__} does not begin with a header.")
+        self._message = self._same(message, texts)
+        self._stamp = self._message.header.stamp
         self._image = layout_of(copy.deepcopy(message), *texts)
 
     def read(self, data: bytes) -> Any:

@@ -137,8 +137,9 @@ class EstimatorNode(Node):
         receive = partial(self._on_message, name, self.resolve_topic_name(wire.name), read)
         if lockstep:
             qos = subscriber_qos(wire, reliable=True, depth=depth, lossless=True)
-            receive = BytesReader(kind).passing(receive)
-            return [self.create_subscription(kind, wire.name, receive, qos, raw=True)]
+            return [
+                self.create_subscription(kind, wire.name, BytesReader(kind).passing(receive), qos, raw=True)
+            ]
         return subscribe_every(self, kind, wire, receive, depth=depth)
 
     def _on_message(self, name: str, topic: str, read: Read, message: Any) -> None:

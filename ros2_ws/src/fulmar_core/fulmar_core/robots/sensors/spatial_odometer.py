@@ -53,8 +53,8 @@ class SpatialOdometer(Odometer[SpatialState]):
             quantum = xp.concat((quantum[PLACE], quantum[MOTION]), axis=0)
             step = xp.where(quantum > 0.0, quantum, xp.ones_like(quantum))
             linear = xp.where(quantum > 0.0, xp.round(linear / step) * step, linear)
-        turned = np.array([turned]).T if isinstance(turned[0], float) else xp.stack(turned)
-        return xp.concat((linear[0:3], turned, linear[3:9]), axis=0)
+        attitude = np.array([turned]).T if isinstance(turned[0], float) else xp.stack(turned)
+        return xp.concat((linear[0:3], attitude, linear[3:9]), axis=0)
 
     def _errors(self, columns: Array, world: Any, drawn: Drawn) -> Array:
         """Bias, noise and blur of each channel, shape (12, n)."""
