@@ -10,11 +10,12 @@ from nav_msgs.msg import Odometry
 from rclpy.serialization import deserialize_message
 
 from fulmar_core.estimators.motion.estimator import Estimate
+from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.robots.topics import INERTIA, ODOMETRY, RATE
 from fulmar_core.states.rotation import rotate_inverse
 from fulmar_core.states.state import RigidBodyState
 from fulmar_core.wires.robot_name import Frames
-from fulmar_ros.estimator_node import EstimatorNode
+from fulmar_ros.estimator_node import EstimatorNode, _is_lacking
 from fulmar_ros.estimator_wires import WRITERS
 
 FRAMES = Frames("alpha/")
@@ -71,3 +72,12 @@ def test_what_a_controller_waits_for_goes_out_before_the_transform():
     assert EstimatorNode._messages(node, estimate) == [("odom", 5), ("tf", ("state", 5))]
     node._transform = None
     assert EstimatorNode._messages(node, estimate) == [("odom", 5)]
+
+
+def test_an_estimator_waits_for_no_sensor_that_the_robot_lacks():
+    names = ("imu", "mocap", "star_tracker", "wheels", "rate")
+    lacking = {
+        robot: [name for name in names if _is_lacking(name, load_robot(robot))]
+        for robot in ("spacecraft_16", "cubesat_wheels")
+    }
+    assert lacking == {"spacecraft_16": ["star_tracker", "wheels"], "cubesat_wheels": []}

@@ -128,3 +128,17 @@ def test_a_reading_that_got_lost_is_taken_when_the_period_is_repeated():
     for topic, stamp in (("/r/imu/data", 10), ("/r/imu/data", 20), ("/r/mocap/pose", 20)):
         box.add(topic, stamp, f"{TOPICS[topic]} {stamp}")
     assert box.take() == (20, [("imu", "imu 10")])
+
+
+def test_a_topic_of_a_sensor_that_the_robot_lacks_is_not_waited_for():
+    topics = TOPICS | {"/r/attitude": "star_tracker"}
+    for silent, found in (((), []), (["/r/attitude"], [("imu", "imu 10"), ("mocap", "mocap 10")])):
+        box = PeriodInbox[str](topics, silent=silent)
+        box.expect(PLANT, 0, {})
+        assert box.take() == (0, [])
+        for topic, name in TOPICS.items():
+            box.add(topic, 10, f"{name} 10")
+        assert box.ready() == found
+    box.add("/r/attitude", 5, "attitude 5")  # from whoever sends it after all
+    box.expect(PLANT, 10, {topic: 1 for topic in topics})
+    assert box.take() == (10, [("star_tracker", "attitude 5")])

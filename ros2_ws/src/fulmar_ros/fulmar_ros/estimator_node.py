@@ -28,6 +28,7 @@ from fulmar_core.config.process import CONTROL_PRIORITY, take_priority_with_help
 from fulmar_core.estimators.kinds import estimator_kind, load_estimator, make_estimator
 from fulmar_core.estimators.motion.estimator import LACKS_NOTHING, Estimate
 from fulmar_core.estimators.readings import reading_problem, readings_of
+from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.robots.topics import ODOMETRY, Wire
 from fulmar_core.robots.wire_check import BETWEEN, WIRE_WARNINGS
@@ -121,6 +122,7 @@ class EstimatorNode(Node):
                 [publisher for publisher, _ in self._outputs],
                 take=self._take_early,
                 upstream=[node for node in settings.upstream if node],
+                silent=[topic for topic, name in topics.items() if _is_lacking(name, robot)],
                 wait_for_subscribers=settings.wait_for_subscribers,
             )
         self.create_timer(WATCH_S, self._publish_status, clock=Clock(clock_type=ClockType.STEADY_TIME))
@@ -268,6 +270,11 @@ class EstimatorNode(Node):
         """Wait for the last estimate to arrive; nodes that receive none stop by themselves."""
         for publisher, _ in self._outputs:
             publisher.wait_for_all_acked(Duration(seconds=LAST_WORDS_S))
+
+
+def _is_lacking(name: str, robot: Robot) -> bool:
+    """Whether a reading is that of a sensor which a robot does not have."""
+    return readings_of(robot)[name].sensor is not None and name not in robot.sensors.kinds
 
 
 def main() -> None:

@@ -33,6 +33,7 @@ class LockstepAnswer:
         *,
         take: Callable[[str, Any], object] | None = None,
         upstream: Iterable[str] = (),
+        silent: Iterable[str] = (),
         wait_for_subscribers: int = 0,
     ) -> None:
         """Create the endpoints; last, after every other subscription, so that a plant that sees these has all.
@@ -46,12 +47,13 @@ class LockstepAnswer:
             take: Called with the name of a reading and the reading as soon as none that goes before it can come; the
                 rest of a period goes to `compute`. None: all of it does.
             upstream: Other nodes between plant and this one.
+            silent: As in `PeriodInbox`.
             wait_for_subscribers: Of each output; before they are there the plant is not answered, and asks again.
         """
         self._compute, self._outputs, self._awaited = compute, tuple(outputs), wait_for_subscribers
         self._take = take
         self._topics = [publisher.topic_name for publisher in self._outputs]
-        self._inbox: PeriodInbox[Any] = PeriodInbox(topics, upstream=upstream)
+        self._inbox: PeriodInbox[Any] = PeriodInbox(topics, upstream=upstream, silent=silent)
         self._name = node.get_name()
         self._sent: list[tuple[Publisher, Any]] = []
         self._answers = node.create_publisher(JointState, ANSWER.name, publisher_qos(ANSWER, lockstep=True))

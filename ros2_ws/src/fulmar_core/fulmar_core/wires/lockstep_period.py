@@ -29,18 +29,21 @@ class PeriodInbox(Generic[T]):
         answered_ns: Stamp of the period that was handed over last; -1 before the first [ns].
     """
 
-    def __init__(self, topics: Mapping[str, str], *, upstream: Iterable[str] = ()) -> None:
+    def __init__(
+        self, topics: Mapping[str, str], *, upstream: Iterable[str] = (), silent: Iterable[str] = ()
+    ) -> None:
         """Begin empty.
 
         Args:
             topics: Name of the reading by the topic on which it comes.
             upstream: Nodes other than the plant that publish some of these topics.
+            silent: Topics that no node of the chain publishes, such as those of sensors that the robot lacks.
         """
         self._topics = dict(topics)
         self._sources = (PLANT, *upstream)
         self._items: dict[str, dict[int, T]] = {topic: {} for topic in topics}
         self._taken_ns = dict.fromkeys(topics, -1)
-        self._newest_ns = dict.fromkeys(topics, -1)
+        self._newest_ns = {topic: -1 for topic in topics if topic not in set(silent)}
         # Of the period under way, by topic: stamps of what `ready` has handed over.
         self._early: dict[str, set[int]] = {topic: set() for topic in topics}
         self._expected: dict[str, tuple[int, dict[str, int]]] = {}
@@ -50,7 +53,8 @@ class PeriodInbox(Generic[T]):
         """Keep what came on a topic; a repetition of what is there or was handed over is left out."""
         if stamp_ns > self._taken_ns[topic] and stamp_ns not in self._early[topic]:
             self._items[topic].setdefault(stamp_ns, item)
-            self._newest_ns[topic] = max(self._newest_ns[topic], stamp_ns)
+            if stamp_ns > self._newest_ns.get(topic, stamp_ns):
+                self._newest_ns[topic] = stamp_ns
 
     def ready(self) -> list[tuple[str, T]]:
         """Hand over what belongs first into the period under way, before the period is complete; ordered as by `take`.
@@ -61,7 +65,7 @@ class PeriodInbox(Generic[T]):
         """
         if self.answered_ns < 0 or len(self._sources) > 1:
             return []
-        until_ns = min(self._newest_ns.values())
+        until_ns = min(self._newest_ns.values(), default=-1)
         if until_ns <= self.answered_ns:
             return []
         found = []
