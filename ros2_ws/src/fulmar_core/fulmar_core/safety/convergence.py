@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections import deque
 from dataclasses import replace
@@ -62,9 +63,9 @@ class TimeToGoal:
             np.abs(errors.yaw_rate) / self._turn if limits.yaw_rate else None,
             np.abs(errors.rate) / self._turn if limits.rate else None,
         ]
-        return np.asarray(np.maximum.reduce([part for part in parts if part is not None]))
+        return np.asarray(functools.reduce(np.maximum, [part for part in parts if part is not None]))
 
-    @property
+    @functools.cached_property
     def at_tolerance(self) -> float:
         """Of errors of so many tolerances that they are no reason to stop [s]."""
         names = Errors.__slots__
@@ -144,7 +145,7 @@ class ConvergenceMonitor:
     def _shift(self, state: State, goal: Goal, now: np.ndarray) -> np.ndarray | float:
         """What the target's own motion since the last step adds to the time to it [s]."""
         assert self._goal is not None
-        if np.array_equal(self._goal.current, goal.current):
+        if goal is self._goal or np.array_equal(self._goal.current, goal.current):
             return 0.0
         stood = replace(self._goal, things=goal.things)
         return np.asarray(now - self._time.of(self._task.errors(state, stood)))
@@ -208,4 +209,4 @@ class ConvergenceWatch:
         newest = self._applied.newest if self._applied is not None else None
         if newest is None or not self._own:
             return False
-        return not any(np.all(np.abs(newest - own) <= self._alike) for own in self._own)
+        return not any((np.abs(newest - own) <= self._alike).all() for own in reversed(self._own))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,6 +34,9 @@ class Beliefs:
     words: tuple[str, ...] = ()
     open: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
+
+
+NOTHING = Beliefs()
 
 
 def joined(estimated: Beliefs, monitored: Beliefs, suspects: tuple[str, ...]) -> Beliefs:
@@ -71,6 +75,10 @@ class BeliefReader:
 
     def read(self, health: Health) -> Beliefs:
         """Warn of valves believed dead, and of a push beyond what the valves can hold; `health` of one robot."""
+        ahead, left, torque = health.push.tolist()
+        small = math.hypot(ahead, left) < self._reach.at_least and abs(torque) <= self._torque
+        if small and not bool(health.held) and health.effectiveness.min() >= DEAD_BELOW:
+            return NOTHING
         shares = dict(zip(self._names, health.effectiveness.tolist(), strict=True))
         dead = tuple(name for name, share in shares.items() if share < DEAD_BELOW)
         words = [f"{said_dead('valve', name)} (effectiveness {shares[name]:.2f})" for name in dead]

@@ -96,7 +96,9 @@ class FaultBank:
         #: Acceleration of each axis by one actuator.
         self._unit = one[group]
         self._which = 2 * easy[:, None] + group  # filter of each hypothesis and axis
-        self._gains: tuple[Gains, Gains] | None = None  # of the filters, and of each hypothesis and axis
+        self._group = group  # of each axis
+        self._gains: tuple[Gains, Gains, np.ndarray] | None = None  # see `_gains_of`
+        self._few = self._settings.anew * self.hypotheses.prior
         self.reset()
 
     def reset(self) -> None:
@@ -104,8 +106,9 @@ class FaultBank:
         count, axes = len(self.hypotheses.all), len(self._axes)
         self._last: BodyMotion | None = None
         self.chance = self.hypotheses.prior.copy()
-        self._state = np.zeros((3, count, axes))  # pose, velocity, acceleration by the push
-        self._response = np.zeros((3, count, axes))  # of these to the factors
+        # Pose, velocity and acceleration by the push, and the response of these to the factors.
+        self._both = np.zeros((2, 3, count, axes))
+        self._state, self._response = self._both
         self._factor = np.ones((count, 2))
         self._doubt = np.tile(self._spread**2, (count, 1))
         self._usual = np.zeros((count, axes))  # mean acceleration by the commands of late
@@ -166,84 +169,84 @@ class FaultBank:
         self._turned = self._turned + swing
         place, speed, free = self._accelerations(last, swing, applied)
         factor = self._by_axis(self._factor)
-        ahead = _moved(self._state, dt, half)
+        both = _moved(self._both, dt, half)
+        ahead, response = both
         ahead[0] += half * (factor * place + free)
         ahead[1] += dt * (factor * speed + free)
-        response = _moved(self._response, dt, half)
         response[0] += half * place
         response[1] += dt * speed
         self._usual += min(1.0, dt / self._settings.learned_s) * (speed - self._usual)
-        pose = (np.concatenate((motion.position, self._turned)) - self._begin)[self._axes]
-        self._learn(ahead, response, pose - ahead[0], motion.velocity[self._axes] - ahead[1], dt, half)
+        # Errors of pose and velocity, and what leaves no response of either.
+        off = np.negative(both[:, :2])
+        off[0, 0] += (np.concatenate((motion.position, self._turned)) - self._begin)[self._axes]
+        off[0, 1] += motion.velocity[self._axes]
+        self._learn(both, off, dt, half)
 
-    def _learn(
-        self,
-        ahead: np.ndarray,
-        response: np.ndarray,
-        off: np.ndarray,
-        off_speed: np.ndarray,
-        dt: float,
-        half: float,
-    ) -> None:
-        """Learn from the errors of pose and velocity, shapes (hypotheses, axes)."""
-        s, gains = self._settings, self._gains_of(dt, half)
-        odd = _white(gains, off, off_speed)
-        about = _white(gains, response[0], response[1])
-        along = self._by_group((about * about).sum(axis=0))
-        common = self._by_group((about * odd).sum(axis=0))
+    def _learn(self, both: np.ndarray, off: np.ndarray, dt: float, half: float) -> None:
+        """Learn from the errors of pose and velocity; shapes (2, 3 or 2, hypotheses, axes)."""
+        s = self._settings
+        gains, log_white = self._gains_of(dt, half)
+        white = _white(gains, off)
+        odd, about = white
+        squares = white * about
+        along, common = self._by_group(squares[1]), self._by_group(squares[0])
         doubt = self._doubt + s.misfit**2
-        square = self._by_group((odd * odd).sum(axis=0)) - common * common * doubt / (1.0 + doubt * along)
-        surprise = 0.5 * (square / self._noise + np.log1p(doubt * along)).sum(axis=-1)
-        surprise -= gains.log_white.sum(axis=-1)
+        spread = doubt * along
+        wider = 1.0 + spread
+        square = self._by_group(odd * odd) - common * common * doubt / wider
+        surprise = square / self._noise + np.log1p(spread)
+        surprise = 0.5 * (surprise[:, 0] + surprise[:, 1]) - log_white
         surprise -= surprise.min()
         chance = self.chance * np.exp(-np.minimum(surprise, s.surprise))
         self.chance = chance / chance.sum()
         share = min(1.0, dt / s.memory_s)
-        fresh = np.minimum(square[np.argmax(self.chance)] / self._numbers, WORST)
+        fresh = np.minimum(square[self.chance.argmax()] / self._numbers, WORST)
         self._noise = np.maximum(1.0, self._noise + share * (fresh - self._noise))
         # Two stages: first the factors, then the motion under them.
-        left = self._doubt / (1.0 + doubt * along)
-        factor = np.clip(self._factor + left * common, *self._factors)
-        better = self._by_axis(factor - self._factor)
-        kept = _corrected(gains, response, -response[0], -response[1])
-        state = _corrected(gains, ahead, off, off_speed) + better * kept
-        self._mix(state, kept, factor, left + s.wander**2 * dt, dt)
+        left = self._doubt / wider
+        least, most = self._factors
+        factor = np.minimum(np.maximum(self._factor - left * common, least), most)
+        both += gains.pose * off[:, :1]
+        both += gains.velocity * off[:, 1:]
+        both[0] += self._by_axis(factor - self._factor) * both[1]
+        self._mix(both, factor, left + s.wander**2 * dt, dt)
 
-    def _mix(
-        self, state: np.ndarray, response: np.ndarray, factor: np.ndarray, doubt: np.ndarray, dt: float
-    ) -> None:
+    def _mix(self, both: np.ndarray, factor: np.ndarray, doubt: np.ndarray, dt: float) -> None:
         """Let unlikely hypotheses go on from what the likely ones believe."""
-        change = self._settings.change * dt
-        kept = (1.0 - change) * self.chance
-        total = kept + change * self.hypotheses.prior
-        own, chance = (
-            (self.chance / (self.chance + self._settings.anew * self.hypotheses.prior))[:, None],
-            self.chance,
-        )
-        anew = np.repeat((chance @ state)[:, None], len(chance), axis=1)
-        anew[2] += self._for_long * (chance @ self._usual - self._usual)
-        self._state = own * state + (1.0 - own) * anew
-        self._response = own * response + (1.0 - own) * (chance @ response)[:, None]
-        self._factor = own * factor + (1.0 - own) * (chance @ factor)
-        self._doubt = own * doubt + (1.0 - own) * (chance @ doubt)
-        self.chance = total
+        change, chance = self._settings.change * dt, self.chance
+        own = (chance / (chance + self._few))[:, None]
+        rest = 1.0 - own
+        anew = np.empty_like(both)
+        anew[...] = (chance @ both)[:, :, None]
+        anew[0, 2] += self._for_long * (chance @ self._usual - self._usual)
+        self._both = own * both
+        self._both += np.multiply(rest, anew, out=anew)
+        self._state, self._response = self._both
+        self._factor = own * factor + rest * (chance @ factor)
+        self._doubt = own * doubt + rest * (chance @ doubt)
+        self.chance = (1.0 - change) * chance + change * self.hypotheses.prior
 
-    def _gains_of(self, dt: float, half: float) -> Gains:
-        """Of each hypothesis and axis, shapes (hypotheses, axes)."""
+    def _gains_of(self, dt: float, half: float) -> tuple[Gains, np.ndarray]:
+        """Of each hypothesis and axis, shapes (hypotheses, axes), and the sum of their `log_white`."""
         gains = self._filters.advance(dt, half)
         if self._gains is None or self._gains[0] is not gains:
-            self._gains = gains, gains.at(self._which)
-        return self._gains[1]
+            each = gains.at(self._which)
+            self._gains = gains, each, each.log_white.sum(axis=-1)
+        return self._gains[1:]
 
     def _by_axis(self, values: np.ndarray) -> np.ndarray:
         """Numbers of both groups, shape (hypotheses, 2), for every axis."""
-        return values[:, self._which[0] % 2]
+        return values.take(self._group, axis=1)
 
     def _by_group(self, values: np.ndarray) -> np.ndarray:
-        """Sums over the axes of both groups, shape (hypotheses, 2)."""
-        found = np.empty((len(values), 2))
-        values[:, : self._moving].sum(axis=1, out=found[:, MOVING])
-        values[:, self._moving :].sum(axis=1, out=found[:, TURNING])
+        """Sums of two squares over the axes of both groups, shape (2, hypotheses, axes) to (hypotheses, 2)."""
+        each = values[0] + values[1]
+        found = np.empty((len(each), 2))
+        for group, begin, end in ((MOVING, 0, self._moving), (TURNING, self._moving, each.shape[1])):
+            total = each[:, begin]
+            for axis in range(begin + 1, end):
+                total = total + each[:, axis]
+            found[:, group] = total
         return found
 
     def _accelerations(
@@ -278,23 +281,18 @@ class FaultBank:
 
 
 def _moved(state: np.ndarray, dt: float, half: float) -> np.ndarray:
-    """Pose, velocity and push after a step without commands."""
+    """Pose, velocity and push after a step without commands, shape (2, 3, ...)."""
     moved = state.copy()
-    moved[0] += dt * state[1] + half * state[2]
-    moved[1] += dt * state[2]
+    moved[:, 0] += dt * state[:, 1] + half * state[:, 2]
+    moved[:, 1] += dt * state[:, 2]
     return moved
 
 
-def _white(gains: Gains, pose: np.ndarray, velocity: np.ndarray) -> np.ndarray:
-    """White numbers of an innovation, shape (2, hypotheses, axes)."""
-    white: np.ndarray = gains.white[:2] * pose
-    white[1] += gains.white[2] * velocity
+def _white(gains: Gains, off: np.ndarray) -> np.ndarray:
+    """White numbers of innovations of pose and velocity, shapes (2, 2, ...)."""
+    white = gains.white[:2] * off[:, :1]
+    white[:, 1] += gains.white[2] * off[:, 1]
     return white
-
-
-def _corrected(gains: Gains, state: np.ndarray, pose: np.ndarray, velocity: np.ndarray) -> np.ndarray:
-    """State after an innovation."""
-    return np.asarray(state + gains.pose * pose + gains.velocity * velocity)
 
 
 def _one_actuator(robot: Robot) -> tuple[float, float]:

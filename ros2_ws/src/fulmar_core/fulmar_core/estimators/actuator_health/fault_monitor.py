@@ -30,6 +30,7 @@ WORST_FIT = 2.5  # mean square of the best hypothesis' errors, in standard devia
 BESIDE = 0.45
 # A push of so much of one actuator's thrust is about that of one [-].
 ABOUT_ONE = (0.3, 1.5)
+SOUND = 0.6  # chance that nothing is wrong from which nothing else is likely, nor suspected [-]
 
 
 @dataclass(slots=True)
@@ -57,6 +58,7 @@ class FaultMonitor:
     Attributes:
         bank: Has the chances.
         beliefs: What is believed now.
+        suspects: Names of actuators that are rather dead than not.
     """
 
     def __init__(self, robot: Robot, applied: AppliedHistory, *, control_hz: float, lockstep: bool) -> None:
@@ -77,6 +79,7 @@ class FaultMonitor:
         self._least_ns = round(1e9 * (LEAST_S - 0.5 * robot.timing.physics_dt))
         every = self.bank.hypotheses.all
         self._kinds = {kind: np.array([each.kind is kind for each in every]) for kind in Kind}
+        self._sound = int(np.flatnonzero(self._kinds[Kind.SOUND])[0])
         self._stuck = np.zeros((len(every), len(self._names)))
         for row, each in enumerate(every):
             self._stuck[row, list(each.stuck)] = 1.0
@@ -100,10 +103,10 @@ class FaultMonitor:
         self._dead, self._open = Persistence.of(count, LIKELY_DEAD), Persistence.of(count, LIKELY_OPEN)
         self._others = Persistence.of(2, LIKELY_OTHER)  # a push from nobody, and no effect of any command
         self.beliefs = Beliefs()
+        self.suspects: tuple[str, ...] = ()
+        self._nothing = True  # is named, or has begun to be likely
 
-    @property
-    def suspects(self) -> tuple[str, ...]:
-        """Names of actuators that are rather dead than not."""
+    def _suspects(self) -> tuple[str, ...]:
         dead = (self.bank.chance * self._kinds[Kind.DEAD]) @ self._stuck
         return tuple(name for name, chance in zip(self._names, dead, strict=True) if chance >= DROPPED_BELOW)
 
@@ -125,7 +128,9 @@ class FaultMonitor:
         if before_ns >= 0 and passed_ns <= LONGEST_S * 1e9:
             applied = self._applied.between(before_ns - self._late_ns, stamp_ns - self._late_ns)
         self.bank.take(state, applied)
-        if applied is not None:
+        sound = self.bank.chance[self._sound] > SOUND
+        self.suspects = () if sound else self._suspects()
+        if applied is not None and not (sound and self._nothing):
             self._follow(1e-9 * passed_ns)
 
     def _follow(self, passed_s: float) -> None:
@@ -140,6 +145,9 @@ class FaultMonitor:
         powerless = float(chance[self._kinds[Kind.POWERLESS]].sum())
         self._others.update(np.array([pushed, powerless]), passed_s)
         self.beliefs = self._beliefs()
+        self._nothing = not any(
+            part.since_s.any() or part.named.any() for part in (self._dead, self._open, self._others)
+        )
 
     def _explained(self) -> np.ndarray:
         """For each hypothesis, whether little pushes beside what it says, shape (hypotheses,).

@@ -112,9 +112,6 @@ class PushFilter:
 
 ALLOWANCE = 1.0  # evidence that is forgotten in one second: errors of the model add up slowly [-]
 MOST = 6.0  # evidence of one measurement at most, as log-likelihood [-]
-OF_THE_MEAN = np.array(
-    [1, 1, 1, 0, 0, 0]
-)  # of pose and velocity, what is compared with a mean of measurements
 RELEASE = 6.0  # evidence for motion that ends a standstill: a third of a second of full thrust [-]
 
 
@@ -133,8 +130,8 @@ class HoldDetector:
         self._spread = np.array([s.position, s.position, s.heading, s.velocity, s.velocity, s.yaw_rate])
         self._limit = s.held
         self._evidence = np.zeros(shape)
-        self._place = np.zeros((*shape, 3))  # mean pose since the evidence began [m, m, rad]
-        self._count = np.zeros(shape)  # measurements in it
+        self._place: np.ndarray | None = None  # mean pose since the evidence began, shape (..., 3) [m, m, rad]
+        self._count, self._begun = np.ones(shape), 0.0  # measurements in it; and whether there are any
         self.held = np.zeros(shape, dtype=bool)
 
     @property
@@ -151,18 +148,27 @@ class HoldDetector:
             thrust: Whether valves were open since the last measurement; without, a standstill shows nothing.
             dt: How long that was [s].
         """
-        begun = self._count > 0
+        if self._place is None:
+            self._place = seen[..., :3]
         off = seen.copy()
-        off[..., :3] -= np.where(begun[..., None], self._place, seen[..., :3])
+        off[..., :3] -= self._place
         off[..., 2] -= 2.0 * np.pi * (off[..., 2] / (2.0 * np.pi)).round()
-        spread = self._spread * np.sqrt(1.0 + 1.0 / np.maximum(self._count, 1.0))[..., None] ** OF_THE_MEAN
-        still = 0.5 * ((off / spread) ** 2).sum(axis=-1)
+        errors = off / self._spread
+        errors[..., :3] = off[..., :3] / (self._spread[:3] * np.sqrt(1.0 + 1.0 / self._count)[..., None])
+        still = 0.5 * (errors * errors).sum(axis=-1)
         gain = np.where(thrust | (still > surprise), (surprise - still).clip(-MOST, MOST), 0.0)
-        evidence = self._evidence + gain - np.where(self.held, 0.0, ALLOWANCE * dt)
-        self._evidence = evidence.clip(0.0, np.where(self.held, RELEASE, np.inf))
-        self.held = np.where(self.held, self._evidence > 0.0, self._evidence > self._limit)
-        self._evidence = np.where(self.held, np.minimum(self._evidence, RELEASE), self._evidence)
+        if self.held.any():
+            evidence = self._evidence + gain - np.where(self.held, 0.0, ALLOWANCE * dt)
+            self._evidence = evidence.clip(0.0, np.where(self.held, RELEASE, np.inf))
+            self.held = np.where(self.held, self._evidence > 0.0, self._evidence > self._limit)
+        else:
+            self._evidence = np.maximum(self._evidence + gain - ALLOWANCE * dt, 0.0)
+            self.held = self._evidence > self._limit
+        if self.held.any():
+            self._evidence = np.where(self.held, np.minimum(self._evidence, RELEASE), self._evidence)
         anew = self._evidence <= 0.0
-        self._count = np.where(anew, 1.0, self._count + 1.0)
-        step = off[..., :3] / self._count[..., None]
-        self._place = np.where((anew | ~begun)[..., None], seen[..., :3], self._place + step)
+        self._count = np.where(anew, 1.0, self._count + self._begun)
+        self._begun = 1.0
+        self._place = np.where(
+            anew[..., None], seen[..., :3], self._place + off[..., :3] / self._count[..., None]
+        )

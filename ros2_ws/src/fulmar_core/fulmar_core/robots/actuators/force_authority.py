@@ -24,6 +24,8 @@ class ForceAuthority:
         sides = _hull(alone) if thrusters.shared_pressure else _zonotope(alone)
         table = np.unique(np.round(np.array(sides), 6), axis=0)
         self._normals, self._levels = table[:, :2], table[:, 2]
+        #: Force that the valves bring up in any direction, a little less for what rounding takes [N].
+        self.at_least = (1.0 - 1e-6) * float((self._levels / np.hypot(*self._normals.T)).min())
 
     def holds(self, push: np.ndarray) -> np.ndarray:
         """Whether the valves can bring up the opposite of a push in the body's frame, shape (..., 2) to (...,) [N]."""
