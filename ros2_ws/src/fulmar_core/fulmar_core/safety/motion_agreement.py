@@ -10,10 +10,8 @@ import math
 from collections import deque
 from dataclasses import dataclass
 
-import numpy as np
-
 from fulmar_core.robots.sensors.odometer import Channel, OdometrySpec
-from fulmar_core.states.attitude import conjugate, product
+from fulmar_core.states.attitude import Quaternion, conjugate, minus, plus, product
 from fulmar_core.states.state import RigidBodyState
 
 WINDOW_NS = 20_000_000_000  # how far back is compared
@@ -31,18 +29,21 @@ JUMPS = 3  # corrections in the window: more are a motion in steps
 PROOF = 0.3  # way or turn by the twist in the window with which a pose that agrees does not stand [m, rad]
 
 
-@dataclass(frozen=True, slots=True)
+Three = tuple[float, float, float]
+
+
+@dataclass(slots=True)
 class Sums:
     """What adds up, of position or of attitude; numbers from the first measurement on."""
 
-    off: np.ndarray  # change of the pose less the twist's, (3,)
+    off: Three  # change of the pose less the twist's
     way: float  # by the twist: differences of a noisy pose add up
     squares: float  # of differences of two twists in a row
     count: int
     jumps: int
 
 
-NOTHING = Sums(np.zeros(3), 0.0, 0.0, 0, 0)
+NOTHING = Sums((0.0, 0.0, 0.0), 0.0, 0.0, 0, 0)
 
 
 class Part:
@@ -55,16 +56,18 @@ class Part:
         self._drift = RATE_SIGMAS * rate.std + 4.0 * rate.bias_std
         self._share = SHARE + 4.0 * (pose.scale_std + rate.scale_std)
 
-    def add(self, sums: Sums, moved: np.ndarray, before: np.ndarray, now: np.ndarray, seconds: float) -> Sums:
+    def add(self, sums: Sums, moved: Three, before: Three, now: Three, seconds: float) -> Sums:
         """Sums with one more measurement: how the pose moved, and the rates before and now."""
-        by_rate = 0.5 * seconds * (before + now)
-        off, jumps = moved - by_rate, sums.jumps
-        size = _norm(by_rate)
-        if _norm(off) > self._jump + LATE_S * max(_norm(before), _norm(now)) + self._share * size:
-            off, jumps = np.zeros(3), jumps + 1
-        change = _norm(now - before)
+        half = 0.5 * seconds
+        by_rate = half * (before[0] + now[0]), half * (before[1] + now[1]), half * (before[2] + now[2])
+        off, jumps = minus(moved, by_rate), sums.jumps
+        size = math.hypot(*by_rate)
+        most = max(math.hypot(*before), math.hypot(*now))
+        if math.hypot(*off) > self._jump + LATE_S * most + self._share * size:
+            off, jumps = (0.0, 0.0, 0.0), jumps + 1
+        change = math.hypot(*minus(now, before))
         return Sums(
-            sums.off + off,
+            plus(sums.off, off),
             sums.way + size,
             sums.squares + (change * seconds) ** 2,
             sums.count + 1,
@@ -77,16 +80,19 @@ class Part:
             return True
         white = WHITE_SIGMAS * math.sqrt(0.5 * max(now.squares - then.squares, 0.0))
         allowed = self._least + self._drift * seconds + self._share * (now.way - then.way)
-        off = _norm(now.off - then.off)
+        off = math.hypot(*minus(now.off, then.off))
         return off <= allowed + white + LATE_S * change and now.jumps - then.jumps <= JUMPS
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Past:
     """A measurement, and what had added up by then."""
 
     stamp_ns: int
-    state: RigidBodyState
+    position: Three  # numbers of the state, which cost less than arrays of three
+    attitude: Quaternion
+    velocity: Three
+    turning: Three
     place: Sums
     turn: Sums
 
@@ -102,6 +108,7 @@ class MotionAgreement:
     def forget(self) -> None:
         """Begin anew."""
         self._past: deque[Past] = deque()
+        self._recent: deque[Past] = deque()
 
     @property
     def proves(self) -> bool:
@@ -116,45 +123,40 @@ class MotionAgreement:
         """Note the next measurement; whether its pose and those before it moved as their twists say."""
         if self._past and stamp_ns - self._past[-1].stamp_ns > GAP_NS:
             self.forget()
+        position, attitude = state.position_in_world.tolist(), state.quat_xyzw.tolist()
+        velocity, turning = state.velocity_in_world.tolist(), state.angular_velocity_in_body.tolist()
+        now = Past(stamp_ns, position, attitude, velocity, turning, NOTHING, NOTHING)
+        self._recent.append(now)
         if not self._past:
-            self._past.append(Past(stamp_ns, state, NOTHING, NOTHING))
+            self._past.append(now)
             return True
-        last = self._past[-1]
-        now = self._added(last, stamp_ns, state)
+        self._add(self._past[-1], now)
         self._past.append(now)
         while stamp_ns - self._past[1].stamp_ns > WINDOW_NS:
             self._past.popleft()
-        short = next((past for past in reversed(self._past) if stamp_ns - past.stamp_ns >= SHORT_NS), None)
-        return all(self._agree(then, now) for then in (self._past[0], short) if then is not None)
+        recent = self._recent  # and the newest that is not
+        while len(recent) > 1 and stamp_ns - recent[1].stamp_ns >= SHORT_NS:
+            recent.popleft()
+        whole = self._agree(self._past[0], now)
+        return whole and (stamp_ns - recent[0].stamp_ns < SHORT_NS or self._agree(recent[0], now))
 
-    def _added(self, last: Past, stamp_ns: int, state: RigidBodyState) -> Past:
-        seconds, before = (stamp_ns - last.stamp_ns) / 1e9, last.state
-        way = state.position_in_world - before.position_in_world
-        turn = _turn(before.quat_xyzw, state.quat_xyzw)
-        return Past(
-            stamp_ns,
-            state,
-            self._place.add(last.place, way, before.velocity_in_world, state.velocity_in_world, seconds),
-            self._turn.add(
-                last.turn, turn, before.angular_velocity_in_body, state.angular_velocity_in_body, seconds
-            ),
-        )
+    def _add(self, last: Past, now: Past) -> None:
+        seconds = (now.stamp_ns - last.stamp_ns) / 1e9
+        way, turn = minus(now.position, last.position), _turn(last.attitude, now.attitude)
+        now.place = self._place.add(last.place, way, last.velocity, now.velocity, seconds)
+        now.turn = self._turn.add(last.turn, turn, last.turning, now.turning, seconds)
 
     def _agree(self, then: Past, now: Past) -> bool:
         seconds = (now.stamp_ns - then.stamp_ns) / 1e9
-        change = now.state.velocity_in_world - then.state.velocity_in_world
-        turning = now.state.angular_velocity_in_body - then.state.angular_velocity_in_body
-        return self._place.agrees(then.place, now.place, seconds, _norm(change)) and self._turn.agrees(
-            then.turn, now.turn, seconds, _norm(turning)
+        change = math.hypot(*minus(now.velocity, then.velocity))
+        turning = math.hypot(*minus(now.turning, then.turning))
+        return self._place.agrees(then.place, now.place, seconds, change) and self._turn.agrees(
+            then.turn, now.turn, seconds, turning
         )
 
 
-def _turn(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Small rotation from one attitude to another, about the body's axes, (3,) [rad]."""
-    x, y, z, w = product(conjugate(tuple(a.tolist())), tuple(b.tolist()))
-    half = math.copysign(1.0, w) * np.array([x, y, z])
-    return np.asarray(2.0 * half)
-
-
-def _norm(vector: np.ndarray) -> float:
-    return math.hypot(*vector.tolist())
+def _turn(a: Quaternion, b: Quaternion) -> Three:
+    """Small rotation from one attitude to another, about the body's axes [rad]."""
+    x, y, z, w = product(conjugate(a), b)
+    sign = math.copysign(1.0, w)
+    return 2.0 * (sign * x), 2.0 * (sign * y), 2.0 * (sign * z)

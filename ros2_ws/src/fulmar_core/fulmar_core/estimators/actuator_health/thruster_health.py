@@ -146,10 +146,10 @@ class ThrusterHealth:
         """Learn nothing from a body that is held, and forget what was learned while it was not known to be."""
         assert self._state is not None
         commands = applied.commands if isinstance(applied, Applied) else np.asarray(applied)
-        thrust = np.asarray(np.any(commands > 0.0, axis=None if isinstance(applied, Applied) else -1))
+        thrust = np.asarray((commands > 0.0).any(axis=None if isinstance(applied, Applied) else -1))
         self._hold.update(seen, surprise, thrust, dt)
         push, chance = self._kept
-        held, innocent = self._hold.held, self._hold.innocent[..., None]
+        held, innocent = self._hold.held, self._hold.innocent
         if held.any():
             at_rest = seen.copy()
             at_rest[..., 3:] = 0.0
@@ -158,10 +158,13 @@ class ThrusterHealth:
             )
             self._state = np.where(held[..., None, None], still, self._state)
             self._chance = np.where(held[..., None], chance, self._chance)
-        self._kept = (
-            np.where(innocent[..., None], self._state[..., 6:], push),
-            np.where(innocent, self._chance, chance),
-        )
+        if innocent.all():
+            self._kept = self._state[..., 6:], self._chance
+        elif innocent.any():
+            self._kept = (
+                np.where(innocent[..., None, None], self._state[..., 6:], push),
+                np.where(innocent[..., None], self._chance, chance),
+            )
 
     def _driven(self, applied: np.ndarray | Applied, turned: np.ndarray) -> np.ndarray:
         """What the valves add to the state within the interval under each hypothesis, shape (..., hypotheses, 9).
