@@ -84,6 +84,7 @@ class Bench:
         if inputs is None:
             return decision, None
         step = self.guard.act(inputs)
+        self.guard.watch(inputs, step)
         self.guard.note(step.refusal)
         return decision, step.command[0].tolist()
 

@@ -63,7 +63,11 @@ class Bench:
         state = RigidBodyState(np.array(place), np.array(quat), np.zeros(3), np.array(rate))
         self.guard.take(Measurement(self.now_ns, "odom", "base_link", state), self.now_ns)
         decision, inputs = self.guard.begin_step(self.guard.newest, self.now_ns)
-        return decision, None if inputs is None else self.guard.act(inputs).command[0]
+        if inputs is None:
+            return decision, None
+        step = self.guard.act(inputs)
+        self.guard.watch(inputs, step)
+        return decision, step.command[0]
 
 
 def test_it_acts_with_an_attitude_as_it_likes():

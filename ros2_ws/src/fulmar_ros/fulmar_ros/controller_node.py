@@ -341,7 +341,12 @@ class ControllerNode(LifecycleNode):
         if speaks and not self._send(partial(self.wires.publish_command, command, stamp)):
             return
         self._status.steps += 1
-        if step is not None:
+        if inputs is not None and step is not None:
+            try:
+                guard.watch(inputs, step)
+            except TaskError as error:
+                self._give_up(str(error), stamp)
+                return
             self.wires.publish_reasoning(step.observation[0], step.action.ravel(), stamp)
             self._publish_believed(inputs, stamp)
             self._publish_estimate(stamp)

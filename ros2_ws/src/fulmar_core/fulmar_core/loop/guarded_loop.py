@@ -275,12 +275,19 @@ class GuardedLoop:
             return self._inputs(measurement)
 
     def act(self, inputs: Inputs) -> Step:
-        """Let the controller act; see `ControlLoop.act`."""
+        """Let the controller act; see `ControlLoop.act`. `watch` its step next, once the command is on its way."""
         step = self.loop.act(inputs)
         self.acted += 1
+        return step
+
+    def watch(self, inputs: Inputs, step: Step) -> None:
+        """See whether the robot comes nearer to its goal; `note` says what follows of it.
+
+        Raises:
+            TaskError: The task cannot say how far it is.
+        """
         if self.strives:
             self._convergence.see(inputs, step.command)
-        return step
 
     def note(self, refusal: str) -> bool:
         """Count refused actions (empty: not refused): several in a row switch to the fallback, or latch a fault.

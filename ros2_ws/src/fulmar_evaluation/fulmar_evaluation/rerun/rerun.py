@@ -168,6 +168,7 @@ class _Rerun:
             if inputs is not None:
                 try:
                     done = guard.act(inputs)
+                    guard.watch(inputs, done)
                 except Exception as error:  # noqa: BLE001 - whatever a controller raises, as in the node
                     reasons[step] = self._give_up(step, error)
                 else:
