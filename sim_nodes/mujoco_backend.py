@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 
 from fulmar_core.config.errors import SafetyError
+from fulmar_core.dynamics.batch_dynamics import left_of
 from fulmar_core.dynamics.things import Thing
 from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.sensors.kind import Truth
@@ -84,9 +85,12 @@ class MujocoBackend:
         world.begin(np.asarray(command, dtype=float), ticks, self._truth, begins=begins)
         outside = tuple(float(part[0]) for part in world.outside)
         dt = self.robot.timing.physics_dt
-        last = None
+        last, lost = None, world.actuation.lost
         for _ in range(ticks):
             applied = world.actuation.advance(dt, latest_s=world.latest_s)
+            if lost is not None:
+                share, lost = left_of(world.world.mass, lost, world.actuation.lost)
+                self._scene.lighten(float(share[0]))
             if not robot_model.steady:
                 for _ in range(robot_model.steps_per_tick):
                     robot_model.drive(model, data, applied[:, 0], world.actuation.gain[:, 0], outside)

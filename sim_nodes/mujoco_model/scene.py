@@ -27,7 +27,7 @@ from sim_nodes.mujoco_model.objects import (
     place_obstacles,
 )
 from sim_nodes.mujoco_model.satellite import Satellite
-from sim_nodes.mujoco_model.scenery import add_scenery, add_sensors
+from sim_nodes.mujoco_model.scenery import BODY, add_scenery, add_sensors
 
 
 def _rolling(robot: Robot) -> RobotModel:
@@ -74,6 +74,9 @@ class Scene:
             ) from error
         self.robot_model.bind(self.model)
         self.data = mujoco.MjData(self.model)
+        self._scratch = mujoco.MjData(self.model)
+        self._body = self.model.body(BODY).id
+        self._whole = 0.0, np.zeros(3)  # mass and moments of inertia when the episode began
 
     def has_room_for(self, obstacles: np.ndarray) -> bool:
         """Whether these obstacles can be shown, shape (m, 3); if not, another scene has to be compiled."""
@@ -82,6 +85,7 @@ class Scene:
     def begin(self, episode: Episode) -> None:
         """Set the start of an episode: bodies, robot, obstacles and things."""
         self.robot_model.take_world(self.model, episode.world)
+        self._whole = float(self.model.body_mass[self._body]), self.model.body_inertia[self._body].copy()
         mujoco.mj_setConst(self.model, self.data)
         mujoco.mj_resetData(self.model, self.data)
         self.robot_model.place(self.model, self.data, episode.start)
@@ -91,6 +95,12 @@ class Scene:
             self._poses[thing.name] = pose
             if thing.body is not None:
                 place_block(self.model, self.data, thing.name, float(pose[0]), float(pose[1]))
+
+    def lighten(self, share: float) -> None:
+        """Leave the robot's body a share of the mass and inertia with which the episode began."""
+        mass, moments = self._whole
+        self.model.body_mass[self._body], self.model.body_inertia[self._body] = share * mass, share * moments
+        mujoco.mj_setConst(self.model, self._scratch)
 
     @property
     def things(self) -> dict[str, np.ndarray]:

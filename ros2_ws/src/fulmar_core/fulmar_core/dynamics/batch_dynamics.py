@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Generic, TypeVar
 
@@ -51,6 +51,23 @@ from fulmar_core.worlds.world import Drawn, World, outside_wrench, push_is_const
 
 W = TypeVar("W", bound=Drawn)
 Push = tuple[Array, ...]  # on a body in space, as its dynamics take it
+
+
+def left_of(mass: Array, lost_before: Array, lost: Array) -> tuple[Array, Array]:
+    """What a body keeps of its mass and inertia while it blows some of itself out.
+
+    What leaves takes its own momentum along and comes from the centre of mass, so that the body's turn rate stays; jets
+    that turn with the body and slow it down are left out (RANS and SRB scale the inertia alike).
+
+    Args:
+        mass: Of the whole body, shape (worlds,) [kg].
+        lost_before: When an integration step begins, same shape [kg].
+        lost: When it ends.
+
+    Returns:
+        The share in the middle of the step, which makes it one of second order [-]; and `lost`.
+    """
+    return 1.0 - 0.5 * (lost_before + lost) / mass, lost
 
 
 @dataclass(frozen=True)
@@ -183,16 +200,19 @@ class PlanarDynamics(Dynamics[World, PlanarState]):
         if steps.off_centre:
             state = to_center(state, world)
         push: Wrench | None = None
-        doing: Array = None
+        doing, body, lost = None, world, actuation.lost
         for _ in range(steps.count):
             applied = actuation.advance(dt, latest_s=steps.latest_s)
+            if lost is not None:
+                share, lost = left_of(world.mass, lost, actuation.lost)
+                body = replace(world, mass=share * world.mass, yaw_inertia=share * world.yaw_inertia)
             if push is None or applied is not doing:
                 doing = applied
                 push = actuators.planar_wrench(applied, actuation.gain)
                 if steps.off_centre:
                     ahead, left, moment = push
                     push = ahead, left, moment - (world.com_x * left - world.com_y * ahead)
-            state = free_body_step(state, push, outside, world, water, dt)
+            state = free_body_step(state, push, outside, body, water, dt)
         return to_center(state, world, -1.0) if steps.off_centre else state
 
     def under_wrench(self, state: PlanarState, wrench: Array, world: World) -> PlanarState:
@@ -301,15 +321,19 @@ class SpatialDynamics(Dynamics[SpatialWorld, SpatialState]):
         if len(outside) > 3:
             steady = plus(steady, (outside[3], outside[4], outside[5]))
         doing, force, torque = None, push, push
+        mass, turning, lost = world.mass, inertia, actuation.lost
         for _ in range(steps.count):
             applied = actuation.advance(dt, latest_s=steps.latest_s)
+            if lost is not None:
+                share, lost = left_of(world.mass, lost, actuation.lost)
+                mass, turning = share * world.mass, inertia.scaled(share)
             if applied is not doing:
                 doing = applied
                 force, torque = actuators.spatial_wrench(applied, actuation.gain)
                 if steps.off_centre:
                     torque = minus(torque, cross(com, force))
                 torque = plus(torque, steady)
-            state = rigid_body_step(state, force, torque, push, world.mass, inertia, dt)
+            state = rigid_body_step(state, force, torque, push, mass, turning, dt)
         return shifted(state, scaled(-1.0, com)) if steps.off_centre else state
 
     def under_wrench(self, state: SpatialState, wrench: Array, world: SpatialWorld) -> SpatialState:

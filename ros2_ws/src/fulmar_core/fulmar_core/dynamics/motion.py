@@ -20,6 +20,12 @@ def may_be_off_centre(robot: Robot, scenario: Scenario) -> bool:
     return uncertain or any(robot.body.center_of_mass)
 
 
+def tank_empties(robot: Robot, scenario: Scenario) -> bool:
+    """Whether what is blown out counts in a batch: by weight, or since a tank is not full when episodes begin."""
+    tank = robot.actuators.tank
+    return tank is not None and (tank.weighs or scenario.actuation.supply.tank < 1.0)
+
+
 def to_center(state: PlanarState, world: World, sign: float = 1.0) -> PlanarState:
     """State of the centre of mass from that of the origin (+1), or back (-1)."""
     xp = array_namespace(state.x)

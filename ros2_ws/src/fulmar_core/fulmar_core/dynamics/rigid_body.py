@@ -35,6 +35,12 @@ class Inertia:
     tensor: Tensor  # [kg·m²]
     inverse: Tensor  # [1/(kg·m²)]
 
+    def scaled(self, share: Array) -> Inertia:
+        """Of a body that kept a share of its mass in the same shape, shape (...,)."""
+        return Inertia(
+            tuple(share * entry for entry in self.tensor), tuple(entry / share for entry in self.inverse)
+        )
+
 
 def inertia_of(tensor: Tensor) -> Inertia:
     """Inertia with its inverse, by cofactors; the tensor is positive definite [kg·m²]."""

@@ -11,7 +11,7 @@ from array_api_compat import is_numpy_namespace
 
 from fulmar_core.dynamics.batch_dynamics import Dynamics, Steps
 from fulmar_core.dynamics.by_kind import actuation_of, dynamics_of
-from fulmar_core.dynamics.motion import may_be_off_centre, may_open_late
+from fulmar_core.dynamics.motion import may_be_off_centre, may_open_late, tank_empties
 from fulmar_core.dynamics.things import Poses
 from fulmar_core.robots.robot import Robot
 from fulmar_core.simulation.episode import draw_episodes
@@ -113,7 +113,7 @@ class BatchSimulation(MutableState, Generic[S]):
             latest_s=self._latest_s,
             step_s=self.control_dt,
             changes=scenario.actuation.changes,
-            world=self.world if scenario.actuation.supply.tank < 1.0 else None,
+            world=self.world if tank_empties(robot, scenario) else None,
         )
         self._measure()
 

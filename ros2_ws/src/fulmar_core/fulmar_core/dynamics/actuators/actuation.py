@@ -81,6 +81,11 @@ class ActuationState(MutableState):
             self._slew = xp.asarray(self._response.slew, dtype=safe.dtype, device=device(safe))[:, None]
 
     @property
+    def lost(self) -> Array | None:
+        """Mass that each body has lost through its actuators, shape (worlds,) [kg]; None where none ever does."""
+        return None
+
+    @property
     def readings(self) -> dict[str, np.ndarray]:
         """What sensors measure of it without errors, worlds first; see `Inputs.readings`."""
         return {}

@@ -37,6 +37,11 @@ class TankActuation(ActuationState):
         return clip(self._tank.pressure * self._filled - self._fallen, 0.0, None)
 
     @property
+    def lost(self) -> Array | None:
+        """What was blown out, or missed at the start; see `ActuationState.lost`."""
+        return self._tank.gone(self.pressure) if self._tank.weighs else None
+
+    @property
     def readings(self) -> dict[str, np.ndarray]:
         """Pressure of the tanks; see `ActuationState.readings`."""
         return {NAME: np.asarray(self.pressure, dtype=float)[:, None]}

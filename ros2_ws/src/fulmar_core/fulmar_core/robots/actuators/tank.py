@@ -29,6 +29,9 @@ class Tank:
     temperature: float = 293.15  # of what is in it [K]
     leak: float = 0.0  # what flows whether thrust is asked for or not, such as through air bearings [kg/s]
     reserve_s: float = 60.0  # full thrust that is to be left when a warning comes [s]
+    weighs: bool = (
+        False  # `body` is meant with this tank full, and loses mass and inertia with what is blown out
+    )
 
     def __post_init__(self) -> None:
         positive = (self.volume, self.regulated, self.specific_impulse, self._specific_energy)
@@ -49,6 +52,15 @@ class Tank:
     def volume_per_kg(self) -> float:
         """That a kilogram takes in the full tank [m³/kg]."""
         return self._specific_energy / self.pressure
+
+    @property
+    def content(self) -> float:
+        """Mass of what is in the full tank [kg]."""
+        return self.volume / self.volume_per_kg
+
+    def gone(self, pressure: Array) -> Array:
+        """Mass that a full tank has lost at some pressures [Pa], shape of these [kg]."""
+        return (self.pressure - pressure) * (self.volume / self._specific_energy)
 
     def share(self, pressure: Array) -> Array:
         """Share of the full thrust at some pressures in the tank, shape of these [-]."""
