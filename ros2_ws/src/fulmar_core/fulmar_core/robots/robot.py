@@ -364,8 +364,8 @@ def _check_pushed(robot: Robot) -> None:
     tank, mass = robot.actuators.tank, robot.body.mass
     if tank is not None and tank.weighs and tank.content >= mass:
         raise ValueError(
-            f"'tank' holds {tank.content:.3g} kg, and the whole body has 'mass' = {mass:g} kg: with 'weighs' the full tank "
-            "is a part of it. Give the mass of the body with its tank full."
+            f"'tank' holds {tank.content:.3g} kg, and the whole body has 'mass' = {mass:g} kg: with 'weighs' the full "
+            "tank is a part of it. Give the mass of the body with its tank full."
         )
 
 
