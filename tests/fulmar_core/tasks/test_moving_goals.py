@@ -99,18 +99,24 @@ def test_the_plane_has_no_such_targets():
         goal_sequence(CIRCLE, CRAFT, as_path=True)
 
 
+def stacked(moved):
+    """Motion and accelerations, shape (4, n, 3)."""
+    return np.stack((moved.velocity, moved.rate, moved.acceleration, moved.turning))
+
+
 def test_motion_of_targets_is_their_difference_and_a_jump_is_none():
     motion = TargetMotion(speed=3.0, rate=6.0)
     here = SpatialState.target_at((1.0, 0.0, 0.0, 0.0, 0.0, 0.0))
     there = SpatialState.target_at((1.0, 0.02, 0.0, 0.0, 0.0, 3.0))
     far = SpatialState.target_at((5.0, 0.0, 0.0, 0.0, 0.0, 0.0))
-    assert not np.any(motion.update(np.stack((here, here)), 0, 0.2))
-    velocity, rate = motion.update(np.stack((there, far)), 0, 0.2)
+    assert not stacked(motion.update(np.stack((here, here)), 0, 0.2)).any()
+    moved = motion.update(np.stack((there, far)), 0, 0.2)
+    velocity, rate = moved.velocity, moved.rate
     assert velocity == pytest.approx(np.array([[0.0, 0.1, 0.0], [0.0, 0.0, 0.0]]))
     assert rate == pytest.approx(np.array([[0.0, 0.0, np.deg2rad(15.0)], [0.0, 0.0, 0.0]]))
-    assert not np.any(motion.update(np.stack((there, far)), 0, 0.2))  # exactly
+    assert not stacked(motion.update(np.stack((there, far)), 0, 0.2)).any()  # exactly
     motion.reset()
-    assert not np.any(motion.update(np.stack((here, here)), 0, 0.2))
+    assert not stacked(motion.update(np.stack((here, here)), 0, 0.2)).any()
 
 
 def test_motion_goes_by_the_time_that_has_passed():
@@ -119,8 +125,8 @@ def test_motion_goes_by_the_time_that_has_passed():
 
     def moved(steps, metres, degrees, *, stamp_ns=None):
         target = SpatialState.target_at((metres, 0.0, 0.0, 0.0, 0.0, degrees))[None]
-        velocity, rate = motion.update(target, begin + steps * step_ns if stamp_ns is None else stamp_ns, 0.2)
-        return velocity[0, 0], np.rad2deg(rate[0, 2])
+        moved = motion.update(target, begin + steps * step_ns if stamp_ns is None else stamp_ns, 0.2)
+        return moved.velocity[0, 0], np.rad2deg(moved.rate[0, 2])
 
     assert moved(0, 0.0, 0.0) == (0.0, 0.0)
     assert moved(1, 0.02, 1.0) == pytest.approx((0.1, 5.0))

@@ -63,7 +63,7 @@ class AttitudeLaw(Law):
         """Choose torques of motors and of unloading; shapes as in `Controller.act`."""
         now = self.frame.motion(inputs)
         motion = self._target.update(inputs.goal.current, inputs.stamp_ns, inputs.dt)
-        now = self.frame.less_target(now, inputs, *motion)
+        now = self.frame.less_target(now, inputs, motion.velocity, motion.rate)
         inertia = self.inertia_of(inputs)
         momentum = self._momentum(inputs)
         gyroscopic = np.cross(now.turning, now.turning @ inertia + momentum)

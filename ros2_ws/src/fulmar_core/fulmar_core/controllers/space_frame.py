@@ -67,11 +67,23 @@ class SpaceFrame:
             velocity: Of the target, in the world, shape (n, 3) [m/s].
             rate: Of the target, about its own axes; of none where no attitude is wanted, shape (n, 3) [rad/s].
         """
-        along = _rows(turn_back(_state(inputs).quat, tuple(velocity.T)))
+        along, about = self.of_target(now, inputs, velocity, rate)
         found = replace(now, velocity=now.velocity - along)
-        if not self.heads:
-            return found
-        return replace(found, rate=now.rate - _rows(turn(now.to_goal, tuple(rate.T))))
+        return replace(found, rate=now.rate - about) if self.heads else found
+
+    def of_target(
+        self, now: SpaceMotion, inputs: Inputs, linear: np.ndarray, angular: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Vectors of the target in the body's own frame.
+
+        Args:
+            now: As in `motion`.
+            inputs: It came from them.
+            linear: In the world, shape (n, 3).
+            angular: About the target's own axes, same shape; nothing of it counts where no attitude is wanted.
+        """
+        along = _rows(turn_back(_state(inputs).quat, tuple(linear.T)))
+        return along, _rows(turn(now.to_goal, tuple(angular.T))) * float(self.heads)
 
     def next_leg(self, inputs: Inputs) -> np.ndarray:
         """Way from the current target to the one after it, in the body's frame, shape (n, 3) [m]."""

@@ -1,6 +1,8 @@
-"""Velocity and turn rate of a target that moves, from one control step to the next."""
+"""Velocity, turn rate and accelerations of a target that moves, from one control step to the next."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -8,6 +10,27 @@ from fulmar_core.states.attitude import conjugate, logarithm, product
 from fulmar_core.states.spatial import quat_of
 
 ROUNDING = 1.001  # of targets that move as fast as they may
+
+
+@dataclass(frozen=True)
+class Moved:
+    """How targets move, in the middle of the step before, shapes (n, 3); each is 0 where it cannot be known."""
+
+    velocity: np.ndarray  # in the world [m/s]
+    rate: np.ndarray  # about the target's own axes [rad/s]
+    acceleration: np.ndarray  # in the world [m/s²]
+    turning: np.ndarray  # change of the rate about the target's own axes [rad/s²]
+    step_s: float = 0.0  # since the target before [s]
+
+    @property
+    def bends(self) -> bool:
+        """Whether any target does not go straight on."""
+        return bool(self.acceleration.any() or self.turning.any())
+
+    def at_end(self) -> tuple[np.ndarray, np.ndarray]:
+        """Velocity and rate half a step later, which is now."""
+        half_s = 0.5 * self.step_s
+        return self.velocity + half_s * self.acceleration, self.rate + half_s * self.turning
 
 
 class TargetMotion:
@@ -25,13 +48,14 @@ class TargetMotion:
         """
         self._speed, self._rate = ROUNDING * speed, ROUNDING * rate
         self._before: np.ndarray | None = None
+        self._differences: tuple[np.ndarray, float] | None = None
         self._stamp_ns = 0
 
     def reset(self) -> None:
         """Forget the target."""
-        self._before = None
+        self._before = self._differences = None
 
-    def update(self, target: np.ndarray, stamp_ns: int, dt: float) -> tuple[np.ndarray, np.ndarray]:
+    def update(self, target: np.ndarray, stamp_ns: int, dt: float) -> Moved:
         """Take the targets of a step.
 
         Args:
@@ -40,14 +64,15 @@ class TargetMotion:
             dt: Time of one step, which counts without two stamps in order: none, or the same one again [s].
 
         Returns:
-            Velocity in the world [m/s], and turn rate about the target's own axes [rad/s], shapes (n, 3).
+            How it moves.
         """
         passed_ns = stamp_ns - self._stamp_ns
         # After missed steps a target is as much further on as time is.
         elapsed = passed_ns / 1e9 if self._stamp_ns > 0 and passed_ns > 0 else dt
         before, self._before, self._stamp_ns = self._before, np.array(target, dtype=float), stamp_ns
         if before is None or before.shape != target.shape:
-            return np.zeros((len(target), 3)), np.zeros((len(target), 3))
+            self._differences = None
+            return Moved(*np.zeros((4, len(target), 3)))
         velocity = (target[:, :3] - before[:, :3]) / elapsed
         turned = product(conjugate(quat_of(before)), quat_of(target))
         still = np.all(before[:, 3:] == target[:, 3:], axis=-1)
@@ -55,4 +80,11 @@ class TargetMotion:
         follows = (np.linalg.norm(velocity, axis=-1) <= self._speed) & (
             np.linalg.norm(rate, axis=-1) <= self._rate
         )
-        return velocity * follows[:, None], rate * follows[:, None]
+        now = np.concatenate((velocity, rate), axis=-1) * follows[:, None]
+        earlier, self._differences = self._differences, (now, elapsed)
+        if earlier is None:
+            return Moved(*np.split(now, 2, axis=-1), *np.zeros((2, len(target), 3)), elapsed)
+        # Of two steps that both follow; what begins or ends to move makes a jump of its velocity, and no acceleration.
+        bends = (now - earlier[0]) / (0.5 * (elapsed + earlier[1]))
+        bends = bends * (np.any(now, axis=-1) & np.any(earlier[0], axis=-1))[:, None]
+        return Moved(*np.split(now, 2, axis=-1), *np.split(bends, 2, axis=-1), elapsed)
