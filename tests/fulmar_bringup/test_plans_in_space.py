@@ -221,7 +221,7 @@ def test_a_target_that_turns_beyond_the_tolerance_from_step_to_step_is_refused(p
     with pytest.raises(ConfigError, match=r"turn by up to 5.2 deg"):
         planned(0.09, "along_path", 0.2)
     planned(0.08, "along_path", 0.2)
-    planned(0.24, "fixed", 0.1)
+    planned(0.24, "fixed", 0.5)
     with pytest.raises(ConfigError, match=r"turn by up to 13.8 deg in a control step at 10 Hz"):
         planned(0.24, "along_path", 0.1, control_hz=25.0)  # goals come at 10 Hz
 
@@ -236,4 +236,24 @@ def test_the_pace_of_a_target_is_that_of_the_runs_goals(plan, tmp_path):
     goals.write_text(CIRCLE.format(0.6, "along_path", 2.0))
     with pytest.raises(ConfigError, match=r"at 10 Hz by more than .* at most 0.5 m/s"):
         plan(**request, control_hz=12.5)
-    plan(**request, control_hz=12.5, lockstep=True)
+    with pytest.raises(ConfigError, match=r"0.6 m/s, and tasks of 'spacecraft_16' ask for 0.4 m/s"):
+        plan(**request, control_hz=12.5, lockstep=True)
+
+
+def test_a_target_that_bends_or_turns_harder_than_the_robot_sustains_is_refused(plan, tmp_path):
+    goals = tmp_path / "tight.yaml"
+    request = {**SPACE, "controller": STILL, "goals": str(goals)}
+    goals.write_text(CIRCLE.format(0.24, "fixed", 0.4))
+    with pytest.raises(
+        ConfigError, match=r"0.24 m/s takes 0.144 m/s².* sustains 0.12 m/s².* of 0.22 m/s at most"
+    ):
+        plan(**request)
+    goals.write_text(CIRCLE.format(0.21, "fixed", 0.4))
+    plan(**request)
+    goals.write_text(CIRCLE.format(0.15, "along_path", 0.2))
+    with pytest.raises(ConfigError, match=r"turn by up to 8.6 deg in a control step"):
+        plan(**request)
+    with pytest.raises(
+        ConfigError, match=r"turn by 43 deg/s, and tasks of 'spacecraft_16' ask for 34.4 deg/s"
+    ):
+        plan(**request, control_hz=25.0, lockstep=True)

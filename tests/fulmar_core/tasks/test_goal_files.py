@@ -40,6 +40,9 @@ SIZES = {
     "ngon": "corners: 5, radius: 1.0",
     "sine": "length: 4.0, amplitude: 0.5, cycles: 2",
     "race_track": "seed: 1",
+    "line": "length: 4.0",
+    "rectangle": "length: 4.0, width: 2.0, corner_radius: 0.5",
+    "capsule": "length: 3.0, radius: 1.0",
 }
 
 

@@ -23,6 +23,7 @@ from fulmar_core.tasks.references.curves import (
     Square,
 )
 from fulmar_core.tasks.references.race_track import RaceTrack
+from fulmar_core.tasks.references.rounded import Capsule, Line, Rectangle
 
 COUNT = 1000
 EXAMPLES = (
@@ -38,6 +39,9 @@ EXAMPLES = (
     Ngon("ngon", 6, 1.5),
     Sine("sine", 4.0, 0.5, 2.0),
     RaceTrack("race_track", seed=1),
+    Line("line", 4.0),
+    Rectangle("rectangle", 4.0, 2.0, 0.5),
+    Capsule("capsule", 3.0, 1.0),
 )
 EACH = pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.kind)
 CLOSED = pytest.mark.parametrize("path", [p for p in EXAMPLES if p.closed], ids=lambda path: path.kind)

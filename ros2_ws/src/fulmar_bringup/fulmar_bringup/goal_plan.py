@@ -90,6 +90,7 @@ def check_pace(file: GoalFile, goals: str, robot: Robot, goal_hz: float) -> None
     elif isinstance(file, Trajectory):
         ahead, sideways = file.speed, 0.0
         _check_step(file, goals, goal_hz)
+        _check_motion(file, goals, robot)
     elif isinstance(file, Velocities):
         targets = file.targets()
         axes = file.form.AXES
@@ -126,6 +127,32 @@ def _check_step(file: Trajectory, goals: str, goal_hz: float) -> None:
             f"the goals '{goals}' turn by up to {turned:.1f} deg in a control step at {goal_hz:g} Hz, and the task's "
             f"tolerance is {tolerance.attitude_deg:g} deg. Give a lower speed than {file.speed:g} m/s, a wider path, "
             "or 'facing: fixed'."
+        )
+
+
+def _check_motion(file: Trajectory, goals: str, robot: Robot) -> None:
+    """Refuse a target that is faster than tasks of the robot ask for, or bends harder than it can follow."""
+    can, target = robot.performance, file.target()
+    if file.speed > can.speed:
+        raise ConfigError(
+            f"the goals '{goals}' move by {file.speed:g} m/s, and tasks of '{robot.name}' ask for "
+            f"{can.speed:g} m/s at most: it would fall behind. Give a lower speed."
+        )
+    needs = target.acceleration()
+    if needs > can.turning_acceleration:
+        slower = file.speed * math.sqrt(can.turning_acceleration / needs)
+        raise ConfigError(
+            f"the goals '{goals}' bend so hard that {file.speed:g} m/s takes {needs:.3g} m/s², and '{robot.name}' "
+            f"sustains {can.turning_acceleration:g} m/s². Give a speed of {slower:.2g} m/s at most, or wider bends."
+        )
+    if file.facing in ("fixed", "any"):
+        return
+    step_s = robot.timing.control_s
+    rate = math.radians(_largest_turn_deg(file, step_s)) / step_s
+    if rate > can.yaw_rate:
+        raise ConfigError(
+            f"the goals '{goals}' turn by {math.degrees(rate):.3g} deg/s, and tasks of '{robot.name}' ask for "
+            f"{math.degrees(can.yaw_rate):.3g} deg/s at most. Give a lower speed, wider bends, or 'facing: fixed'."
         )
 
 

@@ -18,7 +18,7 @@ from fulmar_core.states.state import State
 from fulmar_core.tasks.excitation import Torques
 from fulmar_core.tasks.goal_words import any_attitude, place_words, pose_words
 from fulmar_core.tasks.references import ReferencePath
-from fulmar_core.tasks.references.in_space import SpacePath
+from fulmar_core.tasks.references.in_space import Place, SpacePath
 from fulmar_core.tasks.references.look_ahead import LookAhead, follow
 from fulmar_core.tasks.references.moving_target import Facing, MovingTarget
 
@@ -167,19 +167,29 @@ class Trajectory:
     title: str
     path: SpacePath
     speed: float  # [m/s]
-    # Of the body's x axis: along the path, with z nearest to the path's own up; `fixed` as `angles_deg`; or `any`, of
-    # goals that are positions.
+    # Of the body's x axis: along the path, with z nearest to the path's own up; at a `point`, without rolling; `fixed`
+    # as `angles_deg`; or `any`, of goals that are positions.
     facing: Facing = "along_path"
+    point: Place | None = None  # x, y, z of `point`; the path's centre by default [m]
     angles_deg: tuple[float, float, float] = (0.0, 0.0, 0.0)  # roll, pitch, yaw of `fixed` [deg]
     loops: int = 1  # rounds of a closed path; 0 means for ever
+    ease_s: float = 0.0  # in which it gets up to its speed, and to rest at the end; 0: at once [s]
 
     def __post_init__(self) -> None:
         if self.speed <= 0.0:
             raise ValueError("'speed' must be greater than 0.")
-        if self.loops < 0:
-            raise ValueError("'loops' must not be negative; 0 means for ever.")
+        if self.loops < 0 or self.ease_s < 0.0:
+            raise ValueError("'loops' and 'ease_s' must not be negative; 0 loops mean for ever.")
         if any(self.angles_deg) and self.facing != "fixed":
             raise ValueError(f"'angles_deg' needs facing: fixed, found facing: {self.facing}.")
+        if self.point is not None and self.facing != "point":
+            raise ValueError(f"'point' needs facing: point, found facing: {self.facing}.")
+        target = self.target()
+        if self.ease_s > target.duration_s - self.ease_s:
+            raise ValueError(
+                f"'ease_s' = {self.ease_s:g} s is longer than the path, of {target.duration_s - self.ease_s:.3g} s."
+            )
+        target.pose(0.0)
 
     @property
     def form(self) -> type[State]:
@@ -188,7 +198,9 @@ class Trajectory:
 
     def target(self) -> MovingTarget:
         """What moves."""
-        return MovingTarget(self.path, self.speed, self.facing, self.angles_deg, self.loops)
+        return MovingTarget(
+            self.path, self.speed, self.facing, self.angles_deg, self.loops, self.point, self.ease_s
+        )
 
     def targets(self) -> np.ndarray:
         """The pose that it begins with, shape (1, 7)."""

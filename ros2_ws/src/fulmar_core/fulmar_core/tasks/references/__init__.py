@@ -21,6 +21,7 @@ from fulmar_core.tasks.references.curves import (
     Square,
 )
 from fulmar_core.tasks.references.race_track import RaceTrack
+from fulmar_core.tasks.references.rounded import Capsule, Line, Rectangle
 
 ReferencePath = (
     Circle
@@ -34,6 +35,9 @@ ReferencePath = (
     | Hypotrochoid
     | Ngon
     | Sine
+    | Line
+    | Rectangle
+    | Capsule
     | RaceTrack
 )
 

@@ -8,37 +8,51 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import Literal
 
 import numpy as np
 
+from fulmar_core.states.attitude import from_euler, turn
+from fulmar_core.tasks.references import ReferencePath
 from fulmar_core.tasks.references.spacing import few, on_circle, positive, spread_along
 
 Place = tuple[float, float, float]  # x, y, z [m]
 
 
 class SpaceCurve(ABC):
-    """A smooth path in space, open unless it says otherwise."""
+    """A path in space, open unless it says otherwise."""
 
-    centre: Place
-    closed: ClassVar[bool] = False
+    centre: Place  # that a target on it may face
+
+    @property
+    def closed(self) -> bool:
+        """Whether it ends where it began."""
+        return False
 
     @abstractmethod
-    def at(self, t: np.ndarray) -> np.ndarray:
-        """Positions (n, 3) about the origin for parameters (n,) from 0 to 1 [m]."""
+    def points(self, count: int) -> np.ndarray:
+        """Equally spaced points, shape (count, 3) [m]; see `spread_along`."""
 
     @property
     @abstractmethod
     def up(self) -> np.ndarray:
         """Unit vector, nowhere along the path, that a body on it keeps its z axis nearest to, shape (3,)."""
 
+
+class SmoothCurve(SpaceCurve):
+    """One that a formula gives."""
+
+    @abstractmethod
+    def at(self, t: np.ndarray) -> np.ndarray:
+        """Positions (n, 3) about the origin for parameters (n,) from 0 to 1 [m]."""
+
     def points(self, count: int) -> np.ndarray:
-        """Equally spaced points, shape (count, 3) [m]; see `spread_along`."""
+        """See `SpaceCurve.points`."""
         return np.asarray(spread_along(self.at, count, closed=self.closed) + np.array(self.centre))
 
 
 @dataclass(frozen=True)
-class Helix(SpaceCurve):
+class Helix(SmoothCurve):
     """Screw about the world's z, upwards through its middle at the centre: x = r cos t, y = r sin t, z = p t / 2π."""
 
     kind: Literal["helix"]
@@ -52,7 +66,7 @@ class Helix(SpaceCurve):
         few(turns=self.turns)
 
     def at(self, t: np.ndarray) -> np.ndarray:
-        """See `SpaceCurve.at`."""
+        """See `SmoothCurve.at`."""
         flat = self.radius * on_circle(self.turns * t)
         return np.column_stack((flat, self.pitch * self.turns * (t - 0.5)))
 
@@ -63,7 +77,7 @@ class Helix(SpaceCurve):
 
 
 @dataclass(frozen=True)
-class TiltedCircle(SpaceCurve):
+class TiltedCircle(SmoothCurve):
     """Circle that begins due east of its centre, in a plane that is turned about x; 90: upright."""
 
     kind: Literal["tilted_circle"]
@@ -71,13 +85,16 @@ class TiltedCircle(SpaceCurve):
     tilt_deg: float = 0.0  # [deg]
     centre: Place = (0.0, 0.0, 0.0)
 
-    closed: ClassVar[bool] = True
-
     def __post_init__(self) -> None:
         positive(radius=self.radius)
 
+    @property
+    def closed(self) -> bool:
+        """See `SpaceCurve.closed`."""
+        return True
+
     def at(self, t: np.ndarray) -> np.ndarray:
-        """See `SpaceCurve.at`."""
+        """See `SmoothCurve.at`."""
         east, north = self.radius * on_circle(t).T
         tilt = math.radians(self.tilt_deg)
         return np.column_stack((east, north * math.cos(tilt), north * math.sin(tilt)))
@@ -89,4 +106,30 @@ class TiltedCircle(SpaceCurve):
         return np.array([0.0, -math.sin(tilt), math.cos(tilt)])
 
 
-SpacePath = Helix | TiltedCircle
+@dataclass(frozen=True)
+class Lifted(SpaceCurve):
+    """A path of the plane, turned into space about its origin and put at a centre."""
+
+    kind: Literal["lifted"]
+    curve: ReferencePath
+    angles_deg: tuple[float, float, float] = (0.0, 0.0, 0.0)  # roll, pitch, yaw of its plane [deg]
+    centre: Place = (0.0, 0.0, 0.0)
+
+    @property
+    def closed(self) -> bool:
+        """See `SpaceCurve.closed`."""
+        return self.curve.closed
+
+    def points(self, count: int) -> np.ndarray:
+        """See `SpaceCurve.points`."""
+        x, y = self.curve.points(count).T
+        quat = from_euler(*np.deg2rad(self.angles_deg))
+        return np.stack(turn(quat, (x, y, 0.0 * x)), axis=1) + np.array(self.centre)
+
+    @property
+    def up(self) -> np.ndarray:
+        """See `SpaceCurve.up`."""
+        return np.array(turn(from_euler(*np.deg2rad(self.angles_deg)), (0.0, 0.0, 1.0)))
+
+
+SpacePath = Helix | TiltedCircle | Lifted
