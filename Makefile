@@ -163,25 +163,18 @@ rooms: dev ## Print the rooms of the core, and which folders import each other
 freeze: dev ## Freeze them anew, after an intended change of behaviour
 	$(BIN)/python -m tests.freeze --update
 
-# Tests with wall-clock deadlines run alone, all others in three processes, since tests of nodes mostly wait.
-# Exit code 5 of pytest: no test of this part is selected.
+# Three processes, since tests of nodes mostly wait. Those with wall-clock deadlines come first and alone, see
+# tests/real_time_first.py.
 define run_tests
-code=5; \
-run() { $(BIN)/python -m pytest "$$@" $(PYTEST_ARGS); }; \
-for part in "not real_time" real_time; do \
-	last=0; \
-	if [ "$$part" = real_time ]; then run tests/ros -m "$$part$(1)" || last=$$?; \
-	else run tests -n 3 --dist loadfile -m "$$part$(1)" || last=$$?; fi; \
-	if [ $$last != 5 ] && { [ $$code = 5 ] || [ $$code = 0 ]; }; then code=$$last; fi; \
-done; \
-if [ $$code = 0 ]; then echo; echo "All tests passed."; \
-else echo; echo "Some tests failed, or none was found. To repeat the failed ones: make test PYTEST_ARGS=--last-failed" >&2; \
+if $(BIN)/python -m pytest tests -n 3 --dist loadfile $(1) $(PYTEST_ARGS); then echo; echo "All tests passed."; \
+else code=$$?; echo; \
+	echo "Some tests failed, or none was found. To repeat the failed ones: make test PYTEST_ARGS=--last-failed" >&2; \
 	exit $$code; fi
 endef
 
 .PHONY: test
 test: dev ## Run the tests, without those that take more than ten seconds
-	@$(call run_tests, and not slow)
+	@$(call run_tests,-m "not slow")
 
 .PHONY: test-all
 test-all: dev peers ## Run every test

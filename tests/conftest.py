@@ -19,6 +19,7 @@ from fulmar_bringup.domains import reserved_domains
 from fulmar_cli import main as command_line
 from fulmar_ros.middleware import LOOPBACK, PROFILES
 from tests.fulmar_cli.bag_commands import POLICY
+from tests.real_time_first import RealTimeFirstPlugin
 from tests.synthetic_run import CALM, Plan, write_run
 
 
@@ -33,6 +34,11 @@ class RosDomain:
 def pytest_addoption(parser: pytest.Parser) -> None:
     """`--seeds 20` repeats random tests: pytest tests/ros/test_six_nozzles.py --seeds 20."""
     parser.addoption("--seeds", type=int, default=1, help="seeds of each test that takes `seed_of_series`")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Run tests with wall-clock deadlines before all others, and alone."""
+    config.pluginmanager.register(RealTimeFirstPlugin(), "real_time_first")
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
