@@ -32,9 +32,27 @@ class RealTimeFirst(LoadFileScheduling):
         waited = self._waits
         super().mark_test_complete(node, item_index, duration)
         if waited and not self._waits:
-            for _ in range(2):  # a process begins its last test when it knows of one more
-                for other in self.nodes:
-                    self._reschedule(other)
+            self._go_on()
+
+    def remove_node(self, node: Any) -> str | None:
+        """Give what a process that ended had left to others, without the test in which it did: it would end them too.
+
+        Returns:
+            That test; None where nothing was left.
+        """
+        work: dict[str, dict[str, bool]] = self.assigned_work.pop(node)
+        crashed = next((test for unit in work.values() for test, done in unit.items() if not done), None)
+        if crashed is not None:
+            work[self._split_scope(crashed)][crashed] = True
+            self.workqueue.update({name: unit for name, unit in work.items() if not all(unit.values())})
+            self._go_on()
+        return crashed
+
+    def _go_on(self) -> None:
+        """Give everybody work; twice, since a process begins its last test when it knows of one more."""
+        for _ in range(2):
+            for node in self.nodes:
+                self._reschedule(node)
 
     def _split_scope(self, nodeid: str) -> str:
         return REAL_TIME if nodeid in self._real_time else str(super()._split_scope(nodeid))
