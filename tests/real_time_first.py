@@ -13,7 +13,7 @@ REAL_TIME = "real_time"  # the marker, and the name of the work that is theirs t
 LIST, WRITER = "real_time_list", "gw0"  # where their names stand, and the process that writes them
 
 
-class RealTimeFirst(LoadFileScheduling):
+class RealTimeFirst(LoadFileScheduling):  # type: ignore[misc]  # xdist has no types
     """Gives all real-time tests to one process, and nothing to the others until these are done; then file by file."""
 
     def __init__(self, config: pytest.Config, log: Any, names: Path) -> None:
