@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -10,9 +11,10 @@ from fulmar_bags.mcap_records import bag_files
 from tests.conftest import RosDomain
 from tests.ros.cli import fulmar, json_of
 
-pytestmark = pytest.mark.real_time
+real_time = pytest.mark.real_time
 
 
+@real_time
 @pytest.mark.slow
 def test_killed_recorders_leave_bags_that_two_readers_open(ros_domain: RosDomain, tmp_path: Path) -> None:
     """One of them with a new file each second."""
@@ -23,6 +25,7 @@ def test_killed_recorders_leave_bags_that_two_readers_open(ros_domain: RosDomain
     assert len(bag_files(tmp_path / "bags" / "killed_0")) == 1
 
 
+@real_time
 @pytest.mark.slow
 def test_lock_step_loses_no_message_of_any_step(ros_domain: RosDomain, tmp_path: Path) -> None:
     """Six wires, compared step by step."""
@@ -33,6 +36,7 @@ def test_lock_step_loses_no_message_of_any_step(ros_domain: RosDomain, tmp_path:
     assert not any(figures["lost"].values())
 
 
+@real_time
 @pytest.mark.slow
 def test_the_cost_is_reported_for_both_with_its_interval(ros_domain: RosDomain, tmp_path: Path) -> None:
     """Real plant, real controller, a recorder that comes and goes."""
@@ -50,8 +54,8 @@ def test_the_cost_is_reported_for_both_with_its_interval(ros_domain: RosDomain, 
     assert sorted(path.name for path in (tmp_path / "bags").iterdir()) == ["cost_0", "cost_3"]
 
 
-def test_an_unknown_part_is_refused_with_the_nearest(ros_domain: RosDomain, tmp_path: Path) -> None:
+def test_an_unknown_part_is_refused_with_the_nearest(fulmar: Callable[..., tuple[int, str, str]]) -> None:
     """Before anything starts."""
-    done = fulmar("benchmark", "recorder", "--parts", "kils", env=ros_domain.env, cwd=tmp_path)
-    assert done.returncode == 2
-    assert "Did you mean 'kills'" in done.stderr
+    code, _, said = fulmar("benchmark", "recorder", "--parts", "kils")
+    assert code == 2
+    assert "Did you mean 'kills'" in said

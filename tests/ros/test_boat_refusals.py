@@ -68,7 +68,7 @@ def test_hold_by_an_operator_stops_the_boat_in_words_and_manual_alone_does_not_s
     assert not neighbour.applied[-1].any()
     bench.device.mode = MANUAL
     until(lambda: ahead(neighbour) or neighbour.said["plant"][1]["autopilot_mode"] == "0 (MANUAL)")
-    until_s = time.monotonic() + 1.0
+    until_s = time.monotonic() + 0.5
     while time.monotonic() < until_s:
         ahead(neighbour)
         assert not bench.command.any()

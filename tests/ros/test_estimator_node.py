@@ -16,7 +16,7 @@ from sensor_msgs.msg import Imu
 
 from fulmar_core.config.errors import ConfigError
 from fulmar_core.estimators.motion.frozen import POSE_FROZEN
-from fulmar_core.robots.topics import IMU, MOCAP, ODOMETRY, Wire
+from fulmar_core.robots.topics import IMU, MOCAP, ODOMETRY
 from fulmar_ros.convert import PoseWriter, stamp_of
 from fulmar_ros.estimator_node import EstimatorNode
 from fulmar_ros.qos import publisher_qos, subscriber_qos
@@ -26,7 +26,7 @@ from tests.ros.cli import json_of, run_in_real_time
 from tests.ros.neighbour import NAMESPACE, Neighbour, second_publisher, until
 from tests.states import planar_state
 
-pytestmark = pytest.mark.real_time
+real_time = pytest.mark.real_time
 
 pytest.importorskip("filterpy")
 MS = 1_000_000
@@ -100,6 +100,7 @@ def test_a_node_that_is_started_by_hand_refuses_an_estimator_of_the_other_space(
         EstimatorNode(lambda _code: None, cli_args=given)
 
 
+@real_time
 def test_odometry_has_frames_the_stamp_of_what_it_is_about_and_covariances(sources: Sources) -> None:
     sources.until_odometry()
     message = sources.odometry[-1]
@@ -111,6 +112,7 @@ def test_odometry_has_frames_the_stamp_of_what_it_is_about_and_covariances(sourc
     assert abs(message.twist.twist.linear.x) < 0.2
 
 
+@real_time
 def test_a_frozen_motion_capture_makes_no_odometry_and_is_a_warning_by_name(sources: Sources) -> None:
     sources.until_odometry()
 
@@ -129,13 +131,14 @@ def test_a_frozen_motion_capture_makes_no_odometry_and_is_a_warning_by_name(sour
     sources.until_odometry()
 
 
-@pytest.mark.parametrize("wire", [MOCAP, IMU], ids=lambda wire: wire.name)
+@real_time
 def test_readings_of_two_nodes_make_no_odometry_and_both_nodes_are_named_until_one_is_gone(
-    sources: Sources, ros_domain: RosDomain, wire: Wire
+    sources: Sources, ros_domain: RosDomain
 ) -> None:
+    """Poses; tests/fulmar_ros/test_writer_watch.py has the others."""
     sources.until_odometry()
     name = f"{NAMESPACE}/neighbour"
-    words = f"2 nodes publish {wire.name}, and only one may: {name}, {name}"
+    words = f"2 nodes publish {MOCAP.name}, and only one may: {name}, {name}"
 
     def silent() -> bool:
         before = len(sources.odometry)
@@ -144,15 +147,16 @@ def test_readings_of_two_nodes_make_no_odometry_and_both_nodes_are_named_until_o
             time.sleep(0.01)
         return len(sources.odometry) == before
 
-    with second_publisher(ros_domain.id, wire):
+    with second_publisher(ros_domain.id, MOCAP):
         until(silent)
         until(lambda: silent() and sources.said[1].get("warnings", "").startswith(words))
         assert sources.said[0] == words
-        assert sources.said[1]["last_refusal"].startswith(f"2 nodes publish {wire.name}, and only one may: ")
+        assert sources.said[1]["last_refusal"].startswith(f"2 nodes publish {MOCAP.name}, and only one may: ")
         assert sources.said[1]["stale"] == "true"
     sources.until_odometry()
 
 
+@real_time
 def test_a_gap_is_bridged_and_then_silence_says_that_it_is_stale(sources: Sources) -> None:
     sources.until_odometry()
     last_pose_ns = sources.now_ns
@@ -165,17 +169,15 @@ def test_a_gap_is_bridged_and_then_silence_says_that_it_is_stale(sources: Source
     sources.until_odometry()
 
 
-@pytest.mark.parametrize(
-    ("spoil", "words"), [({"frame": "camera"}, "'camera'"), ({"bad": True}, "not finite")]
-)
-def test_senseless_messages_are_refused_and_reported(
-    sources: Sources, spoil: dict[str, object], words: str
-) -> None:
+@real_time
+def test_senseless_messages_are_refused_and_reported(sources: Sources) -> None:
     sources.until_odometry()
-    until(lambda: sources.tick(**spoil) or words in sources.said[1]["last_refusal"])  # type: ignore[arg-type, func-returns-value]
+    until(lambda: sources.tick(frame="camera") or "'camera'" in sources.said[1]["last_refusal"])  # type: ignore[func-returns-value]
+    until(lambda: sources.tick(bad=True) or "not finite" in sources.said[1]["last_refusal"])  # type: ignore[func-returns-value]
     assert all(np.isfinite(m.twist.twist.linear.x) for m in sources.odometry)
 
 
+@real_time
 @pytest.mark.slow
 def test_a_platform_reaches_its_pose_by_estimated_odometry_alone(
     ros_domain: RosDomain, tmp_path: Path

@@ -140,7 +140,6 @@ QUICK = {
 }  # one of each kind
 
 
-@pytest.mark.real_time
 @pytest.mark.parametrize(
     "name", [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in nodes()]
 )
@@ -207,7 +206,6 @@ def test_a_plain_publisher_of_an_operator_s_wire_is_warned_of_nothing_and_a_latc
         until(lambda: len(got) == 2)
 
 
-@pytest.mark.real_time
 def test_a_best_effort_publisher_is_named_by_an_estimator_in_lock_step_which_counts_messages(
     other: Node, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -28,7 +28,7 @@ from policy_server.policy import Policy
 from tests.ros.controllers import copy_of
 from tests.ros.neighbour import NAMESPACE, ROBOT, Neighbour, Stream, asked_by_neighbour, until
 
-pytestmark = pytest.mark.real_time
+real_time = pytest.mark.real_time
 
 SHIPPED = policies_directory() / "floating_platform_go_to_pose"
 OTHER_TASK = policies_directory() / "floating_platform_go_to_position"
@@ -73,6 +73,7 @@ def damaged(folder: Path) -> Path:
     return bundle
 
 
+@real_time
 @pytest.mark.parametrize("what", ["wrong hash", "unsigned"])
 def test_a_policy_that_is_refused_gives_its_place_to_the_named_controller(
     what: str, neighbour: Neighbour, start: Start, tmp_path: Path
@@ -103,6 +104,7 @@ def test_a_rate_that_the_policy_was_not_trained_at_is_refused_too(neighbour: Nei
     assert "Hz" in values(neighbour)["fell_back"]
 
 
+@real_time
 def test_a_policy_whose_commands_are_refused_several_times_is_replaced(
     neighbour: Neighbour, start: Start, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -148,6 +150,7 @@ class Swapper:
         until(answered)
 
 
+@real_time
 def test_a_policy_is_changed_while_it_acts_without_a_gap_or_a_stray_command(
     neighbour: Neighbour, start: Start, tmp_path: Path
 ) -> None:
@@ -170,6 +173,7 @@ def test_a_policy_is_changed_while_it_acts_without_a_gap_or_a_stray_command(
     assert (around == around[0]).all()
 
 
+@real_time
 def test_policies_that_do_not_fit_are_refused_and_the_old_one_goes_on(
     neighbour: Neighbour, start: Start
 ) -> None:
@@ -186,12 +190,13 @@ def test_policies_that_do_not_fit_are_refused_and_the_old_one_goes_on(
     ):
         swapper.ask(folder, "refused", words)
         count = len(neighbour.commands)
-        until(lambda count=count: len(neighbour.commands) > count + 3)
+        until(lambda count=count: len(neighbour.commands) > count + 1)
         assert neighbour.commands[-1].any(), words
         assert values(neighbour)["sha256"] == before, words
     odometry.stop()
 
 
+@real_time
 def test_where_signatures_are_asked_for_only_a_signed_policy_takes_over(
     neighbour: Neighbour, start: Start, tmp_path: Path
 ) -> None:
@@ -206,6 +211,7 @@ def test_where_signatures_are_asked_for_only_a_signed_policy_takes_over(
     swapper.ask(second, "done")
 
 
+@real_time
 def test_the_swap_command_waits_for_the_controller_beside_a_recorder_and_asks_again(
     neighbour: Neighbour, start: Start, record: Callable[..., object], tmp_path: Path, monkeypatch
 ) -> None:

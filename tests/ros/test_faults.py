@@ -84,6 +84,7 @@ def test_a_dead_or_hung_policy_closes_the_valves_within_the_watchdog_and_a_tick(
     assert not np.any(closed)
 
 
+@pytest.mark.slow  # tests/fulmar_bringup/test_node_keeper.py has the decision
 def test_a_dead_plant_ends_the_run(ros_domain: RosDomain, tmp_path: Path) -> None:
     """First failure stops all."""
     run = start_run(ros_domain, tmp_path)
@@ -93,6 +94,7 @@ def test_a_dead_plant_ends_the_run(ros_domain: RosDomain, tmp_path: Path) -> Non
     assert "plant was killed by SIGKILL" in json_of(out)["failure"]
 
 
+@pytest.mark.slow  # tests/fulmar_bringup/test_silent_nodes.py has the decision
 def test_a_hung_plant_is_noticed_within_seconds(ros_domain: RosDomain, tmp_path: Path) -> None:
     """It reports once a second; a run does not wait for its own limit to learn that it no longer does."""
     run = start_run(ros_domain, tmp_path)

@@ -43,7 +43,7 @@ from tests.conftest import RosDomain
 from tests.ros.cli import fulmar, json_of
 from tests.ros.neighbour import Neighbour, until
 
-pytestmark = pytest.mark.real_time
+real_time = pytest.mark.real_time
 
 STARTS_S = 40.0
 
@@ -106,6 +106,7 @@ def devices(names):
 @pytest.mark.slow
 @pytest.mark.timeout(240)
 @devices(WATCHED)
+@real_time
 def test_a_killed_driver_leaves_the_device_to_its_own_watchdog(rig: Rig, request) -> None:
     """SIGKILL while it drives: the emulator's own last command is a stop, at its own time."""
     name = request.node.callspec.id
@@ -127,6 +128,7 @@ def test_a_killed_driver_leaves_the_device_to_its_own_watchdog(rig: Rig, request
 @pytest.mark.slow
 @pytest.mark.timeout(240)
 @devices(UNWATCHED)
+@real_time
 def test_a_killed_driver_without_a_watchdog_below_moves_on_and_a_new_one_stops_it(rig: Rig, request) -> None:
     """The hardware file says so in capitals. A driver that starts again begins with the safe command."""
     rig.until_it_moves()
@@ -159,6 +161,7 @@ def valves(neighbour: Neighbour, tmp_path: Path) -> Iterator[tuple[ValveBank, ps
         bank.close()
 
 
+@real_time
 @pytest.mark.timeout(120)
 @pytest.mark.parametrize(
     "number", ["SIGHUP", *(pytest.param(n, marks=pytest.mark.slow) for n in ("SIGTERM", "SIGINT", "SIGQUIT"))]
@@ -171,6 +174,7 @@ def test_a_driver_that_is_asked_to_end_closes_its_valves_first(valves, number: s
     assert driver.wait(10.0) == 0
 
 
+@real_time
 @pytest.mark.slow
 @pytest.mark.timeout(120)
 def test_a_node_that_was_started_by_nohup_goes_on_without_its_terminal(neighbour, tmp_path: Path) -> None:
@@ -194,6 +198,7 @@ def test_a_node_that_was_started_by_nohup_goes_on_without_its_terminal(neighbour
         assert started.wait(10.0) == 0
 
 
+@real_time
 @pytest.mark.slow
 @pytest.mark.timeout(240)
 @pytest.mark.parametrize(("neighbour", "rig"), [("floating_platform", "zero_g_lab")], indirect=True)
@@ -207,6 +212,7 @@ def test_silence_closes_the_valves_and_the_state_shows_it(rig: Rig) -> None:
     until(lambda: rig.neighbour.said["plant"][1].get("air_bearing") == "on")
 
 
+@real_time
 @pytest.mark.slow
 @pytest.mark.timeout(240)
 @pytest.mark.parametrize(("neighbour", "rig"), [("floating_platform", "zero_g_lab")], indirect=True)
@@ -236,6 +242,7 @@ RUNS = (  # with as many seconds as each needs to get there and stay for four
 )
 
 
+@real_time
 @pytest.mark.slow
 @pytest.mark.timeout(240)
 def test_runs_reach_their_goals_through_the_protocols(ros_domain: RosDomain, tmp_path: Path) -> None:

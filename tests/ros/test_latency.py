@@ -11,9 +11,10 @@ from fulmar_benchmarks.latency.endurance import endure
 from fulmar_cli.commands.benchmark_latency import latency
 from fulmar_core.config.errors import ConfigError
 
-pytestmark = pytest.mark.real_time
+real_time = pytest.mark.real_time
 
 
+@real_time
 @pytest.mark.slow
 def test_a_cell_states_latency_errors_of_the_period_and_what_each_node_uses() -> None:
     """rclpy's own executor, whose figures nothing is asked of, at 100 Hz."""
@@ -28,6 +29,7 @@ def test_a_cell_states_latency_errors_of_the_period_and_what_each_node_uses() ->
     assert figures["required"] == []
 
 
+@real_time
 @pytest.mark.slow
 def test_a_long_run_states_growth_of_memory_and_commands_that_the_bag_lacks(tmp_path: Path) -> None:
     figures = endure(simulated_s=10.0, rate=4.0, folder=tmp_path / "long", progress=lambda _done: None)

@@ -21,8 +21,6 @@ from tests.conftest import RosDomain
 from tests.ros.cli import child_running, json_of, start_fulmar, under_way
 from tests.ros.neighbour import until
 
-pytestmark = pytest.mark.real_time
-
 PLACES = """
 kind: positions
 title: there and back
@@ -32,22 +30,28 @@ HEADER = slice(4, 12)  # the stamp in the CDR bytes of a message that begins wit
 
 
 @pytest.mark.parametrize(
-    ("robot", "goals", "topic", "held_up_s"),
+    ("robot", "goals", "topic", "held_up_s", "more"),
     [
-        ("spacecraft_16", "helix", "goal_pose", 0.5),
-        pytest.param("floating_platform", "places.yaml", "goal_point", 0.5, marks=pytest.mark.slow),
+        ("spacecraft_16", "helix", "goal_pose", 0.5, ("--duration", "8")),
+        pytest.param("floating_platform", "places.yaml", "goal_point", 0.5, (), marks=pytest.mark.slow),
         # Longer than the 100 velocities last that its wire keeps by the clock.
-        pytest.param("turtlebot2", "lab_circle", "goal_velocity", 1.0, marks=pytest.mark.slow),
+        pytest.param("turtlebot2", "lab_circle", "goal_velocity", 1.0, (), marks=pytest.mark.slow),
     ],
 )
 def test_a_recorder_that_is_held_up_has_the_goal_of_each_step(
-    robot: str, goals: str, topic: str, held_up_s: float, ros_domain: RosDomain, tmp_path: Path
+    robot: str,
+    goals: str,
+    topic: str,
+    held_up_s: float,
+    more: tuple[str, ...],
+    ros_domain: RosDomain,
+    tmp_path: Path,
 ) -> None:
     (tmp_path / "places.yaml").write_text(PLACES, encoding="utf-8")
-    asked = ("run", robot, "--goals", goals, "--lockstep", "--record", "bag", "--json")
+    asked = ("run", robot, "--goals", goals, "--lockstep", *more, "--record", "bag", "--json")
     run = start_fulmar(*asked, env=ros_domain.env, cwd=tmp_path)
     try:
-        assert under_way(run, tmp_path / "bag", 200)
+        assert under_way(run, tmp_path / "bag", 100)
         recorder = child_running(run, "fulmar_ros.recorder_node")
         recorder.send_signal(signal.SIGSTOP)
         time.sleep(held_up_s)

@@ -102,7 +102,8 @@ def test_an_aircraft_lands_also_where_its_launcher_is_killed(ros_domain: RosDoma
 @pytest.mark.parametrize(
     ("node", "number"),
     [
-        ("recorder", signal.SIGKILL),
+        # tests/fulmar_bringup/test_node_keeper.py and test_processes.py have what starts it again.
+        pytest.param("recorder", signal.SIGKILL, marks=pytest.mark.slow),
         pytest.param("recorder", signal.SIGSTOP, marks=pytest.mark.slow),
         pytest.param("markers", signal.SIGKILL, marks=pytest.mark.slow),
         pytest.param("markers", signal.SIGSTOP, marks=pytest.mark.slow),

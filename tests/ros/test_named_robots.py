@@ -30,9 +30,8 @@ MESSAGES = 100  # in a bag, when its run is under way
 
 
 @pytest.fixture
-def beta(plant: PlantNode, monkeypatch: pytest.MonkeyPatch) -> Iterator[PlantNode]:
+def beta(plant: PlantNode) -> Iterator[PlantNode]:
     """A second plant of the same type, beside one without a name of its own."""
-    monkeypatch.setattr("fulmar_ros.plant_node.BRIEFLY_S", 5.0)  # a busy machine discovers nodes later
     node = PlantNode(
         make_backend, lambda _code: None, cli_args=["--ros-args", "-r", "__ns:=/beta", "-p", "backend:=mock"]
     )

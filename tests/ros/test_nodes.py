@@ -123,7 +123,6 @@ def test_parameters_of_rclpy_itself_are_known_to_every_node(ros_domain: RosDomai
         rclpy.shutdown(context=context)
 
 
-@pytest.mark.real_time
 @pytest.mark.parametrize("part", ["plant", "controller"])
 def test_a_node_survives_its_whole_lifecycle_twice(
     part: str, request: pytest.FixtureRequest, neighbour: Neighbour

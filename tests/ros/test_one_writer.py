@@ -16,7 +16,7 @@ import pytest
 from fulmar_bringup.launch_check import refuse_living_plants
 from fulmar_bringup.node_spec import NodeSpec
 from fulmar_core.config.errors import ConfigError
-from fulmar_core.robots.topics import AIR_BEARING, COMMAND, ODOMETRY, Wire
+from fulmar_core.robots.topics import COMMAND, ODOMETRY
 from fulmar_ros.controller_node import ControllerNode
 from fulmar_ros.plant_node import PlantNode
 from tests.conftest import RosDomain
@@ -76,10 +76,11 @@ def test_a_second_node_that_commands_closes_the_valves_until_it_is_gone(
     assert plant.guard.watchdog.trips == 0  # the commands went on all the time
 
 
-@pytest.mark.parametrize("wire", [ODOMETRY, AIR_BEARING], ids=lambda wire: wire.name)
 def test_a_controller_follows_no_input_of_two_nodes_names_both_and_goes_on_when_one_is_gone(
-    neighbour: Neighbour, controller: ControllerNode, ros_domain: RosDomain, wire: Wire
+    neighbour: Neighbour, controller: ControllerNode, ros_domain: RosDomain
 ) -> None:
+    """Odometry; tests/fulmar_ros/test_writer_watch.py has the others."""
+
     def acts() -> bool:
         neighbour.odometry(time.time_ns())
         time.sleep(0.02)
@@ -89,8 +90,8 @@ def test_a_controller_follows_no_input_of_two_nodes_names_both_and_goes_on_when_
     neighbour.give_goal()
     until(acts)
     name = f"{NAMESPACE}/neighbour"
-    words = f"2 nodes publish {wire.name}, and only one may: {name}, {name}"
-    with second_publisher(ros_domain.id, wire):
+    words = f"2 nodes publish {ODOMETRY.name}, and only one may: {name}, {name}"
+    with second_publisher(ros_domain.id, ODOMETRY):
         until(lambda: not acts())
         until(lambda: not acts() and neighbour.said["controller"][1].get("warnings") == words)
         message, values = neighbour.said["controller"]
@@ -104,7 +105,7 @@ def test_a_node_that_publishes_odometry_and_starts_again_in_order_is_no_second_o
 ) -> None:
     until(lambda: neighbour.goal_publisher.get_subscription_count() > 0)
     neighbour.give_goal()
-    for _ in range(4):
+    for _ in range(3):
         for _ in range(10):
             neighbour.odometry(time.time_ns())
             time.sleep(0.02)
@@ -168,6 +169,7 @@ def test_a_plant_whose_name_already_lives_is_refused_by_run_launch_file_and_node
         assert all(applied.any() for applied in neighbour.applied[begun:])
 
 
+@pytest.mark.slow  # tests/fulmar_ros/test_older_plant.py has who gives way
 def test_of_two_plants_that_start_at_once_not_both_live(ros_domain: RosDomain) -> None:
     """Neither has published anything yet when the other looks."""
     both = [subprocess.Popen(PLANT, env=ros_domain.env, stderr=subprocess.PIPE, text=True) for _ in range(2)]

@@ -34,7 +34,7 @@ from tests.own_files import own_folder
 from tests.ros.cli import fulmar, json_of
 from tests.ros.neighbour import NAMESPACE, Neighbour, until
 
-pytestmark = pytest.mark.real_time
+real_time = pytest.mark.real_time
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "own-driver.md"
 STARTS_S = 40.0
@@ -100,18 +100,19 @@ STARS = """
         from fulmar_core.wires.reading import Reading
         from hardware_drivers.feedback import Report
         now_ns = time.time_ns()
-        measured_ns = now_ns // 500_000_000 * 500_000_000  # twice a second
-        attitude = (0.0, 0.0, 1.0, 0.0) if measured_ns // 500_000_000 % 2 else (0.0, 0.0, 0.0, 1.0)
+        measured_ns = now_ns // 200_000_000 * 200_000_000  # five times a second
+        attitude = (0.0, 0.0, 1.0, 0.0) if measured_ns // 200_000_000 % 2 else (0.0, 0.0, 0.0, 1.0)
         return Report(None, None, now_ns, {"star_tracker": Reading(attitude, measured_ns)})
 """
 
 
+@real_time
 def test_a_star_tracker_of_the_device_is_published_once_a_reading_with_its_own_stamp(
     neighbour: Neighbour, folder: Path, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
 ) -> None:
     """The robot's YAML, outside of the checkout, names the sensor; the class reports it."""
     robot = yaml.safe_load(config_path("robots", "floating_platform").read_text(encoding="utf-8"))
-    robot["sensors"]["star_tracker"] = {"rate_hz": 2.0}
+    robot["sensors"]["star_tracker"] = {"rate_hz": 5.0}
     (folder / "robots").mkdir()
     (folder / "robots" / "floating_platform.yaml").write_text(yaml.safe_dump(robot))
     monkeypatch.setenv("FULMAR_CONFIGS", str(folder))
@@ -128,9 +129,9 @@ def test_a_star_tracker_of_the_device_is_published_once_a_reading_with_its_own_s
     request.getfixturevalue("node")
     until(lambda: len(found) >= 4)
     stamps = [stamp for _, stamp, _ in found]
-    assert np.diff(stamps).tolist() == [500_000_000] * (len(stamps) - 1)
+    assert np.diff(stamps).tolist() == [200_000_000] * (len(stamps) - 1)
     assert all(frame == "inertial" for frame, *_ in found)
-    assert [w for *_, w in found] == [0.0 if stamp // 500_000_000 % 2 else 1.0 for stamp in stamps]
+    assert [w for *_, w in found] == [0.0 if stamp // 200_000_000 % 2 else 1.0 for stamp in stamps]
 
 
 def open_first(neighbour: Neighbour) -> None:
@@ -138,6 +139,7 @@ def open_first(neighbour: Neighbour) -> None:
     time.sleep(0.02)
 
 
+@real_time
 def test_silence_closes_it_and_a_write_that_raises_ends_it_closed(
     neighbour: Neighbour, board: ModuleType, node: DriverNode, exits: list[int]
 ) -> None:
@@ -160,6 +162,7 @@ def test_silence_closes_it_and_a_write_that_raises_ends_it_closed(
     assert board.CLOSED == [True]
 
 
+@real_time
 def test_a_device_that_refuses_is_held_until_a_person_gives_control_back(
     neighbour: Neighbour, board: ModuleType, node: DriverNode
 ) -> None:
@@ -183,10 +186,12 @@ def test_a_device_that_refuses_is_held_until_a_person_gives_control_back(
     node.stop()
 
 
+@real_time
 def test_a_write_that_hangs_is_reported_and_does_not_hold_up_the_end(
-    neighbour: Neighbour, board: ModuleType, node: DriverNode
+    neighbour: Neighbour, board: ModuleType, node: DriverNode, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Nothing but the device's own watchdog can stop it meanwhile; the node ends before a launcher would kill it."""
+    monkeypatch.setattr("fulmar_ros.plant_node.PATIENCE_S", 0.5)
     until(lambda: bool(board.SENT) and "plant" in neighbour.said)
     board.HOLD.clear()
     try:
@@ -217,6 +222,7 @@ def test_a_constructor_that_raises_ends_the_node_with_one_line_and_exit_code_2(
         group.stop_all()
 
 
+@real_time
 @pytest.mark.slow
 def test_a_constructor_that_raises_ends_a_run_with_one_line_and_exit_code_2(
     ros_domain: RosDomain, folder: Path
@@ -282,6 +288,7 @@ def test_the_class_of_the_page_is_short() -> None:
     assert len(code.splitlines()) <= 40
 
 
+@real_time
 @pytest.mark.timeout(120)
 def test_the_relay_board_of_the_page_opens_a_valve_and_is_closed_by_watchdog_and_sigterm(
     neighbour: Neighbour, relays: Relays, tmp_path: Path
@@ -315,6 +322,7 @@ def test_the_relay_board_of_the_page_opens_a_valve_and_is_closed_by_watchdog_and
         group.stop_all()
 
 
+@real_time
 @pytest.mark.slow
 @pytest.mark.timeout(120)
 def test_commission_clicks_each_relay_of_the_page_in_the_order_of_its_channels(

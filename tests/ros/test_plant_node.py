@@ -31,9 +31,10 @@ from sim_nodes.sim_node import make_backend
 from tests.ros.neighbour import NAMESPACE, Neighbour, open_valves, until
 from tests.states import planar_state
 
-pytestmark = pytest.mark.real_time
+real_time = pytest.mark.real_time
 
 
+@real_time
 def test_a_command_opens_valves_and_silence_closes_them_within_the_timeout(
     neighbour: Neighbour, plant: PlantNode
 ) -> None:
@@ -45,22 +46,27 @@ def test_a_command_opens_valves_and_silence_closes_them_within_the_timeout(
     until(lambda: "no command for" in neighbour.said["plant"][0])
 
 
-@pytest.mark.parametrize(
-    ("values", "names", "reason"),
-    [
-        ([float("nan")] + [1.0] * 7, None, "not finite"),
-        ([1.0] * 7, [f"thruster_{i}" for i in range(1, 8)], "names 7 actuators"),
-        ([1.0] * 8, [f"thruster_{i}" for i in (2, 1, 3, 4, 5, 6, 7, 8)], "'thruster_2' as actuator 1"),
-    ],
-)
-def test_a_senseless_command_is_refused_and_named(
-    values: list[float], names: list[str] | None, reason: str, neighbour: Neighbour, plant: PlantNode
-) -> None:
+SENSELESS: list[tuple[list[float], list[str] | None, str]] = [
+    ([float("nan")] + [1.0] * 7, None, "not finite"),
+    ([1.0] * 7, [f"thruster_{i}" for i in range(1, 8)], "names 7 actuators"),
+    ([1.0] * 8, [f"thruster_{i}" for i in (2, 1, 3, 4, 5, 6, 7, 8)], "'thruster_2' as actuator 1"),
+]
+
+
+@real_time
+def test_a_senseless_command_is_refused_and_named(neighbour: Neighbour, plant: PlantNode) -> None:
     """The valves stay closed, and the diagnostics say why."""
-    until(lambda: neighbour.command(values, names) or reason in neighbour.said.get("plant", ("",))[0])
+    for values, names, reason in SENSELESS:
+
+        def said(values=values, names=names, reason=reason) -> bool:
+            neighbour.command(values, names)
+            return reason in neighbour.said["plant"][0]
+
+        until(said)
     assert not any(applied.any() for applied in neighbour.applied)
 
 
+@real_time
 def test_an_answer_to_an_old_observation_opens_no_valve(neighbour: Neighbour, plant: PlantNode) -> None:
     """The watchdog is 0.4 s; answers half a second old come all the time, with stamps that go on."""
 
@@ -70,13 +76,14 @@ def test_an_answer_to_an_old_observation_opens_no_valve(neighbour: Neighbour, pl
         return bool(neighbour.applied[-1].any())
 
     until(lambda: plant.clock.now_ns > SIMULATION_START_NS + 500_000_000)
-    end = time.monotonic() + 0.7
+    end = time.monotonic() + 0.5
     while time.monotonic() < end:
         assert not answer(500_000_000)
     until(lambda: "older than the watchdog's 400 ms" in neighbour.said["plant"][0])
     until(lambda: answer(100_000_000))
 
 
+@real_time
 def test_a_stale_command_does_not_survive_a_deactivation(neighbour: Neighbour, plant: PlantNode) -> None:
     """Deactivate with an open valve, activate again at once: the plant begins with closed valves."""
     until(lambda: neighbour.command(open_valves(neighbour.robot)) or neighbour.applied[-1].any())
@@ -108,6 +115,7 @@ def test_a_transition_that_does_not_fit_the_state_is_refused_and_the_plant_goes_
     assert asked(label="cleanup")
 
 
+@real_time
 def test_shutdown_from_active_stops_the_loop_and_closes_the_valves(
     neighbour: Neighbour, plant: PlantNode
 ) -> None:
@@ -139,6 +147,7 @@ def test_a_backend_that_raises_ends_the_process_with_closed_valves(neighbour: Ne
         until(lambda: "the bus is gone" in neighbour.said.get("plant", ("",))[0])
 
 
+@real_time
 def test_a_backend_that_hangs_is_reported_and_its_watchdog_counts(neighbour: Neighbour) -> None:
     """A step that does not come back cannot hide behind an old status."""
     release = threading.Event()
@@ -156,6 +165,7 @@ def test_a_backend_that_hangs_is_reported_and_its_watchdog_counts(neighbour: Nei
         node.stop()
 
 
+@real_time
 @pytest.mark.parametrize("neighbour", ["turtlebot2"], indirect=True)
 def test_wheels_follow_cmd_vel_and_slow_down_within_a_second_when_it_falls_silent(
     neighbour: Neighbour,
@@ -182,6 +192,7 @@ def test_wheels_follow_cmd_vel_and_slow_down_within_a_second_when_it_falls_silen
         node.stop()
 
 
+@real_time
 def test_in_real_time_the_newest_command_is_received_from_best_effort_publishers_too(
     neighbour: Neighbour, plant: PlantNode
 ) -> None:
@@ -192,9 +203,10 @@ def test_in_real_time_the_newest_command_is_received_from_best_effort_publishers
     until(lambda: publisher.publish(message) or neighbour.applied[-1].any())
 
 
+@real_time
 def test_silence_after_the_last_tick_is_no_trip(neighbour: Neighbour) -> None:
     """A controller that still speaks when the plant has finished, after a pause."""
-    arguments = ["--ros-args", "-r", f"__ns:={NAMESPACE}", "-p", "backend:=mock", "-p", "duration_s:=1.0"]
+    arguments = ["--ros-args", "-r", f"__ns:={NAMESPACE}", "-p", "backend:=mock", "-p", "duration_s:=0.4"]
     node = PlantNode(make_backend, lambda _code: None, cli_args=arguments)
     with spinning(node, lambda error: pytest.fail(repr(error))):
         until(
@@ -211,6 +223,7 @@ def test_silence_after_the_last_tick_is_no_trip(neighbour: Neighbour) -> None:
         node.stop()
 
 
+@real_time
 def test_odometry_goes_on_when_somebody_sets_the_clock_back(neighbour) -> None:
     """By an hour: dropping what lies behind the newest stamp would keep a robot blind for as long.
 

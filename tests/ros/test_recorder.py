@@ -20,7 +20,6 @@ from geometry_msgs.msg import PoseStamped
 from mcap.reader import make_reader
 from nav_msgs.msg import Odometry
 from rclpy.duration import Duration
-from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import Reader
 from std_msgs.msg import String
 
@@ -30,10 +29,13 @@ from fulmar_core.robots.topics import GOAL_POSE, METADATA
 from fulmar_ros.qos import publish_patiently, publisher_qos
 from tests.ros.recorder import ROBOT, odometry, publish, wait_for
 
-pytestmark = pytest.mark.real_time
+real_time = pytest.mark.real_time
 
 
-def test_a_stopped_recorder_has_kept_every_message_and_leaves_no_process(record, node):
+@real_time
+def test_a_stopped_recorder_has_kept_every_message_and_said_so_each_second_and_leaves_no_process(
+    record, node, healths
+):
     early = node.create_publisher(String, METADATA.name, publisher_qos(METADATA))
     early.publish(String(data="early"))
     latched = node.create_publisher(PoseStamped, GOAL_POSE.name, publisher_qos(GOAL_POSE))
@@ -43,12 +45,17 @@ def test_a_stopped_recorder_has_kept_every_message_and_leaves_no_process(record,
     recorder.wait_until_recording()
     while not early.get_subscription_count():  # endpoints find each other in any order
         time.sleep(0.01)
-    publish(odometry(node), range(500))
+    # Whatever the machine holds the recorder up for: a publisher in real time keeps 50 messages, 0.1 s of these.
+    publish(odometry(node, lockstep=True), range(500))
     for goals in (latched, volatile):
         assert goals.get_subscription_count()
         goals.publish(PoseStamped())
     for sent in (early, latched, volatile):
         assert sent.wait_for_all_acked(Duration(seconds=5.0))
+    wait_for(lambda: healths and int(values(healths[-1])["recorded"]) >= 500)
+    assert healths[-1].level == DiagnosticStatus.OK
+    assert (values(healths[-1])["mode"], values(healths[-1])["dropped"]) == ("recording", "0")
+    assert int(values(healths[-1])["free_bytes"]) > 0
     code, out, err = recorder.end(signal.SIGINT)
     assert (code, err) == (0, "")
     assert out.startswith("recorded ")
@@ -60,13 +67,16 @@ def test_a_stopped_recorder_has_kept_every_message_and_leaves_no_process(record,
         # The latched one before it was there and the one after, which came twice, and that of a default publisher.
         assert counts[f"{ROBOT}/{GOAL_POSE.name}"] == 3
         assert {c.topic for c in reader.connections} >= {f"{ROBOT}/odom", "/clock", "/diagnostics"}
+    said = open_bag(recorder.directory).topics["/diagnostics"].data[0]
+    assert b"floating_platform: recorder" in said
     check_provenance(recorder.file())
     with pytest.raises(ProcessLookupError):
         os.kill(recorder.process.pid, 0)
     assert not [thread for thread in threading.enumerate() if thread.name == "bag"]
 
 
-def test_a_bag_says_when_a_message_was_sent_and_when_it_was_received(record, node):
+@real_time
+def test_a_paused_recorder_says_when_a_message_was_sent_and_received_and_sigterm_closes_its_bag(record, node):
     early = node.create_publisher(PoseStamped, GOAL_POSE.name, publisher_qos(GOAL_POSE))
     latched = [time.time_ns(), early.publish(PoseStamped()), time.time_ns()]
     time.sleep(0.2)
@@ -83,11 +93,13 @@ def test_a_bag_says_when_a_message_was_sent_and_when_it_was_received(record, nod
     went_on = time.time_ns()
     recorder.process.send_signal(signal.SIGCONT)
     assert publisher.wait_for_all_acked(Duration(seconds=5.0))
-    assert recorder.end(signal.SIGINT)[0] == 0
+    publish(publisher, range(20, 40))
+    assert publisher.wait_for_all_acked(Duration(seconds=5.0))
+    assert recorder.end(signal.SIGTERM)[0] == 0
+    assert recorder.stamps_by_rosbags() == list(range(40))
     topics = open_bag(recorder.directory).topics
     odom, goal = topics[f"{ROBOT}/odom"], topics[f"{ROBOT}/{GOAL_POSE.name}"]
-    assert len(odom) == len(spans)
-    for (before, after), sent, received in zip(spans, odom.publish_ns, odom.log_ns, strict=True):
+    for (before, after), sent, received in zip(spans, odom.publish_ns, odom.log_ns, strict=False):
         assert before <= sent <= after
         assert received >= went_on
     # A latched message was sent before anybody recorded.
@@ -103,8 +115,10 @@ def check_provenance(file):
     assert set(reported) == {"fulmar_version", "git_revision", "python", "platform", "packages"}
 
 
+@real_time
 def test_a_recorder_that_is_started_again_goes_on_in_the_bag_of_the_one_that_died(record, node):
-    publisher = odometry_soon(node, recorder := record())
+    (recorder := record()).wait_until_recording()
+    publisher = odometry(node, lockstep=True)  # keeps what a busy machine holds the second one up for
     publish(publisher, range(50))
     wait_for(lambda: len(recorder.stamps_by_rosbags()) == 50)
     recorder.end(signal.SIGKILL)
@@ -129,18 +143,14 @@ def says_what_it_missed(recorder):
     return health is not None and any(missed in data for data in health.data)
 
 
-def odometry_soon(node, recorder):
-    recorder.wait_until_recording()
-    return odometry(node)
-
-
+@real_time
 def test_a_killed_recorder_leaves_a_bag_up_to_its_last_second(record, node):
     recorder = record()
     recorder.wait_until_recording()
     publisher = odometry(node)
     begin = time.monotonic()
     sent = []
-    while time.monotonic() - begin < 2.0:
+    while time.monotonic() - begin < 1.6:
         publish(publisher, [len(sent)], period_s=0.01)
         sent.append(time.monotonic())
     recorder.end(signal.SIGKILL)
@@ -150,20 +160,8 @@ def test_a_killed_recorder_leaves_a_bag_up_to_its_last_second(record, node):
     assert lost_s < 1.3, "half a second between flushes, the rest for a busy machine"
 
 
-def test_a_paused_recorder_goes_on_where_it_was_and_sigterm_closes_its_bag(record, node):
-    recorder = record()
-    recorder.wait_until_recording()
-    publisher = odometry(node)
-    publish(publisher, range(50))
-    recorder.process.send_signal(signal.SIGSTOP)
-    time.sleep(0.5)
-    recorder.process.send_signal(signal.SIGCONT)
-    publish(publisher, range(50, 100))
-    assert recorder.end(signal.SIGTERM)[0] == 0
-    assert recorder.stamps_by_rosbags() == list(range(100))
-
-
 @pytest.mark.slow
+@real_time
 def test_in_lock_step_a_paused_recorder_is_waited_for_and_lacks_nothing(record, node):
     recorder = record()
     recorder.wait_until_recording()
@@ -183,6 +181,7 @@ def test_in_lock_step_a_paused_recorder_is_waited_for_and_lacks_nothing(record, 
     assert recorder.stamps_by_rosbags() == list(range(6000))
 
 
+@real_time
 def test_in_lock_step_a_recorder_that_hangs_ends_the_waiting_with_a_reason(record, node, monkeypatch):
     monkeypatch.setattr("fulmar_ros.qos.PATIENCE_S", 0.3)
     recorder = record()
@@ -196,6 +195,7 @@ def test_in_lock_step_a_recorder_that_hangs_ends_the_waiting_with_a_reason(recor
             publish_patiently(publisher, Odometry())
 
 
+@real_time
 def test_in_real_time_a_recorder_that_hangs_holds_up_nothing(record, node):
     recorder = record()
     recorder.wait_until_recording()
@@ -203,7 +203,7 @@ def test_in_real_time_a_recorder_that_hangs_holds_up_nothing(record, node):
 
     def round_s() -> float:
         begin = time.monotonic()
-        for _ in range(6000):
+        for _ in range(2000):
             publisher.publish(Odometry())
         return time.monotonic() - begin
 
@@ -234,6 +234,7 @@ print(publisher.wait_for_all_acked(Duration(seconds=1.5)))
 """
 
 
+@real_time
 def test_a_publisher_learns_soon_what_has_arrived(record, ros_domain):
     """By itself Fast DDS asks every 3 s, when the last 50 messages of a 200 Hz publisher are long gone."""
     record().wait_until_recording()
@@ -266,12 +267,13 @@ def values(status: DiagnosticStatus) -> dict[str, str]:
     return {pair.key: pair.value for pair in status.values}
 
 
+@real_time
 def test_a_full_disk_ends_in_exit_code_1_with_all_before_it_kept(record, node, healths):
     recorder = record()
     recorder.wait_until_recording()
     publisher = odometry(node)
     publish(publisher, range(10))
-    time.sleep(1.3)
+    wait_for(lambda: len(recorder.stamps_by_rosbags()) == 10)
     size = recorder.file().stat().st_size
     resource.prlimit(recorder.process.pid, resource.RLIMIT_FSIZE, (size, resource.RLIM_INFINITY))
     publish(publisher, range(10, 600))
@@ -284,24 +286,8 @@ def test_a_full_disk_ends_in_exit_code_1_with_all_before_it_kept(record, node, h
     assert recorder.stamps_by_rosbags() == list(range(10))
 
 
-def test_a_recorder_says_once_a_second_what_became_of_the_messages(record, node, healths):
-    recorder = record()
-    recorder.wait_until_recording()
-    publish(odometry(node), range(50))
-    wait_for(lambda: healths and int(values(healths[-1])["recorded"]) >= 50)
-    assert healths[-1].level == DiagnosticStatus.OK
-    assert values(healths[-1])["mode"] == "recording"
-    assert values(healths[-1])["dropped"] == "0"
-    assert int(values(healths[-1])["free_bytes"]) > 0
-    recorder.end(signal.SIGINT)
-    with AnyReader([recorder.directory]) as reader:
-        said = [
-            reader.deserialize(raw, c.msgtype) for c, _, raw in reader.messages() if c.topic == "/diagnostics"
-        ]
-    assert said[0].status[0].name == "floating_platform: recorder"
-
-
 @pytest.mark.slow
+@real_time
 def test_a_recorder_splits_by_time(record, node):
     recorder = record("split_s:=0.5")
     recorder.wait_until_recording()

@@ -29,7 +29,8 @@ from tests.conftest import RosDomain
 from tests.ros.controllers import make_lqr
 from tests.ros.neighbour import NAMESPACE, until
 
-pytestmark = pytest.mark.real_time
+real_time = pytest.mark.real_time
+
 PLAN = RunPlan("floating_platform", "go_to_pose", "lqr", "mock", 50.0)
 
 
@@ -84,9 +85,10 @@ def test_a_launcher_whose_goals_come_from_outside_publishes_none_itself(
 class Button:
     """An e-stop that says what a test wants, twenty times a second, or nothing."""
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self) -> None:
         self.pressed: bool | None = False
-        self._publisher = node.create_publisher(Bool, ESTOP.name, publisher_qos(ESTOP))
+        self._node = rclpy.create_node("button", namespace=NAMESPACE)
+        self._publisher = self._node.create_publisher(Bool, ESTOP.name, publisher_qos(ESTOP))
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._run)
         self._thread.start()
@@ -99,6 +101,7 @@ class Button:
     def stop(self) -> None:
         self._over.set()
         self._thread.join()
+        self._node.destroy_node()  # not before: the thread publishes
 
 
 @pytest.fixture
@@ -111,7 +114,7 @@ def operated(
     with supervisor(PLAN) as overseer:
         controller = ControllerNode(make_lqr, lambda _code: None, cli_args=arguments)
         other = rclpy.create_node("other", namespace=NAMESPACE)
-        button = Button(other)
+        button = Button()
         with spinning(controller, overseer.fail):
             until(lambda: "no odom yet" in reason(overseer))  # the e-stop is received, and released
             yield overseer, button, other
@@ -144,6 +147,7 @@ def give(
     return thread
 
 
+@real_time
 def test_a_goal_that_was_refused_for_a_silent_e_stop_is_reported_again(
     operated: tuple[Supervisor, Button, Node],
 ) -> None:
@@ -160,6 +164,7 @@ def test_a_goal_that_was_refused_for_a_silent_e_stop_is_reported_again(
     assert overseer.controller.values["goal_refused"] == ""
 
 
+@real_time
 def test_a_goal_that_a_silent_e_stop_took_away_before_all_were_ready_is_reported_again(
     operated: tuple[Supervisor, Button, Node],
 ) -> None:
@@ -177,6 +182,7 @@ def test_a_goal_that_a_silent_e_stop_took_away_before_all_were_ready_is_reported
     assert overseer.controller.values["goal_stamp_ns"] == "6"
 
 
+@real_time
 def test_a_goal_that_was_refused_for_a_pressed_e_stop_is_not_reported_again_by_itself(
     operated: tuple[Supervisor, Button, Node],
 ) -> None:
@@ -184,7 +190,7 @@ def test_a_goal_that_was_refused_for_a_pressed_e_stop_is_not_reported_again_by_i
     button.pressed = True
     until(lambda: "e-stop: pressed" in reason(overseer))
     failures: list[Exception] = []
-    giving = give(overseer, failures, within_s=2.5)
+    giving = give(overseer, failures, within_s=1.5)
     until(lambda: overseer.controller.values.get("goal_refused", "").startswith("e-stop: pressed"))
     button.pressed = False
     released = other.create_publisher(String, ESTOP_RELEASED.name, publisher_qos(ESTOP_RELEASED))

@@ -25,7 +25,8 @@ from tests.ros.cli import child_running, fulmar, start_fulmar
 from tests.ros.controllers import copy_of
 from tests.ros.neighbour import ROBOT, Neighbour, until
 
-pytestmark = pytest.mark.real_time
+real_time = pytest.mark.real_time
+
 LOAD = ("fault", "recovered")  # of a busy machine, four times as fast as the clock
 RECORDED = ("--json", "--record", "bag")
 
@@ -86,6 +87,7 @@ def give(neighbour: Neighbour, x: float, y: float) -> None:
     neighbour.node.destroy_publisher(publisher)
 
 
+@real_time
 @pytest.mark.slow
 def test_three_goals_a_swap_an_e_stop_its_reset_and_another_goal_follow_each_other(
     neighbour: Neighbour, start: Any, tmp_path: Path
@@ -119,6 +121,7 @@ def test_three_goals_a_swap_an_e_stop_its_reset_and_another_goal_follow_each_oth
     assert not record.applied.effort[-1].any()
 
 
+@real_time
 @pytest.mark.slow
 def test_the_controller_of_a_recorded_system_takes_every_swap(
     seed_of_series: int, neighbour: Neighbour, ros_domain: RosDomain, start: Any, tmp_path: Path
@@ -134,6 +137,7 @@ def test_the_controller_of_a_recorded_system_takes_every_swap(
     up.end(signal.SIGTERM)
 
 
+@real_time
 @pytest.mark.slow
 def test_ctrl_c_counts_no_trip_and_one_bag_holds_all(
     neighbour: Neighbour, start: Any, tmp_path: Path
@@ -150,6 +154,7 @@ def test_ctrl_c_counts_no_trip_and_one_bag_holds_all(
     assert not read_run(tmp_path / "bag").warnings
 
 
+@real_time
 @pytest.mark.slow  # as in `fulmar run`
 def test_a_node_that_dies_ends_the_system_with_its_name_and_a_whole_bag(start: Any, tmp_path: Path) -> None:
     up = start("mock_lqr")
@@ -163,8 +168,8 @@ def test_a_node_that_dies_ends_the_system_with_its_name_and_a_whole_bag(start: A
     assert not record.applied.effort[-1].any()
 
 
-def test_an_unknown_system_is_refused_with_the_nearest_name(ros_domain: RosDomain, tmp_path: Path) -> None:
-    done = fulmar("up", "mujoco_lqrr", env=ros_domain.env, cwd=tmp_path)
-    assert done.returncode == BAD_USAGE
-    assert "mujoco_lqr" in done.stderr
-    assert len(done.stderr.strip().splitlines()) == 1
+def test_an_unknown_system_is_refused_with_the_nearest_name(fulmar: Any) -> None:
+    code, _, said = fulmar("up", "mujoco_lqrr")
+    assert code == BAD_USAGE
+    assert "mujoco_lqr" in said
+    assert len(said.strip().splitlines()) == 1
