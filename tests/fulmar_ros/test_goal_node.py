@@ -74,6 +74,7 @@ class Bench:
         """Let time pass without odometry, with the looks of the node's timer."""
         for _ in range(round(seconds / 0.1)):
             self._clock.now_s += 0.1
+            self.stamp_ns += 100 * MS
             self.node._watch()
 
     def see(
