@@ -13,6 +13,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
 
+# Before numpy is loaded: threads of linear algebra that wait for each other take a third of all processor time.
+os.environ.update(dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1"))
+
 import pytest
 
 from fulmar_bringup.domains import reserved_domains
