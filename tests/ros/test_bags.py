@@ -105,6 +105,7 @@ def rerun_through_node(bag: Path) -> list[str]:
     return ["bag", "rerun", str(bag), "--through", "node", *tolerances, "--json"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("bag", [POLICY, LQR], ids=lambda bag: bag.name)
 def test_the_deployed_node_gives_the_recorded_answers(bag: Path, ros_domain: RosDomain, tmp_path: Path):
     done = fulmar(*rerun_through_node(bag), env=ros_domain.env, cwd=tmp_path)
@@ -121,6 +122,7 @@ def test_the_deployed_node_is_given_the_guards_of_the_run(ros_domain: RosDomain,
     assert found["asked"] == 76
 
 
+@pytest.mark.slow
 def test_another_controller_behind_the_node_is_found_out(ros_domain: RosDomain, tmp_path: Path):
     asked = ("--through", "node", "--controller", "lqr", "--json")
     done = fulmar("bag", "rerun", str(POLICY), *asked, env=ros_domain.env, cwd=tmp_path)

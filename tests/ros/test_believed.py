@@ -35,6 +35,7 @@ class Ahead:
 """
 
 
+@pytest.mark.slow
 def test_the_observer_of_a_users_controller_is_recorded_beside_the_odometry(
     ros_domain: RosDomain, tmp_path: Path
 ) -> None:

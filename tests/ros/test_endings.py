@@ -24,6 +24,7 @@ from tests.ros.cli import child_running, fulmar, json_of, nothing_left, start_fu
 UNDER_WAY_S = 1.5  # from the start of the processes of an evaluation until they step
 
 
+@pytest.mark.slow
 def test_a_recorder_that_fails_at_its_end_fails_the_run(
     ros_domain: RosDomain, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -33,6 +34,7 @@ def test_a_recorder_that_fails_at_its_end_fails_the_run(
     assert reported.exit_code == 1
 
 
+@pytest.mark.slow
 def test_commands_that_are_not_in_the_bag_fail_a_lockstep_run(
     ros_domain: RosDomain, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -74,7 +76,7 @@ def outcome_with(
     )
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)])
 def test_a_run_that_is_stopped_before_there_is_a_bag_has_an_outcome_all_the_same(
     number: signal.Signals, ros_domain: RosDomain, tmp_path: Path
 ) -> None:
@@ -96,6 +98,7 @@ def test_a_run_that_is_stopped_before_there_is_a_bag_has_an_outcome_all_the_same
     assert nothing_left(children)
 
 
+@pytest.mark.slow
 def test_ctrl_c_ends_a_demo_and_not_its_first_run_alone(ros_domain: RosDomain, tmp_path: Path) -> None:
     """Nothing is compared, and no second run begins."""
     demo = start_fulmar("demo", "--out", "demo", env=ros_domain.env, cwd=tmp_path)
@@ -109,6 +112,7 @@ def test_ctrl_c_ends_a_demo_and_not_its_first_run_alone(ros_domain: RosDomain, t
     assert nothing_left(children)
 
 
+@pytest.mark.slow
 def test_a_recorder_that_cannot_begin_is_the_failure(ros_domain: RosDomain, tmp_path: Path) -> None:
     """Its own words are on standard error."""
     (tmp_path / "file").write_text("")

@@ -40,9 +40,9 @@ from tests.spaces import robot_for, task_for
 
 SEED = 5
 LASTS_S = {"track_velocities": 14.0, "track_velocities_3d": 14.0}  # long enough for a second velocity
-BRIEFLY_S = 6.0  # short enough to leave no geofence and to touch no obstacle
+BRIEFLY_S = 3.0  # short enough to leave no geofence and to touch no obstacle
 TURNS_S = 3.0  # soon after, the guard stops what turns ever further from its goal
-FLIES_S = 2.0  # of aircraft, which are commanded more often
+FLIES_S = 0.5  # of aircraft, which are commanded more often
 # A second task of a kind with other figures brings nothing new onto the wires; tests/conftest.py has more of them.
 ALIKE = {
     "drift_go_to_pose",
@@ -189,6 +189,7 @@ def test_every_task_comes_over_the_wires_as_it_does_without_them(name: str) -> N
     check_pair(robot_for(task, load_robot("turtlebot2")), task)
 
 
+@pytest.mark.slow
 def test_a_policy_with_memory_goes_the_same_way_over_the_wires_as_without_them(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

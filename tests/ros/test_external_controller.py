@@ -44,6 +44,7 @@ def node(folder: Path, env: dict[str, str], *changes: tuple[str, str]) -> Iterat
         process.wait()
 
 
+@pytest.mark.slow
 def test_the_node_of_the_page_reaches_its_goal_in_lock_step(ros_domain: RosDomain, tmp_path: Path) -> None:
     with node(tmp_path, ros_domain.env):
         asked = ("run", *ASKED, "--lockstep", "--duration", "12", "--record", "bag", "--json")

@@ -30,6 +30,7 @@ def own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     return str(tmp_path / "mine")
 
 
+@pytest.mark.slow
 def test_it_meets_its_goal_in_lock_step_without_a_gains_file(
     own: str, ros_domain: RosDomain, tmp_path: Path
 ) -> None:

@@ -5,11 +5,14 @@ from __future__ import annotations
 import signal
 from pathlib import Path
 
+import pytest
+
 from fulmar_bringup.launched_command import launched
 from fulmar_core.config.errors import DONE
 from tests.conftest import RosDomain
 
 
+@pytest.mark.slow
 def test_a_launched_system_names_its_processes_and_events_and_leaves_none(
     ros_domain: RosDomain, tmp_path: Path
 ) -> None:

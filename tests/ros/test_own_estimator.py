@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import pytest
 from mcap.reader import make_reader
 
 from tests.conftest import RosDomain
@@ -14,6 +15,7 @@ PAGE = Path(__file__).resolve().parents[2] / "docs" / "own-estimator.md"
 RUN = ("run", "floating_platform", "--controller", "lqr", "--lockstep", "--record", "bag", "--json")
 
 
+@pytest.mark.slow
 def test_the_robot_follows_the_estimator_of_the_page_and_its_source_is_in_the_bag(
     ros_domain: RosDomain, tmp_path: Path
 ) -> None:

@@ -117,14 +117,14 @@ def test_a_thing_of_its_own_comes_over_the_wires_into_observation_bag_rerun_and_
     assert "the way of the gate" in (folder / "bag" / "report.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "words"),
     [
         ("late:Observes", "task 'late:Observes': observe raised AssertionError: too fast"),
-        pytest.param(
+        (
             "late:Measures",
             "task 'late:Measures': distance_from_goal returned the result that is not finite.",
-            marks=pytest.mark.slow,
         ),
     ],
 )

@@ -63,25 +63,27 @@ def stamp_in(data: bytes) -> int:
     return int(seconds * 10**9 + nanoseconds)
 
 
-# Other quick runs have the LQR.
+README = (
+    "run",
+    "floating_platform",
+    "--task",
+    "go_to_pose",
+    "--lockstep",
+    "--seed",
+    "7",
+    "--control-hz",
+    "5",
+)
+
+
+# The one whole run of `make test` in lock step beside that of test_own_parts.py, of the LQR.
 @pytest.mark.parametrize("controller", ["policy", pytest.param("lqr", marks=pytest.mark.slow)])
 def test_a_lockstep_run_reaches_its_goal_and_says_so_in_json(
     controller: str, ros_domain: RosDomain, tmp_path: Path
 ) -> None:
-    """The very command of the README, with the figures that outside checks read; a policy's again, byte for byte."""
-    asked = (
-        "floating_platform",
-        "--task",
-        "go_to_pose",
-        "--controller",
-        controller,
-        "--lockstep",
-        "--seed",
-        "7",
-    )
-    done = fulmar(
-        "run", *asked, "--control-hz", "5", "--record", "bag", "--json", env=ros_domain.env, cwd=tmp_path
-    )
+    """The very command of the README, with the figures that outside checks read."""
+    asked = (*README, "--controller", controller, "--record", "bag", "--json")
+    done = fulmar(*asked, env=ros_domain.env, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     summary = json_of(done.stdout)
     assert summary.keys() >= REQUIRED
@@ -89,11 +91,16 @@ def test_a_lockstep_run_reaches_its_goal_and_says_so_in_json(
     assert summary["steps"] == 300
     assert summary["duration_s"] == pytest.approx(60.0)
     assert (tmp_path / "bag" / "metadata.yaml").is_file()
-    if controller == "policy":
-        fulmar("run", *asked, "--control-hz", "5", "--record", "again", env=ros_domain.env, cwd=tmp_path)
-        commands = command_bytes(tmp_path / "bag")
-        assert len(commands) >= 300
-        assert commands == command_bytes(tmp_path / "again")
+    assert len(command_bytes(tmp_path / "bag")) >= 300
+
+
+@pytest.mark.slow
+def test_a_policy_commands_the_same_again_byte_for_byte(ros_domain: RosDomain, tmp_path: Path) -> None:
+    for bag in ("bag", "again"):
+        fulmar(*README, "--controller", "policy", "--record", bag, env=ros_domain.env, cwd=tmp_path)
+    commands = command_bytes(tmp_path / "bag")
+    assert len(commands) >= 300
+    assert commands == command_bytes(tmp_path / "again")
 
 
 @pytest.mark.slow
@@ -113,15 +120,14 @@ def test_the_mock_backend_runs_without_mujoco(ros_domain: RosDomain, tmp_path: P
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("robot", "task", "figure"),
     [
         ("turtlebot2", "go_through_positions", "goals_reached"),
-        pytest.param(
-            "kingfisher", "go_to_position_with_obstacles", "final_position_error_m", marks=pytest.mark.slow
-        ),
-        pytest.param("leatherback", "track_velocities", "velocity_error_m_s", marks=pytest.mark.slow),
-        pytest.param("modular_freeflyer", "go_through_poses", "goals_reached", marks=pytest.mark.slow),
+        ("kingfisher", "go_to_position_with_obstacles", "final_position_error_m"),
+        ("leatherback", "track_velocities", "velocity_error_m_s"),
+        ("modular_freeflyer", "go_through_poses", "goals_reached"),
     ],
 )
 def test_every_kind_of_goal_and_robot_runs_and_is_evaluated(
@@ -141,6 +147,7 @@ def test_every_kind_of_goal_and_robot_runs_and_is_evaluated(
     assert bool(len(record.obstacles)) == task.endswith("obstacles")
 
 
+@pytest.mark.slow
 def test_a_missed_goal_is_exit_code_one_and_no_failure(ros_domain: RosDomain, tmp_path: Path) -> None:
     """Two seconds do not suffice for three metres."""
     asked = ("floating_platform", "--controller", "lqr", "--lockstep", "--duration", "2")

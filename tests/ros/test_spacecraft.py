@@ -146,49 +146,6 @@ def test_a_run_through_sixteen_emulated_valves_meets_its_goal_by_motion_capture_
     assert summary["final_attitude_error_deg"] < 5.0
 
 
-@pytest.mark.parametrize(
-    ("command", "words"),
-    [
-        ("run spacecraft_16 --task go_to_pose --lockstep", "pushed in space. Did you mean 'go_to_pose_3d'?"),
-        ("run floating_platform --task go_to_pose_3d", "over a floor or water. Did you mean 'go_to_pose'?"),
-        ("evaluate spacecraft_16 go_to_pose", "pushed in space. Did you mean 'go_to_pose_3d'?"),
-        (
-            "evaluate spacecraft_16 push_block --controller lqr",
-            "shows others, such as go_to_pose_3d.",
-        ),
-        (
-            "evaluate floating_platform go_to_pose_3d",
-            "'floating_platform' is one of the robots that are pushed",
-        ),
-        (
-            "train spacecraft_16 go_to_position",
-            "'spacecraft_16' is one of the bodies that are pushed in space",
-        ),
-        (
-            "up mujoco_lqr --robot spacecraft_16 --controller external",
-            "task 'go_to_pose' is for robots that are",
-        ),
-        (
-            "goals --robot spacecraft_16 --pose 1,2",
-            "moves in space: 3 (x,y,z) or 6 (x,y,z,roll,pitch,yaw) are needed",
-        ),
-        (
-            "goals --robot floating_platform --pose 1,2,3,4,5,6",
-            "moves in two dimensions: 2 (x,y) or 3 (x,y,deg) are needed",
-        ),
-        ("up mujoco_lqr --start 1,2,3,4,5,6", "--start = '1,2,3,4,5,6' has 6 numbers"),
-    ],
-)
-def test_what_belongs_to_the_other_space_is_one_line_before_anything_starts(
-    command: str, words: str, ros_domain: RosDomain, tmp_path: Path
-) -> None:
-    done = fulmar(*command.split(), env=ros_domain.env, cwd=tmp_path)
-    assert done.returncode == 2
-    assert words in done.stderr
-    assert len(done.stderr.strip().splitlines()) == 1
-    assert not list(tmp_path.iterdir())
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("controller", ["lqr", "pd"])
 def test_a_law_follows_a_target_that_moves_in_lock_step(

@@ -26,12 +26,9 @@ class WhileThereIsGas:
 OWN = ("--controller", "my_control:WhileThereIsGas")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
-    ("robot", "task"),
-    [
-        ("floating_platform", "go_to_pose"),
-        pytest.param("spacecraft_16", "go_to_pose_3d", marks=pytest.mark.slow),
-    ],
+    ("robot", "task"), [("floating_platform", "go_to_pose"), ("spacecraft_16", "go_to_pose_3d")]
 )
 def test_a_tank_that_empties_is_in_run_bag_diagnostics_report_and_rerun(
     robot: str, task: str, ros_domain: RosDomain, tmp_path: Path
