@@ -131,6 +131,7 @@ def ros_domain(monkeypatch: pytest.MonkeyPatch) -> Iterator[RosDomain]:
     monkeypatch.setattr("fulmar_ros.runtime.gc", SimpleNamespace(collect=lambda: None, freeze=lambda: None))
     monkeypatch.setattr("fulmar_ros.plant_node.BRIEFLY_S", 0.0)
     gc.collect()
+    gc.freeze()  # modules that earlier tests imported would take a quarter of a second at each collection
     with reserved_domains(1) as (number,):
         own = {"ROS_DOMAIN_ID": str(number), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
         own |= dict.fromkeys(PROFILES, str(LOOPBACK))  # the middleware reads it once in a process
