@@ -96,13 +96,20 @@ def test_the_help_states_what_every_figure_means():
     ("pair", "way"),
     [
         pytest.param("airship_v7 fly_hold", "jsbsim", marks=pytest.mark.slow),
-        ("navion fly_attitude", "jsbsim:L17"),
+        pytest.param("navion fly_attitude", "jsbsim:L17", marks=pytest.mark.slow),
     ],
 )
 def test_aircraft_are_evaluated_in_jsbsim_which_prints_nothing_of_its_own(pair, way, capfd):
     words = f"evaluate {pair} --controller lqi --through {way} --scenario ideal --episodes 1"
     found = evaluate(f"{words} --episode-s 10")
     assert (found["through"], found["success_rate"]) == (way, 1.0)
+    assert capfd.readouterr().out == ""
+
+
+def test_a_short_flight_in_jsbsim_prints_nothing_of_its_own_either(capfd):
+    words = "evaluate navion fly_attitude --controller lqi --through jsbsim:L17 --scenario ideal --episodes 1"
+    found = evaluate(f"{words} --episode-s 1")
+    assert (found["through"], found["episodes"]) == ("jsbsim:L17", 1)
     assert capfd.readouterr().out == ""
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -59,9 +60,15 @@ def two_hosts_are_possible(monkeypatch) -> None:
     monkeypatch.setattr(command_faults, "why_not", lambda: "")
 
 
+@functools.cache
+def inapplicable(robot: str) -> dict[str, str]:
+    """Reasons by fault; asked for with two possible hosts."""
+    return {fault.name: fault.reason for fault in faults_of(robot)[1]}
+
+
 def left_out(robot: str, *, parts: bool = False) -> dict[str, str]:
     """Reasons by fault; of `parts`: of those of `OF_PARTS` as well."""
-    return {fault.name: fault.reason for fault in faults_of(robot)[1] if parts or fault.name not in OF_PARTS}
+    return {name: reason for name, reason in inapplicable(robot).items() if parts or name not in OF_PARTS}
 
 
 @pytest.mark.parametrize("fault", OF_PARTS)

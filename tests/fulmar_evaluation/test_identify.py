@@ -109,6 +109,7 @@ def test_machines_are_drawn_anew_by_number_and_the_same_by_seed():
     assert first != other
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("robot", ["turtlebot2", "kingfisher"])
 def test_other_families_are_found_in_mujoco_too(robot):
     quantities = run_trial(Trial(robot, 1, seed=1, duration_s=60.0))["quantities"]
@@ -117,8 +118,14 @@ def test_other_families_are_found_in_mujoco_too(robot):
         assert quantities[name]["error_percent"] < percent, (name, quantities[name])
 
 
-def test_the_document_says_what_was_asked_and_whether_it_was_met():
+@pytest.mark.slow
+def test_trials_in_processes_of_their_own_give_one_document():
     (result,) = run_identification([Trial("floating_platform", 3, seed=1, duration_s=40.0)], jobs=1)
+    assert document_of([result], seed=1)["asked"] == 3
+
+
+def test_the_document_says_what_was_asked_and_whether_it_was_met(evaluated):
+    result = evaluated[0]
     off = json.loads(json.dumps(result))
     off["quantities"]["thrust"] |= {"error_percent": 4.0, "inside": False}
     good, bad = document_of([result], seed=1), document_of([result, off], seed=1)

@@ -171,10 +171,20 @@ def test_runs_of_two_tasks_are_not_compared(reached, tmp_path):
 @pytest.mark.parametrize(
     ("robot", "task", "words"),
     [
-        ("turtlebot2", "go_through_poses", ("make a success", "targets reached", "Effort spent")),
+        pytest.param(
+            "turtlebot2",
+            "go_through_poses",
+            ("make a success", "targets reached", "Effort spent"),
+            marks=pytest.mark.slow,
+        ),
         ("turtlebot2", "track_velocities", ("velocity error", "turn rate error", "m/s off")),
         ("kingfisher", "go_to_position_with_obstacles", ("Grey discs are obstacles", "distance")),
-        ("leatherback", "race_waypoints", ("Numbered circles", "What the actuators did")),
+        pytest.param(
+            "leatherback",
+            "race_waypoints",
+            ("Numbered circles", "What the actuators did"),
+            marks=pytest.mark.slow,
+        ),
     ],
 )
 def test_every_kind_of_task_and_robot_gets_a_page_and_a_plot(robot, task, words, tmp_path):

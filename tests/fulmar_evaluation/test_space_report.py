@@ -152,10 +152,18 @@ def test_rows_of_robots_with_few_actuators_are_as_high_as_before(reached):
 @pytest.mark.parametrize(
     ("task", "words"),
     [
-        ("go_to_position_3d", ("distance", "1 cm", "within 5 cm of the goal")),
-        ("track_velocities_3d", ("velocity error", "turn rate error", "°/s, on average", "within 0.1 m/s")),
+        pytest.param(
+            "go_to_position_3d", ("distance", "1 cm", "within 5 cm of the goal"), marks=pytest.mark.slow
+        ),
+        pytest.param(
+            "track_velocities_3d",
+            ("velocity error", "turn rate error", "°/s, on average", "within 0.1 m/s"),
+            marks=pytest.mark.slow,
+        ),
         ("go_through_poses_3d", ("make a success", "Numbered circles", "attitude error")),
-        ("go_through_positions_3d", ("make a success", "Numbered circles")),
+        pytest.param(
+            "go_through_positions_3d", ("make a success", "Numbered circles"), marks=pytest.mark.slow
+        ),
     ],
 )
 def test_every_task_in_space_gets_a_page_and_a_plot(task, words, tmp_path):
@@ -175,6 +183,7 @@ def test_two_runs_in_space_share_a_page(flown, tmp_path):
     assert words.count("Reached") == 2
 
 
+@pytest.mark.slow
 def test_bag_commands_work_on_a_run_in_space(flown, tmp_path):
     topics = {topic["name"] for topic in answer("info", flown)["topics"]}
     assert "/spacecraft_16/odom" in topics
