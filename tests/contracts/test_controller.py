@@ -36,7 +36,7 @@ LEARNED = {
     (passport.robot, passport.task): str(folder)
     for folder, passport in ((folder, read_passport(folder)) for folder in shipped_policies())
 }
-WORLDS = 12
+WORLDS = 5
 
 
 SAID = {}  # whether a controller does a kind of task on a robot: some solve for their gains before they say so
