@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from fulmar_core.config.errors import ConfigError, UnknownNameError
 OWN_FOLDERS = "FULMAR_CONFIGS"  # environment variable: folders of a user's own files, separated as in PATH
 
 
+@functools.cache
 def config_directory() -> Path:
     """Folder of what Fulmar comes with: `robots/`, `tasks/` and so on.
 

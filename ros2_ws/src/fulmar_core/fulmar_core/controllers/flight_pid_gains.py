@@ -7,6 +7,7 @@ mode of the whole craft, servos, motors and integrals included, is damped well.
 
 from __future__ import annotations
 
+import functools
 import itertools
 import math
 from collections.abc import Callable, Sequence
@@ -33,6 +34,7 @@ Inner = tuple[float, float]  # natural frequency [rad/s] and damping [-]
 STILL = 1e-3  # modes that are slower count as oscillating at this [rad/s]
 
 
+@functools.lru_cache(maxsize=16)
 def flight_pid_gains(robot: Robot) -> FlightPidGains:
     """Gains of an aircraft without a file.
 

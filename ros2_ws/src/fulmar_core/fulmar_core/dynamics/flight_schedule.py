@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from bisect import bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -68,6 +69,29 @@ def flight_model(robot: Robot, trim: Trim, dt: float) -> FlightModel:
     return FlightModel(trim, stepped[:count, :count], stepped[:count, count:])
 
 
+def heights_of(robot: Robot) -> np.ndarray:
+    """Heights of the centre of mass where models are made, ascending [m]."""
+    span = robot.wings.span
+    above = 1.1 * max(0.0, -robot.hull_span[0] - span * HEIGHTS[0] / 1.1)
+    return np.asarray(above + span * np.array(HEIGHTS))
+
+
+@functools.lru_cache(maxsize=16)
+def flight_models(robot: Robot, speed: float, dt: float) -> tuple[FlightModel, ...]:
+    """The models at `heights_of`, whose arrays cannot be written; kept, as a law is checked before it is made.
+
+    Raises:
+        ConfigError: There is no trim at this speed.
+    """
+    models = tuple(
+        flight_model(robot, find_trim(robot, speed, float(height)), dt) for height in heights_of(robot)
+    )
+    for model in models:
+        for array in (model.a, model.b):
+            array.setflags(write=False)
+    return models
+
+
 class Schedule:
     """Arrays that are computed at some heights, and interpolated between them."""
 
@@ -86,12 +110,8 @@ class Schedule:
         Raises:
             ConfigError: There is no trim at this speed.
         """
-        span = robot.wings.span
-        above = 1.1 * max(0.0, -robot.hull_span[0] - span * HEIGHTS[0] / 1.1)
-        self.heights = above + span * np.array(HEIGHTS)
-        self.models = models or tuple(
-            flight_model(robot, find_trim(robot, speed, float(height)), dt) for height in self.heights
-        )
+        self.heights = heights_of(robot)
+        self.models = models or flight_models(robot, speed, dt)
         self._arrays = np.stack([make(model) for model in self.models])
         self._commands = np.stack([model.trim.command for model in self.models])
         self._quats = np.stack(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass, replace
 
@@ -32,7 +33,7 @@ class Trim:
     altitude: float  # of the craft above mean sea level in free air, else that of the ground [m]
     alpha: float  # angle of attack [rad]
     state: SpatialState  # shapes ()
-    command: np.ndarray  # shape (n,): deflections [rad] and throttles
+    command: np.ndarray  # shape (n,), cannot be written: deflections [rad] and throttles
     thrust: float  # of all propellers [N]
 
     @property
@@ -62,6 +63,7 @@ def free_air(robot: Robot) -> Robot:
     return replace(robot, airframe=replace(robot.wings, ground_effect=None))
 
 
+@functools.lru_cache(maxsize=64)  # laws, observers and tasks ask for the same ones
 def find_trim(robot: Robot, speed: float, height: float | None = None, altitude: float = 0.0) -> Trim:
     """Find the trim at a speed.
 
@@ -239,6 +241,7 @@ class _Problem:
     def trim(self, x: np.ndarray, height: float | None, altitude: float) -> Trim:
         """The solution."""
         alpha, _, _, command = self._split(x)
+        command.setflags(write=False)
         state = self.state(x)
         thrust, _ = self._dynamics.propellers(
             command[self._surfaces :, None],

@@ -61,9 +61,11 @@ class Coefficients:
     """
 
     unit: Literal["deg", "rad"]  # of angles in `terms` and `tables`
-    terms: dict[str, dict[str, float]]  # by coefficient, number by factors
-    tables: dict[str, Curve] = field(default_factory=dict)  # by coefficient, added to its terms
-    signs: dict[str, float] = field(default_factory=dict)  # of the source's surfaces; +1 where left out
+    terms: dict[str, dict[str, float]] = field(hash=False)  # by coefficient, number by factors
+    tables: dict[str, Curve] = field(default_factory=dict, hash=False)  # by coefficient, added to its terms
+    signs: dict[str, float] = field(
+        default_factory=dict, hash=False
+    )  # of the source's surfaces; +1 where left out
     # Angles of attack that the terms are for, in the unit; beyond them coefficients go on in a straight line.
     alpha_range: tuple[float, float] | None = None
     alpha_zero: float = 0.0  # what `alpha` is counted from, in the unit
