@@ -134,6 +134,16 @@ def test_recovery_keeps_whole_files_and_what_can_be_read_of_a_torn_one(bag):
         assert reader.message_count == len(kept)
 
 
+def test_recovery_goes_on_past_a_file_that_is_no_bag_file(bag):
+    bag_files(bag)[1].write_bytes(b"no bag at all")
+    damage = recover(bag)
+    assert len(damage) == 1 and "bag_1.mcap: this is no MCAP file" in damage[0]
+    kept = words_by_rosbags(bag)
+    assert (kept[0], kept[-1], kept) == (WORDS[0], WORDS[-1], [text for text in WORDS if text in kept])
+    assert 15 <= len(kept) < len(WORDS)
+    assert (bag / "bag_1.mcap.damaged").read_bytes() == b"no bag at all"
+
+
 def test_a_new_name_is_on_the_disk_before_anything_else_counts_on_it(tmp_path, monkeypatch):
     done = []
     rename, fsync = os.rename, os.fsync

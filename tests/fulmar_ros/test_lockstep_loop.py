@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from fulmar_core.config.errors import LockstepError
@@ -45,3 +46,26 @@ def test_commands_that_answer_another_stamp_are_named(stamp_ns: int | None, word
     with pytest.raises(LockstepError) as caught:
         loop.run(None, 1, threading.Event())
     assert words in str(caught.value)
+
+
+def test_without_air_what_is_applied_is_the_safe_command() -> None:
+    platform, applied = load_robot("floating_platform"), []
+    wires = Wires(0)
+    wires.publish_applied = lambda command, time_ns: applied.append(command)
+    wires.publish_truth = lambda *_: None
+    sample = SimpleNamespace(odometry=None)
+    backend = SimpleNamespace(
+        robot=platform, bearing_on=False, set_bearing=lambda on: "", step=lambda command, ticks: sample
+    )
+    guard = SimpleNamespace(last_rejection="", answer=lambda *_, **__: np.ones(8))
+    loop = LockstepLoop(
+        backend,
+        wires,
+        guard,
+        SimulatedTime(0),
+        control_hz=10.0,
+        answer_timeout_s=1.0,
+        publish_bearing=lambda: None,
+    )
+    loop.run(sample, 1, threading.Event())
+    assert not applied[0].any()

@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import threading
+import time
 from contextlib import nullcontext
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from fulmar_core.robots.actuators.refuge import DOWN
 from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.safety.actuator_guard import ActuatorGuard
+from fulmar_core.safety.watchdog import Watchdog
 from fulmar_core.simulation.backend import Sample
 from fulmar_core.wires.reading import Reading
 from fulmar_ros.plant_clock import SimulatedTime, WallTime
 from fulmar_ros.plant_loops import RealtimeLoop
 from tests.states import planar_state
 
-ROBOT = load_robot("floating_platform")
+ROBOT, AIRCRAFT = load_robot("floating_platform"), load_robot("airship_v7")
 
 
 @pytest.mark.parametrize("clock", [SimulatedTime(), WallTime()], ids=["simulated", "wall"])
@@ -50,3 +54,46 @@ def test_the_guard_receives_the_newest_measured_state_and_a_steady_time_for_safe
         assert all(0 <= plant_ns - now_ns < 1_000_000_000 for now_ns, plant_ns in asked_ns)
     else:
         assert second - first == round(1e9 * ROBOT.timing.physics_dt)
+
+
+def test_a_refusal_of_the_device_reaches_the_guard_before_the_next_command():
+    guard, applied = ActuatorGuard(ROBOT.actuators, Watchdog(10**9)), []
+    samples = iter(
+        [Sample({}, None, refusal="the autopilot is in mode 4 (HOLD)"), Sample({}, None), Sample({}, None)]
+    )
+
+    def step(command):
+        applied.append(command)
+        return next(samples)
+
+    backend = SimpleNamespace(robot=ROBOT, step=step)
+    wires = SimpleNamespace(lock=nullcontext(), publish_sample=_ignore, publish_applied=_ignore)
+    guard.offer(ROBOT.actuators.names, np.ones(8), time.monotonic_ns())
+    RealtimeLoop(backend, wires, guard, SimulatedTime(), rate=50.0).run(
+        Sample({}, None), 3, threading.Event()
+    )
+    assert [bool(command.any()) for command in applied] == [True, False, False]
+    assert guard.held == "the autopilot is in mode 4 (HOLD)"
+
+
+def test_an_aircraft_is_brought_down_after_its_last_tick():
+    doing = iter(["glides", "glides", "glides", DOWN])
+    guard = SimpleNamespace(handed_over=False, doing="", see_refusal=_ignore, fail=_ignore)
+
+    def hand_over(_now_ns):
+        guard.handed_over = True
+
+    def output(*_, **__):
+        guard.doing = next(doing) if guard.handed_over else ""
+        return AIRCRAFT.actuators.safe_command
+
+    guard.hand_over, guard.output = hand_over, output
+    backend = SimpleNamespace(robot=AIRCRAFT, step=lambda _command: Sample({}, None))
+    wires = SimpleNamespace(lock=nullcontext(), publish_sample=_ignore, publish_applied=_ignore)
+    loop = RealtimeLoop(backend, wires, guard, SimulatedTime(), rate=50.0)
+    loop.run(Sample({}, None), 2, threading.Event(), lands=True)
+    assert (loop.ticks, guard.doing) == (2 + 4, DOWN)
+
+
+def _ignore(*_arguments):
+    """There is no subscriber."""

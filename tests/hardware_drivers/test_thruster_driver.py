@@ -19,7 +19,7 @@ from hardware_drivers.driver_backend import DriverBackend, backend_of
 from hardware_drivers.gpio import output_lines
 from hardware_drivers.hardware import Hardware, load_hardware
 from hardware_drivers.settings import Bearing, GpioValves, Supply
-from hardware_drivers.thruster_driver import ThrusterDriver
+from hardware_drivers.thruster_driver import ThrusterDriver, ValveDriver
 from sim_nodes.emulators.outputs import ValveBank
 from tests.hardware_drivers.bench import episode_at
 
@@ -115,6 +115,18 @@ def test_closing_closes_everything_once_and_for_all(rig):
     driver.close()
     assert set(bank.levels().tolist()) == {int(settings.active_low)}
     assert driver.set_bearing(True)  # refused, with a reason
+
+
+def test_valves_are_closed_before_their_lines_are_released(tmp_path):
+    craft, order = load_robot("spacecraft_16"), tuple(range(16))
+    bank = ValveBank(tmp_path / "gpio", craft, order=order, active_low=True, bearing=False)
+    settings = GpioValves("gpio_valves", port=bank.address, lines=tuple(map(str, order)), order=order)
+    driver = ValveDriver(craft, settings, patience_s=0.0)
+    driver.write(np.ones(16))
+    assert not bank.levels().any()
+    driver.close()  # by itself, whatever was written before
+    assert bank.levels().all()
+    bank.close()
 
 
 def test_a_bearing_that_nobody_needs_is_switched_off(rig, monkeypatch):

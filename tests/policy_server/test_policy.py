@@ -14,6 +14,7 @@ from fulmar_core.config.errors import BundleError
 from fulmar_core.controllers.disturbance_inputs import ESTIMATOR, disturbance_terms
 from fulmar_core.estimators.actuator_health.actuator_estimator import ActuatorEstimate
 from fulmar_core.estimators.actuator_health.thruster_health import Health
+from fulmar_core.loop.bundle_signature import make_keys, sign_bundle
 from fulmar_core.loop.policy_bundle import (
     GOLDEN,
     NETWORK,
@@ -246,6 +247,43 @@ def test_another_network_with_the_old_golden_vectors_is_refused(folder):
     network, _ = linear_network()
     reseal(folder, network=network)
     assert "differs from its golden vectors" in refusal(folder)
+
+
+def test_a_network_whose_weights_are_no_numbers_is_refused_with_that_reason(folder):
+    onnx = pytest.importorskip("onnx")
+    network, golden = linear_network()
+    model = onnx.load_from_string(network)
+    weights = np.full((10, 8), np.nan, np.float32)
+    model.graph.initializer[0].CopyFrom(onnx.numpy_helper.from_array(weights, "w"))
+    reseal(folder, network=model.SerializeToString(), golden=golden)
+    assert "its output is not a number in 32 of 64 values. Are all weights finite?" in refusal(folder)
+
+
+def test_a_network_that_asks_for_more_memory_than_there_may_be_is_refused(folder):
+    """A few bytes that are 1.3 GB once it runs: 5 million zeros for each of the golden observations."""
+    onnx = pytest.importorskip("onnx")
+    make, constant = onnx.helper.make_node, onnx.numpy_helper.from_array
+    network, _ = linear_network()
+    model = onnx.load_from_string(network)
+    model.graph.initializer.extend([constant(np.array([5_000_000]), "many"), constant(np.array([1]), "axis")])
+    model.graph.node[0].output[0] = "raw"
+    for node in (
+        make("Add", ["raw", "most"], ["logits"]),
+        make("ReduceMax", ["rows", "axis"], ["most"]),
+        make("Expand", ["zero", "size"], ["rows"]),
+        make("Concat", ["worlds", "many"], ["size"], axis=0),
+        make("Shape", ["observation"], ["worlds"], start=0, end=1),
+    ):
+        model.graph.node.insert(1, node)
+    reseal(folder, network=model.SerializeToString())
+    assert "cannot be run" in refusal(folder)
+
+
+def test_a_bundle_without_a_trusted_signature_is_no_policy(folder, tmp_path):
+    make_keys(tmp_path / "private.pem", tmp_path / "public.pem")
+    assert "is not signed, and this robot insists on it" in refusal(folder, trusted=tmp_path / "public.pem")
+    sign_bundle(folder, tmp_path / "private.pem")
+    load(folder, trusted=tmp_path / "public.pem")
 
 
 def test_rounding_of_another_processor_is_no_reason_to_refuse(folder):

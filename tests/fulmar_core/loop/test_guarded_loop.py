@@ -142,6 +142,16 @@ def test_an_input_of_two_nodes_stops_the_controller_which_begins_anew_when_one_i
     assert bench.guard.epoch == 0
 
 
+def test_odometry_of_two_nodes_is_not_taken_at_all():
+    bench = Bench()
+    bench.give()
+    bench.step()
+    before = bench.guard.newest
+    bench.guard.contest("2 nodes publish odom, and only one may: /a, /b")
+    assert not bench.see(0.5)
+    assert bench.guard.newest is before
+
+
 def test_odometry_that_stays_away_stops_the_controller():
     bench = Bench()
     bench.give()

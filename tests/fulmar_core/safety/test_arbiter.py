@@ -30,11 +30,13 @@ LADDER = [
     ({"activated": False}, Mode.IDLE, "not activated"),
     ({"estop": "e-stop: pressed"}, Mode.ARMED, "e-stop: pressed"),
     ({"active_s": 61.0, "max_run_time_s": 60.0}, Mode.ARMED, "max_run_time of 60 s is over"),
+    ({"contested": "2 nodes publish odom"}, Mode.ARMED, "2 nodes publish odom"),
     ({"last_input_ns": None}, Mode.ARMED, "no odom yet"),
     ({"last_input_ns": NOW - 620 * MS}, Mode.ARMED, "no usable odom for 620 ms (limit 400 ms)"),
     ({"input_problem": "odom is NaN"}, Mode.ARMED, "odom is NaN"),
     ({"outside": "the robot is outside"}, Mode.ARMED, "the robot is outside"),
     ({"bearing_off": True}, Mode.ARMED, "the air bearing is off"),
+    ({"unconverged": "it comes no nearer"}, Mode.ARMED, "it comes no nearer"),
     ({"has_goal": False}, Mode.ARMED, "no goal yet"),
     ({"goal_distance": 8.1}, Mode.ARMED, "goal is 8.1 m away, beyond the geofence of 8 m"),
 ]

@@ -254,6 +254,15 @@ def test_one_correction_of_a_fix_is_no_contradiction():
     assert drive.run(8.0, change=lambda _t, pose, twist: (pose + corrected, twist)) == (None, "")
 
 
+def test_a_position_that_goes_on_in_steps_is_no_row_of_corrections():
+    drive = Drive(v=0.0, yaw_rate=0.0)
+    drive.run(6.0)
+    step = np.array([0.5, 0.0, 0.0])
+    first, reason = drive.run(12.0, change=lambda t, pose, twist: (pose + t // 2 * step, twist))
+    assert 6.0 < first < 9.0
+    assert reason == CONTRADICTION
+
+
 def test_after_a_contradiction_odometry_passes_once_pose_and_twist_agree_on_a_motion():
     drive = Drive()
     drive.run(6.0)
