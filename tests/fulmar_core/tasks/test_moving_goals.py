@@ -100,8 +100,8 @@ def test_the_plane_has_no_such_targets():
 
 
 def stacked(moved):
-    """Motion and accelerations, shape (4, n, 3)."""
-    return np.stack((moved.velocity, moved.rate, moved.acceleration, moved.turning))
+    """Motion and accelerations, shape (2, n, 6)."""
+    return np.stack((moved.motion, moved.change))
 
 
 def test_motion_of_targets_is_their_difference_and_a_jump_is_none():
@@ -111,7 +111,7 @@ def test_motion_of_targets_is_their_difference_and_a_jump_is_none():
     far = SpatialState.target_at((5.0, 0.0, 0.0, 0.0, 0.0, 0.0))
     assert not stacked(motion.update(np.stack((here, here)), 0, 0.2)).any()
     moved = motion.update(np.stack((there, far)), 0, 0.2)
-    velocity, rate = moved.velocity, moved.rate
+    velocity, rate = moved.motion[:, :3], moved.motion[:, 3:]
     assert velocity == pytest.approx(np.array([[0.0, 0.1, 0.0], [0.0, 0.0, 0.0]]))
     assert rate == pytest.approx(np.array([[0.0, 0.0, np.deg2rad(15.0)], [0.0, 0.0, 0.0]]))
     assert not stacked(motion.update(np.stack((there, far)), 0, 0.2)).any()  # exactly
@@ -126,7 +126,7 @@ def test_motion_goes_by_the_time_that_has_passed():
     def moved(steps, metres, degrees, *, stamp_ns=None):
         target = SpatialState.target_at((metres, 0.0, 0.0, 0.0, 0.0, degrees))[None]
         moved = motion.update(target, begin + steps * step_ns if stamp_ns is None else stamp_ns, 0.2)
-        return moved.velocity[0, 0], np.rad2deg(moved.rate[0, 2])
+        return moved.motion[0, 0], np.rad2deg(moved.motion[0, 5])
 
     assert moved(0, 0.0, 0.0) == (0.0, 0.0)
     assert moved(1, 0.02, 1.0) == pytest.approx((0.1, 5.0))

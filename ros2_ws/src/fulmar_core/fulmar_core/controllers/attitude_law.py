@@ -62,8 +62,8 @@ class AttitudeLaw(Law):
     def command(self, inputs: Inputs) -> np.ndarray:
         """Choose torques of motors and of unloading; shapes as in `Controller.act`."""
         now = self.frame.motion(inputs)
-        motion = self._target.update(inputs.goal.current, inputs.stamp_ns, inputs.dt)
-        now = self.frame.less_target(now, inputs, motion.velocity, motion.rate)
+        moved = self._target.update(inputs.goal.current, inputs.stamp_ns, inputs.dt)
+        now = self.frame.less_target(now, inputs, moved.motion)
         inertia = self.inertia_of(inputs)
         momentum = self._momentum(inputs)
         gyroscopic = np.cross(now.turning, now.turning @ inertia + momentum)

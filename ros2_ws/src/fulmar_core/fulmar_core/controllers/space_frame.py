@@ -56,34 +56,31 @@ class SpaceFrame:
         way = _rows(turn_back(state.quat, minus(position_of(target), state.position)))
         return SpaceMotion(way, to_goal, velocity, rate, velocity, rate, alive)
 
-    def less_target(
-        self, now: SpaceMotion, inputs: Inputs, velocity: np.ndarray, rate: np.ndarray
-    ) -> SpaceMotion:
+    def less_target(self, now: SpaceMotion, inputs: Inputs, target: np.ndarray) -> SpaceMotion:
         """The same motion, less that of the target.
 
         Args:
             now: As in `motion`.
             inputs: It came from them.
-            velocity: Of the target, in the world, shape (n, 3) [m/s].
-            rate: Of the target, about its own axes; of none where no attitude is wanted, shape (n, 3) [rad/s].
+            target: Velocity in the world [m/s], and turn rate about the target's own axes, of none where no attitude is
+                wanted [rad/s], shape (n, 6).
         """
-        along, about = self.of_target(now, inputs, velocity, rate)
+        along, about = self.of_target(now, inputs, target)
         found = replace(now, velocity=now.velocity - along)
         return replace(found, rate=now.rate - about) if self.heads else found
 
     def of_target(
-        self, now: SpaceMotion, inputs: Inputs, linear: np.ndarray, angular: np.ndarray
+        self, now: SpaceMotion, inputs: Inputs, target: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Vectors of the target in the body's own frame.
+        """Two vectors of the target in the body's own frame, the second 0 where no attitude is wanted.
 
         Args:
             now: As in `motion`.
             inputs: It came from them.
-            linear: In the world, shape (n, 3).
-            angular: About the target's own axes, same shape; nothing of it counts where no attitude is wanted.
+            target: One in the world and one about the target's own axes, shape (n, 6).
         """
-        along = _rows(turn_back(_state(inputs).quat, tuple(linear.T)))
-        return along, _rows(turn(now.to_goal, tuple(angular.T))) * float(self.heads)
+        along = _rows(turn_back(_state(inputs).quat, tuple(target[:, :3].T)))
+        return along, _rows(turn(now.to_goal, tuple(target[:, 3:].T))) * float(self.heads)
 
     def next_leg(self, inputs: Inputs) -> np.ndarray:
         """Way from the current target to the one after it, in the body's frame, shape (n, 3) [m]."""

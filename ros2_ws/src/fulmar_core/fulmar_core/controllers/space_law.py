@@ -84,10 +84,10 @@ class SpaceLaw(Law):
         now, moved = self.frame.motion(inputs), None
         if not self.frame.tracks and not self.frame.passes:
             moved = self._target.update(inputs.goal.current, inputs.stamp_ns, inputs.dt)
-            now = self.frame.less_target(now, inputs, *moved.at_end())
+            now = self.frame.less_target(now, inputs, moved.at_end)
         wrench = self.wrench(self._way(inputs, now), now)
-        if moved is not None and moved.bends:
-            push, turn = self.frame.of_target(now, inputs, moved.acceleration, moved.turning)
+        if moved is not None and moved.change.any():
+            push, turn = self.frame.of_target(now, inputs, moved.change)
             wrench = wrench + np.concatenate((self.robot.body.mass * push, turn @ self._inertia), axis=-1)
         # Allocations count torques about the body's origin.
         wrench[..., 3:] += cross(self._com, wrench[..., :3])

@@ -14,23 +14,18 @@ ROUNDING = 1.001  # of targets that move as fast as they may
 
 @dataclass(frozen=True)
 class Moved:
-    """How targets move, in the middle of the step before, shapes (n, 3); each is 0 where it cannot be known."""
+    """How targets move, in the middle of the step before; each is 0 where it cannot be known."""
 
-    velocity: np.ndarray  # in the world [m/s]
-    rate: np.ndarray  # about the target's own axes [rad/s]
-    acceleration: np.ndarray  # in the world [m/s²]
-    turning: np.ndarray  # change of the rate about the target's own axes [rad/s²]
-    step_s: float = 0.0  # since the target before [s]
+    motion: (
+        np.ndarray
+    )  # velocity in the world [m/s], turn rate about the target's own axes [rad/s], shape (n, 6)
+    change: np.ndarray  # of it, same axes, shape (n, 6) [m/s², rad/s²]
+    step_s: float  # since the target before [s]
 
     @property
-    def bends(self) -> bool:
-        """Whether any target does not go straight on."""
-        return bool(self.acceleration.any() or self.turning.any())
-
-    def at_end(self) -> tuple[np.ndarray, np.ndarray]:
-        """Velocity and rate half a step later, which is now."""
-        half_s = 0.5 * self.step_s
-        return self.velocity + half_s * self.acceleration, self.rate + half_s * self.turning
+    def at_end(self) -> np.ndarray:
+        """The motion half a step later, which is now."""
+        return self.motion + 0.5 * self.step_s * self.change
 
 
 class TargetMotion:
@@ -72,7 +67,7 @@ class TargetMotion:
         before, self._before, self._stamp_ns = self._before, np.array(target, dtype=float), stamp_ns
         if before is None or before.shape != target.shape:
             self._differences = None
-            return Moved(*np.zeros((4, len(target), 3)))
+            return Moved(*np.zeros((2, len(target), 6)), step_s=elapsed)
         velocity = (target[:, :3] - before[:, :3]) / elapsed
         turned = product(conjugate(quat_of(before)), quat_of(target))
         still = np.all(before[:, 3:] == target[:, 3:], axis=-1)
@@ -83,8 +78,7 @@ class TargetMotion:
         now = np.concatenate((velocity, rate), axis=-1) * follows[:, None]
         earlier, self._differences = self._differences, (now, elapsed)
         if earlier is None:
-            return Moved(*np.split(now, 2, axis=-1), *np.zeros((2, len(target), 3)), elapsed)
+            return Moved(now, np.zeros_like(now), elapsed)
         # Of two steps that both follow; what begins or ends to move makes a jump of its velocity, and no acceleration.
-        bends = (now - earlier[0]) / (0.5 * (elapsed + earlier[1]))
-        bends = bends * (np.any(now, axis=-1) & np.any(earlier[0], axis=-1))[:, None]
-        return Moved(*np.split(now, 2, axis=-1), *np.split(bends, 2, axis=-1), elapsed)
+        change = (now - earlier[0]) / (0.5 * (elapsed + earlier[1]))
+        return Moved(now, change * (np.any(now, axis=-1) & np.any(earlier[0], axis=-1))[:, None], elapsed)

@@ -130,7 +130,9 @@ class HoldDetector:
         self._spread = np.array([s.position, s.position, s.heading, s.velocity, s.velocity, s.yaw_rate])
         self._limit = s.held
         self._evidence = np.zeros(shape)
-        self._place: np.ndarray | None = None  # mean pose since the evidence began, shape (..., 3) [m, m, rad]
+        self._place: np.ndarray | None = (
+            None  # mean pose since the evidence began, shape (..., 3) [m, m, rad]
+        )
         self._count, self._begun = np.ones(shape), 0.0  # measurements in it; and whether there are any
         self.held = np.zeros(shape, dtype=bool)
 

@@ -124,7 +124,7 @@ class Lifted(SpaceCurve):
         """See `SpaceCurve.points`."""
         x, y = self.curve.points(count).T
         quat = from_euler(*np.deg2rad(self.angles_deg))
-        return np.stack(turn(quat, (x, y, 0.0 * x)), axis=1) + np.array(self.centre)
+        return np.asarray(np.stack(turn(quat, (x, y, 0.0 * x)), axis=1) + np.array(self.centre))
 
     @property
     def up(self) -> np.ndarray:
