@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,13 +18,16 @@ from fulmar_benchmarks.inertia.simulated_runs import (
     simulate,
     wheels_of,
 )
-from fulmar_benchmarks.workers import mapped
+from fulmar_benchmarks.shape import Benchmark, Cell, Check, Figures, Found, Progress, known
 from fulmar_core.estimators.inertia.batch import batch_fit
 from fulmar_core.estimators.inertia.ekf import EkfSettings, InertiaFilter
 from fulmar_core.estimators.inertia.recursive import RecursiveFit
 from fulmar_core.robots.actuators.reaction_wheels import ReactionWheels
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.tasks.torque_profiles import GAINS, OWN, PROFILES
+
+if TYPE_CHECKING:
+    from fulmar_evaluation.report.page import Plot
 
 SATELLITES = tuple(GAINS)
 METHODS = ("ls", "rls", "ekf")
@@ -39,64 +42,94 @@ FOUND, IN_S, KNOWN = (
     0.02,
 )  # a step is found to this share in this time; share that counts as observable
 
-Progress = Callable[[float, float], None]
-
 
 @dataclass(frozen=True)
-class Request:
-    """What to measure."""
+class InertiaCell(Cell):
+    """One satellite under every profile, with an inertia that changes in one way or does not."""
 
-    satellites: tuple[str, ...]
+    modules = (f"{__package__}.simulated_runs",)
+    satellite: str
     profiles: tuple[str, ...]
-    draws: int  # of sensor noise, for each cell
+    change: str  # of simulated_runs.GROWTHS
+    draws: int  # of sensor noise, of `static`
     seed: int
-    jobs: int
 
+    @property
+    def name(self) -> str:
+        """File name without suffix."""
+        return f"{self.satellite}_{self.change}"
 
-def run_inertia(request: Request, progress: Progress) -> dict[str, Any]:
-    """Measure, and put the figures together; JSON-ready, see `fulmar benchmark inertia --help`."""
-    items = [(each, request.profiles, change, request.draws, request.seed)
-             for each in request.satellites for change in ("static", *CHANGES)]  # fmt: skip
-    found = dict(
-        zip(
-            [item[:3:2] for item in items],
-            mapped(_work, items, jobs=request.jobs, progress=progress),
-            strict=True,
-        )
-    )
-    static = {each: found[each, "static"] for each in request.satellites}
-    return {
-        "cells": {
-            level: {each: static[each]["levels"][level] for each in request.satellites} for level in LEVELS
-        },
-        "dynamic": {change: {each: found[each, change] for each in request.satellites} for change in CHANGES},
-        "excitation": {each: static[each]["excitation"] for each in request.satellites},
-        "draws": request.draws,
-        "seed": request.seed,
-        "sample_s": SAMPLE_S,
-        "wheel_std": WHEEL_STD,
-    }
+    @property
+    def cost(self) -> float:
+        """In filters that run."""
+        return float(len(self.profiles) * (2 * self.draws if self.change == "static" else 1))
 
-
-def _work(satellite: str, profiles: Sequence[str], change: str, draws: int, seed: int) -> dict[str, Any]:
-    runs = simulate(satellite, profiles, change=change, seed=seed)
-    if change == "static":
+    def measure(self, progress: Progress, pool: Any = None) -> Figures:
+        """Figures by profile; of `static` by level, with the excitation."""
+        runs = simulate(self.satellite, self.profiles, change=self.change, seed=self.seed)
+        seeded = [(name, run, self.seed + 97 * i) for i, (name, run) in enumerate(runs.items())]
+        if self.change != "static":
+            return {name: _changing(self.satellite, run, self.change, seed) for name, run, seed in seeded}
         return {
             "levels": {
                 level: {
-                    name: _cell(satellite, run, level, draws, seed + 97 * i)
-                    for i, (name, run) in enumerate(runs.items())
+                    name: _errors(self.satellite, run, level, self.draws, seed) for name, run, seed in seeded
                 }
                 for level in LEVELS
             },
-            "excitation": {name: _information(satellite, run) for name, run in runs.items()},
+            "excitation": {name: _information(self.satellite, run) for name, run in runs.items()},
         }
-    return {
-        name: _changing(satellite, run, change, seed + 97 * i) for i, (name, run) in enumerate(runs.items())
-    }
 
 
-def _cell(satellite: str, run: Run, level: str, draws: int, seed: int) -> dict[str, Any]:
+class Inertia(Benchmark):
+    """Estimators under every profile, and inertia that changes."""
+
+    name = "inertia"
+    title = "Inertia of satellites from wheels and gyroscope"
+
+    def cells(self) -> list[InertiaCell]:
+        """Every satellite, static and changing."""
+        asked = self.choice
+        return [
+            InertiaCell(satellite, asked.profiles, change, asked.draws, asked.seed)
+            for satellite in asked.satellites
+            for change in ("static", *CHANGES)
+        ]
+
+    def document(self, found: Found) -> dict[str, Any]:
+        """See `fulmar benchmark inertia --help`."""
+        satellites = self.choice.satellites
+        static = {each: known(found, f"{each}_static") for each in satellites}
+        return {
+            "cells": {
+                level: {each: static[each]["levels"][level] for each in satellites} for level in LEVELS
+            },
+            "dynamic": {
+                change: {each: known(found, f"{each}_{change}") for each in satellites} for change in CHANGES
+            },
+            "excitation": {each: static[each]["excitation"] for each in satellites},
+            "draws": self.choice.draws,
+            "seed": self.choice.seed,
+            "sample_s": SAMPLE_S,
+            "wheel_std": WHEEL_STD,
+        }
+
+    def checks(self, document: Mapping[str, Any]) -> list[Check]:
+        """What estimators are to find."""
+        return requirements(document)
+
+    def tables(self, document: Mapping[str, Any]) -> list[str]:
+        """Lines for a terminal; errors in percent."""
+        return [*lines(document), *self.check_lines(document)]
+
+    def plots(self, document: Mapping[str, Any], found: Found) -> list[Plot]:
+        """Figures like thesis Figs. 6.7, 6.8 and 6.9."""
+        from fulmar_benchmarks.inertia.report import plots
+
+        return plots(document)
+
+
+def _errors(satellite: str, run: Run, level: str, draws: int, seed: int) -> dict[str, Any]:
     """Largest relative error of the diagonal after the run, over all draws, by method."""
     inertia, wheels = _facts(satellite)
     worst = dict.fromkeys(METHODS, 0.0)
@@ -181,48 +214,75 @@ def _facts(satellite: str) -> tuple[np.ndarray, ReactionWheels]:
     return np.array(robot.body.inertia[:3]), wheels_of(robot)
 
 
-def requirements(document: dict[str, Any]) -> list[tuple[str, str, bool]]:
-    """What the benchmark is to show: a name, what was measured, and whether it is enough."""
+def requirements(document: Mapping[str, Any]) -> list[Check]:
+    """What the benchmark is to show: how many cells are near enough to the truth."""
     found = []
-    cells = document["cells"]
-
-    def errors(level: str, method: str) -> list[float]:
-        return [
+    for level, method, limit, spare in (
+        ("fine", "ls", 0.001, 0),
+        ("low_cost", "ls", 0.01, 2),
+        ("fine", "ekf", 0.02, 4),
+    ):
+        errors = [
             cell[method]["error_max"]
-            for satellite in cells[level].values()
+            for satellite in document["cells"][level].values()
             for name, cell in satellite.items()
             if name != OWN
         ]
-
-    for level, limit, spare in (("fine", 0.001, 0), ("low_cost", 0.01, 2)):
-        every = errors(level, "ls")
-        good = sum(error <= limit for error in every)
-        name = f"least squares, {level}, within {100 * limit:g} %"
-        found.append(
-            (name, f"{good} of {len(every)}, worst {100 * max(every):.4f} %", good >= len(every) - spare)
-        )
-    every = errors("fine", "ekf")
-    good = sum(error <= 0.02 for error in every)
-    found.append(
-        (
-            "EKF, fine, within 2 %",
-            f"{good} of {len(every)}, worst {100 * max(every):.3f} %",
-            good >= len(every) - 4,
-        )
-    )
+        good = sum(error <= limit for error in errors)
+        worst = f", worst {100 * max(errors):.4f} %" if errors else ""
+        name = f"{method}, {level}: cells of {len(errors)} within {100 * limit:g} %{worst}"
+        found.append(Check.least(name, good, max(0, len(errors) - spare)))
     steps = [cell for satellite in document["dynamic"]["step"].values() for cell in satellite.values()]
     right = sum(cell["found"] or cell["says_it_cannot_observe"] for cell in steps)
-    found.append(
-        ("step of 10 % found in 60 s to 3 %, or said to be unobservable",
-         f"{sum(cell['found'] for cell in steps)} found, {right} of {len(steps)} right", right == len(steps))
-    )  # fmt: skip
+    seen_steps = sum(cell["found"] for cell in steps)
+    name = f"step of 10 % found in 60 s to 3 % ({seen_steps} of {len(steps)}), or said to be unobservable"
+    found.append(Check.least(name, right, len(steps)))
     for change in ("drift", "periodic"):
         runs = [cell for satellite in document["dynamic"][change].values() for cell in satellite.values()]
         seen = [cell for cell in runs if cell["observable"] >= 0.5]
-        ratio = float(np.median([cell["ekf"] / cell["ls"] for cell in seen])) if seen else math.inf
-        text = f"median {ratio:.2f} over {len(seen)} of {len(runs)} runs in which it is observable most of the time"
-        found.append((f"{change}: error of the EKF over that of the batch", text, ratio <= 0.5))
+        ratio = float(np.median([cell["ekf"] / cell["ls"] for cell in seen])) if seen else None
+        about = f"median of the {len(seen)} of {len(runs)} runs in which it is observable most of the time"
+        check = Check.most(f"{change}: error of the EKF over that of the batch, {about}", ratio, 0.5)
+        found.append(replace(check, met=bool(check.met)))
     return found
 
 
-__all__ = ["METHODS", "PROFILES", "SATELLITES", "Request", "requirements", "run_inertia"]
+def lines(document: Mapping[str, Any]) -> list[str]:
+    """Lines for a terminal; errors in percent."""
+    found = []
+    for level, satellites in document["cells"].items():
+        found.append(
+            f"{level} gyroscope: largest error of a moment [%]" + "".join(f"{m:>9}" for m in METHODS)
+        )
+        for satellite, profiles in satellites.items():
+            for profile, cell in profiles.items():
+                errors = "".join(f"{100 * cell[method]['error_max']:9.4f}" for method in METHODS)
+                full = (
+                    f"  wheels full {100 * cell['ls']['saturated']:3.0f} % of the time"
+                    if cell["ls"]["saturated"]
+                    else ""
+                )
+                found.append(f"  {satellite + ', ' + profile:40}" + errors + full)
+    for change, satellites in document["dynamic"].items():
+        found.append(f"{change}: RMS error after the first minute [%]           EKF    batch  observable")
+        for satellite, profiles in satellites.items():
+            for profile, cell in profiles.items():
+                text = f"  {satellite + ', ' + profile:40} {100 * cell['ekf']:9.3f} {100 * cell['ls']:8.3f}"
+                text += f" {100 * cell['observable']:6.0f} %"
+                if change == "step":
+                    text += f"  found after {cell['found_s']:.1f} s" if cell["found"] else "  not found"
+                    text += ", says that it cannot observe it" if cell["says_it_cannot_observe"] else ""
+                found.append(text)
+    for satellite, profiles in document["excitation"].items():
+        for kind in ("diagonal", "full"):
+            others = {name: each[kind] for name, each in profiles.items() if name != OWN}
+            if OWN in profiles and others:
+                best = max(others, key=lambda name: others[name])
+                ratio = profiles[OWN][kind] / max(others[best], 1e-300)
+                found.append(
+                    f"D-criterion a second, {satellite}, {kind}: ours {ratio:.2f} times that of {best}, the best"
+                )
+    return found
+
+
+__all__ = ["PROFILES", "SATELLITES", "Inertia", "requirements"]

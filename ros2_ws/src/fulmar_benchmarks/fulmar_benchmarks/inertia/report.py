@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from html import escape
-from pathlib import Path
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from fulmar_benchmarks.inertia.campaign import METHODS, requirements
+from fulmar_benchmarks.inertia.campaign import METHODS
 from fulmar_benchmarks.inertia.simulated_runs import wheels_of
-from fulmar_benchmarks.inertia.tables import lines
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.tasks.torque_profiles import PROFILES, gain_of, profile_of
-from fulmar_evaluation.report.page import Part, Plot, headline
-from fulmar_evaluation.report.style import house_style, quiet_grid
-from fulmar_evaluation.report.writer import write_benchmark
+from fulmar_evaluation.report.page import Plot
+from fulmar_evaluation.report.style import quiet_grid
 
 _PROFILES = """
 Torque that each profile asks of the three wheels of the CubeSat, in shares of what its motors have; what is beyond one
@@ -29,18 +26,22 @@ Error of the filter over that of the batch least squares where the inertia chang
 the profile shows the inertia at all. Hollow dots are runs in which most of the time it cannot be observed."""
 
 
-def write_report(document: dict[str, Any], out: Path) -> Path:
-    """Write the page and its plots into a folder; returns the page."""
-    met = requirements(document)
-    with house_style():
-        parts: list[Part] = [headline(f"{sum(good for *_, good in met)} of {len(met)} requirements are met.")]
-        parts.append(Plot("Excitation", _PROFILES, draw_profiles(), "profiles"))
-        for level in document["cells"]:
-            title = f"Static inertia, {level.replace('_', '-')} gyroscope"
-            parts.append(Plot(title, _STATIC, draw_static(document, level), f"static_{level}"))
-        parts.append(Plot("Inertia that changes", _CHANGING, draw_changing(document), "changing"))
-        parts.append("<h2>All figures</h2><pre>" + escape("\n".join(lines(document))) + "</pre>")
-        return write_benchmark(out, "Inertia of satellites from wheels and gyroscope", parts)
+def plots(document: Mapping[str, Any]) -> list[Plot]:
+    """What is drawn of a document."""
+    static = [
+        Plot(
+            f"Static inertia, {level.replace('_', '-')} gyroscope",
+            _STATIC,
+            draw_static(document, level),
+            f"static_{level}",
+        )
+        for level in document["cells"]
+    ]
+    return [
+        Plot("Excitation", _PROFILES, draw_profiles(), "profiles"),
+        *static,
+        Plot("Inertia that changes", _CHANGING, draw_changing(document), "changing"),
+    ]
 
 
 def draw_profiles() -> Figure:
@@ -59,7 +60,7 @@ def draw_profiles() -> Figure:
     return figure
 
 
-def draw_static(document: dict[str, Any], level: str) -> Figure:
+def draw_static(document: Mapping[str, Any], level: str) -> Figure:
     """Errors of every cell, one panel a satellite."""
     satellites = document["cells"][level]
     figure = Figure(figsize=(7.2, 3.4), layout="constrained")
@@ -80,7 +81,7 @@ def draw_static(document: dict[str, Any], level: str) -> Figure:
     return figure
 
 
-def draw_changing(document: dict[str, Any]) -> Figure:
+def draw_changing(document: Mapping[str, Any]) -> Figure:
     """Ratio of the errors of filter and batch for drift and periodic inertia."""
     figure = Figure(figsize=(7.2, 3.4), layout="constrained")
     panels = figure.subplots(1, 2, sharex=True, sharey=True)

@@ -8,15 +8,16 @@ from pathlib import Path
 
 import typer
 
+from fulmar_benchmarks.catalogue import rows
 from fulmar_cli.commands.benchmark_descent import descent
 from fulmar_cli.commands.benchmark_drift import drift
 from fulmar_cli.commands.benchmark_events import events
 from fulmar_cli.commands.benchmark_falcon import falcon
 from fulmar_cli.commands.benchmark_flights import flights
-from fulmar_cli.commands.benchmark_inertia import inertia
 from fulmar_cli.commands.benchmark_latency import endurance, latency
 from fulmar_cli.commands.benchmark_rans3d import rans3d
 from fulmar_cli.commands.benchmark_roboran import roboran
+from fulmar_cli.commands.benchmark_row import OneBenchmark, command_of
 from fulmar_cli.commands.benchmark_throughput import throughput
 from fulmar_cli.commands.benchmark_training import training
 from fulmar_core.config.errors import ConfigError
@@ -46,7 +47,6 @@ for command in (
     events,
     falcon,
     flights,
-    inertia,
     latency,
     rans3d,
     roboran,
@@ -54,6 +54,8 @@ for command in (
     training,
 ):
     benchmark.command()(command)
+for row in rows().values():
+    benchmark.command(row.name, cls=OneBenchmark)(command_of(row))
 
 
 def _missing(name: str) -> Callable[[typer.Context], None]:

@@ -1,0 +1,185 @@
+"""Every benchmark: where it is, and what it can be asked for. Nothing heavy is imported before one is chosen."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from fulmar_core.config.errors import ConfigError, UnknownNameError
+from fulmar_core.config.paths import config_names
+from fulmar_core.config.seeds import EVALUATION_SEED
+
+if TYPE_CHECKING:
+    from fulmar_benchmarks.shape import Benchmark, Choice
+
+CONFIGS = "configs/"  # how `Selector.known` begins where files are meant
+
+
+@dataclass(frozen=True)
+class Selector:
+    """One option of a benchmark, named like its value in a choice unless `names` say otherwise."""
+
+    name: str
+    metavar: str
+    help: str
+    default: Any = None
+    kind: Any = str
+    least: float | None = None
+    most: float | None = None
+    family: str = ""  # its value is names of these, with commas between
+    known: str = ""  # all of them: `module:NAME`, or `configs/FOLDER`
+    usual: str = ""  # same, where nothing is given
+    every: str = "all"  # stands for all of them
+    as_given: bool = False  # the order of names is kept
+    numbers: tuple[float, float] | None = (
+        None  # its value is numbers from one to the other, with commas between
+    )
+    names: tuple[str, ...] = ()
+
+    def read(self, value: Any) -> Any:
+        """The value of a choice, from what was given.
+
+        Raises:
+            ConfigError: What is wrong with it, and what is allowed.
+        """
+        if value is None and self.usual:
+            return known_names(self.usual)
+        if not isinstance(value, str):
+            return value
+        if self.numbers:
+            return self._numbers(value, *self.numbers)
+        return read_names(value, self) if self.family else value
+
+    def _numbers(self, text: str, low: float, high: float) -> tuple[float, ...]:
+        try:
+            values = tuple(float(part) for part in text.split(","))
+        except ValueError:
+            values = ()
+        if not values or not all(low <= value <= high for value in values):
+            raise ConfigError(
+                f"--{self.name} = '{text}' must be numbers from {low:g} to {high:g}, with commas between."
+            )
+        return values
+
+
+def known_names(place: str) -> tuple[str, ...]:
+    """Names that `Selector.known` and `usual` stand for."""
+    if place.startswith(CONFIGS):
+        return tuple(config_names(place.removeprefix(CONFIGS)))
+    module, _, name = place.partition(":")
+    return tuple(getattr(import_module(module), name))
+
+
+def read_names(text: str, selector: Selector) -> tuple[str, ...]:
+    """Names with commas between them, in the order of those known, or as given.
+
+    Raises:
+        UnknownNameError: For the first that is not known.
+        ConfigError: There is none.
+    """
+    known, every = known_names(selector.known), selector.every
+    names = list(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
+    for name in names:
+        if name not in (*known, every):
+            raise UnknownNameError(selector.family, name, known)
+    if not names:
+        raise ConfigError(f"'{text}' names no {selector.family}; known: {', '.join(known)}, or {every}.")
+    if selector.as_given and every not in names:
+        return tuple(names)
+    return tuple(name for name in known if name in names or every in names)
+
+
+@dataclass(frozen=True)
+class Row:
+    """One benchmark."""
+
+    name: str
+    where: str  # its class, as `module:Class`
+    help: str
+    selectors: Sequence[Selector]
+    needs: Callable[[Choice], Sequence[str]] = lambda choice: ()  # modules of extras
+    shared: Sequence[str] = ("seed", "jobs", "resume", "report", "check")  # of SHARED, beside out
+    always_checked: bool = False  # it ends with code 1 even without `--check`
+    out: str = ""  # folder; runs/benchmark/NAME by default
+    measures: str = "measuring"  # beside the bar
+
+    def load(self) -> type[Benchmark]:
+        """Import it."""
+        module, _, name = self.where.partition(":")
+        found: type[Benchmark] = getattr(import_module(module), name)
+        return found
+
+
+# Options that benchmarks share; `--check` and `--json` are for the command alone.
+SHARED = {
+    "seed": Selector("seed", "N", "Seed of everything random.", EVALUATION_SEED, int, 0, 2**63 - 1),
+    "jobs": Selector(
+        "jobs", "N", "Parallel processes; one for each core by default.", len(os.sched_getaffinity(0)), int, 1
+    ),
+    "resume": Selector(
+        "resume", "", "Take what was measured before and did not change, or measure it again.", True, bool,
+        names=("--resume/--fresh",),
+    ),
+    "report": Selector("report", "", "Draw the report.", True, bool, names=("--report/--no-report",)),
+    "check": Selector(
+        "check", "", "End with code 1 unless every requirement was measured and met.", False, bool,
+        names=("--check",),
+    ),
+    "out": Selector("out", "DIR", "Folder of the results and of the report with its figures.", None, Path),
+}  # fmt: skip
+
+
+def rows() -> dict[str, Row]:
+    """Every benchmark by its name."""
+    from fulmar_benchmarks.catalogue_rows import ROWS
+
+    return {row.name: row for row in ROWS}
+
+
+def choice(name: str, **given: Any) -> Choice:
+    """What one run of a benchmark is asked for; what is not given is as the command has it by default.
+
+    Raises:
+        ConfigError: There is no such benchmark or option, or a value is wrong.
+    """
+    from fulmar_benchmarks.shape import Choice
+
+    every = rows()
+    if name not in every:
+        raise UnknownNameError("benchmark", name, every)
+    row = every[name]
+    own = {each.name: each for each in row.selectors}
+    for option in given:
+        if option not in (*own, *SHARED, "command"):
+            raise ConfigError(no_such_selector(name, option))
+    values = {**{each.name: each.default for each in SHARED.values()}, "command": ""}
+    values |= {each.name: each.default for each in row.selectors} | given
+    values |= {option: each.read(values[option]) for option, each in own.items()}
+    values["out"] = Path(values["out"] or row.out or f"runs/benchmark/{name}")
+    return Choice(**values, fresh=not values["resume"])
+
+
+def owners(option: str) -> list[str]:
+    """Benchmarks that have a selector."""
+    written = "--" + option.removeprefix("--").replace("_", "-")
+    return [row.name for row in rows().values() if written in spellings(row)]
+
+
+def no_such_selector(name: str, option: str) -> str:
+    """What is wrong with an option that a benchmark does not have."""
+    written = "--" + option.removeprefix("--").replace("_", "-")
+    whose = (
+        f"{written} selects in {', '.join(owners(option))}, not in {name}"
+        if owners(option)
+        else f"{written}?"
+    )
+    return f"{whose}: {name} has {', '.join(spellings(rows()[name]))}. Try `fulmar benchmark {name} --help`."
+
+
+def spellings(row: Row) -> list[str]:
+    """Selectors of a benchmark as options."""
+    return [name for each in row.selectors for name in each.names or (f"--{each.name.replace('_', '-')}",)]
