@@ -20,9 +20,9 @@ SMALL = {
     "inertia": "--satellites cubesat_wheels --profiles sine --draws 1",
     "descent": "--through batch --heights 1 --flights 2",
 }
-WITHOUT_REPORT = ("descent",)  # they draw none and keep no files
 OF_THE_MACHINE = (
-    "command", "computation_s", "events_per_s", "fulmar_version", "git_revision", "sky_s", "steps_per_s", "wall_s",
+    "checks", "command", "computation_s", "events_per_s", "fulmar_version", "git_revision", "libraries", "machine",
+    "sky_s", "steps_per_s", "wall_s",
 )  # fmt: skip
 DEPTH = 3  # of the keys that a row has
 
@@ -30,8 +30,8 @@ DEPTH = 3  # of the keys that a row has
 def documents(name: str) -> dict[str, str]:
     """The document of a benchmark, by the first keys of its parts."""
     with tempfile.TemporaryDirectory(prefix="fulmar_freeze_") as folder:
-        kept = [] if name in WITHOUT_REPORT else ["--no-report", "--out", folder]
-        asked = ["benchmark", name, *SMALL[name].split(), *kept, "--jobs", "1", "--json"]
+        kept = ["--no-report", "--out", folder, "--jobs", "1", "--json"]
+        asked = ["benchmark", name, *SMALL[name].split(), *kept]
         done = subprocess.run(
             [sys.executable, "-m", "fulmar_cli.main", *asked], stdout=subprocess.PIPE, text=True, check=False
         )

@@ -35,4 +35,32 @@ INERTIA = Row(
     measures="satellites",
 )  # fmt: skip
 
-ROWS = (INERTIA,)
+EVENTS = Row(
+    "events",
+    "fulmar_benchmarks.events.campaign:Events",
+    """Estimate turn rates from simulated events of real stars, beside thesis Table 6.2.
+
+    Cameras of 8.5° and 1024 × 1024 pixels see stars to magnitude 7; pixels have a threshold of 0.25 ± 0.03, 0.1 Hz of
+    noise and time stamps that jitter by 100 µs. Attitudes are random, rates from 0.1 to 2 °/s about any axis. No search
+    starts at the truth. Errors are in °/s about the first camera's axes: p and q across its boresight, r about it.
+    `nees_inside` is the share of windows whose normalised error squared is below the 95 % limit of chi-squared with
+    three degrees of freedom. `pointing` is a satellite that goes on pointing to the nadir when its gyroscope dies.
+
+    Try:
+
+    fulmar benchmark events --runs 20 --parts table,fields --json
+    """,
+    (
+        Selector("runs", "N", "Random windows, of the table and of each field of view.", 100, int, 4,
+                 names=("--runs", "--episodes")),
+        Selector("parts", "P,...", "Out of table, fields (of view), sensitivity, slow_and_fast and pointing, or all.",
+                 "all", family="part", known="fulmar_benchmarks.events.campaign:PARTS"),
+        Selector("pointing_runs", "N", "Episodes of nadir pointing without a gyroscope, 3 min of a core each.", 2,
+                 int, 1),
+        Selector("pointing_s", "S", "Length of these episodes [s].", 600.0, float, 120.0),
+    ),
+    needs=lambda choice: ("mujoco",),
+    measures="windows",
+)  # fmt: skip
+
+ROWS = (EVENTS, INERTIA)

@@ -1,25 +1,23 @@
-"""Report of the benchmark of event-based rates: figures like thesis Figs. 6.11, 6.13 and 6.14, and Table 6.2."""
+"""Report of the benchmark of event-based rates: figures like thesis Figs. 6.11, 6.13 and 6.14."""
 
 from __future__ import annotations
 
 import math
-from html import escape
-from pathlib import Path
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from fulmar_benchmarks.events.tables import NAMES, lines
+from fulmar_benchmarks.events.campaign import NAMES
 from fulmar_core.dynamics.sky.event_sensor import EventSensor
 from fulmar_core.estimators.event_rate.contrast import fit_rate
 from fulmar_core.estimators.event_rate.star_tracks import find_tracks
 from fulmar_core.robots.sensors.catalogue import load_stars
 from fulmar_core.robots.sensors.event_camera import EventSensorSpec
 from fulmar_core.robots.sensors.star_camera import StarCamera
-from fulmar_evaluation.report.page import Part, Plot, cells, headline, table
-from fulmar_evaluation.report.style import house_style, quiet_grid
-from fulmar_evaluation.report.writer import write_benchmark
+from fulmar_evaluation.report.page import Plot
+from fulmar_evaluation.report.style import quiet_grid
 
 _CARRIED = """
 Left, the events of a window of 0.2 s, brighter and darker ones, among the noise; right, the same events of stars,
@@ -32,37 +30,15 @@ How much worse the rate about the boresight is known than that across it. The li
 stars that are spread evenly over a square would give."""
 
 
-def write_report(document: dict[str, Any], out: Path) -> Path:
-    """Write the page and its plots into a folder; returns the page."""
-    with house_style():
-        return write_benchmark(out, "Turn rate from the events of stars", _parts(document))
-
-
-def _parts(document: dict[str, Any]) -> list[Part]:
-    parts: list[Part] = []
+def plots(document: Mapping[str, Any]) -> list[Plot]:
+    """What is drawn of a document."""
+    parts = []
     if "single" in document:
-        rss, thesis = document["dual"]["rss"], document["thesis"]["dual"]["rss"]
-        parts.append(
-            headline(f"Two cameras: {rss:.4f} °/s, the root of the sum of squares; thesis {thesis:g} °/s.")
-        )
-        rows = [
-            f"<tr>{cells([NAMES[name], *(f'{document[name][key]:.5f}' for key in KEYS)])}</tr>"
-            for name in NAMES
-        ]
-        rows += [
-            f"<tr>{cells(['thesis, ' + NAMES[name], *(f'{row[key]:.4f}' for key in KEYS)])}</tr>"
-            for name, row in document["thesis"].items()
-        ]
-        parts.append(table([cells(["RMS [°/s]", "p", "q", "r", "RSS"], "th")], rows))
         parts.append(Plot("Contrast", _CARRIED, draw_carried(), "carried"))
         parts.append(Plot("Errors", _ERRORS, draw_errors(document), "errors"))
     if "fov_ratio" in document:
         parts.append(Plot("Field of view", _FIELDS, draw_fields(document), "fields"))
-    parts.append("<h2>All figures</h2><pre>" + escape("\n".join(lines(document))) + "</pre>")
     return parts
-
-
-KEYS = ("rms_p", "rms_q", "rms_r", "rss")
 
 
 def draw_carried() -> Figure:
@@ -95,7 +71,7 @@ def draw_carried() -> Figure:
     return figure
 
 
-def draw_errors(document: dict[str, Any]) -> Figure:
+def draw_errors(document: Mapping[str, Any]) -> Figure:
     """Errors of every window, of one camera and of two."""
     figure = Figure(figsize=(7.2, 3.2), layout="constrained")
     panels = figure.subplots(1, 2, sharey=True)
@@ -112,7 +88,7 @@ def draw_errors(document: dict[str, Any]) -> Figure:
     return figure
 
 
-def draw_fields(document: dict[str, Any]) -> Figure:
+def draw_fields(document: Mapping[str, Any]) -> Figure:
     """Ratio of the errors over the field of view."""
     figure = Figure(figsize=(5.0, 3.2), layout="constrained")
     axes = figure.subplots()

@@ -11,7 +11,6 @@ import typer
 from fulmar_benchmarks.catalogue import rows
 from fulmar_cli.commands.benchmark_descent import descent
 from fulmar_cli.commands.benchmark_drift import drift
-from fulmar_cli.commands.benchmark_events import events
 from fulmar_cli.commands.benchmark_falcon import falcon
 from fulmar_cli.commands.benchmark_flights import flights
 from fulmar_cli.commands.benchmark_latency import endurance, latency
@@ -44,7 +43,6 @@ for command in (
     descent,
     drift,
     endurance,
-    events,
     falcon,
     flights,
     latency,
