@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from fulmar_benchmarks.falcon.campaign import Request, cells_of, ground_effect, requirements
-from fulmar_benchmarks.falcon.cells import SCENARIOS, figures, first_flight
-from fulmar_cli.commands.values import read_names
+from fulmar_benchmarks.catalogue import choice, read_names, rows
+from fulmar_benchmarks.falcon.campaign import Falcon, ground_effect, requirements
+from fulmar_benchmarks.falcon.cells import SCENARIOS, first_flight
 from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.simulation.flight_figures import flight_figures as figures
 
 ROBOT = load_robot("airship_v7")
 PUBLISHED = {"rmse_per_axis_m": 0.012}
 
 
 def request(*controllers, scenarios=(), episodes=10):
-    return Request("airship_v7", ("a",), controllers, scenarios, episodes, 3, 1)
+    return choice(
+        "falcon", tasks="a", controllers=controllers, scenarios=scenarios, episodes=episodes, seed=3
+    )
+
+
+def cells_of(asked):
+    return Falcon(asked).cells()
 
 
 def test_a_controller_that_draws_flies_five_seeds_with_exact_state_and_others_one():
@@ -30,13 +36,15 @@ def test_a_controller_that_draws_flies_five_seeds_with_exact_state_and_others_on
 
 
 def test_the_scenario_all_is_one_and_every_stands_for_all_of_them():
-    known = tuple(SCENARIOS)
-    assert read_names("all", "scenario", known, every="every") == ("all",)
-    assert read_names("every", "scenario", known, every="every") == known
+    scenarios = next(each for each in rows()["falcon"].selectors if each.name == "scenarios")
+    assert read_names("all", scenarios) == ("all",)
+    assert read_names("every", scenarios) == tuple(SCENARIOS)
+    assert scenarios.read("usual") == ()
 
 
 def test_flights_that_hold_a_height_begin_apart_so_exact_state_takes_as_many():
-    holding = replace(request("lqi", scenarios=("exact", "calm", "light")), tasks=("hold",))
+    holding = request("lqi", scenarios=("exact", "calm", "light"))
+    holding.tasks = ("hold",)
     assert [cell.episodes for cell in cells_of(holding)] == [10, 10, 10]
 
 
@@ -57,7 +65,7 @@ def test_a_policy_must_hold_its_height_and_survive(scenario, change, good):
     held = {"altitude_rmse_m": 0.1, "late_altitude_rmse_m": 0.03, "survival": 1.0, "episodes": 256}
     rows = requirements({"tasks": {"hold": {"policy": {scenario: held | change}}}})
     assert rows
-    assert all(met for *_, met in rows) is good
+    assert all(row.met for row in rows) is good
 
 
 @pytest.mark.parametrize(
@@ -68,13 +76,13 @@ def test_mppi_must_stay_within_three_centimetres_with_every_seed(worst, survival
     found = {"rmse_per_axis_m": worst, "rmse_per_axis_worst_m": worst, "survival": survival, "episodes": 5}
     flown = {"mppi": {"exact": found | {"thesis": PUBLISHED}}}
     rows = requirements({"tasks": {"a": flown, "b": flown}})
-    assert [(name.split(",")[1].strip(), met) for name, *_, met in rows] == [("(a)", good)]
+    assert [(row.name.split(",")[1].strip(), row.met) for row in rows] == [("(a)", good)]
 
 
 def test_an_lqi_that_could_not_be_flown_is_not_met():
     failed = {"error": "why", "survival": None, "episodes": 0}
     rows = requirements({"tasks": {"a": {"lqi": {"light": failed}}}})
-    assert [(shown, met) for *_, shown, met in rows] == [("not flown", False)]
+    assert [(row.measured, row.met) for row in rows] == [(None, False)]
 
 
 def flown(heights, *, lost=(), control_dt=1.0):

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from fulmar_benchmarks.falcon import cells
+from fulmar_benchmarks.shape import ALONE
 from fulmar_core.tasks import load_task
 from tests.fulmar_cli.command_line import complaint
 
@@ -22,10 +23,7 @@ FIGURES = {
 def brief(monkeypatch):
     """Flights of a second in the place of a minute, in this process."""
     monkeypatch.setattr(cells, "load_task", lambda name: replace(load_task(name), episode_s=1.0))
-    monkeypatch.setattr(
-        "fulmar_benchmarks.falcon.campaign.mapped",
-        lambda work, given, **_: [work(*each) for each in given],
-    )
+    monkeypatch.setattr(cells.FalconCell, "where", ALONE)
 
 
 def test_a_flight_has_the_stated_keys(fulmar, brief, tmp_path):
@@ -86,3 +84,27 @@ def test_a_policy_that_is_not_shipped_is_left_out(fulmar, brief, tmp_path):
 )
 def test_a_wrong_name_is_one_line(fulmar, brief, tmp_path, words, says):
     assert says in complaint(fulmar("benchmark", "falcon", *words, "--out", tmp_path / "o", "--json"))
+
+
+def test_flights_that_were_flown_are_kept_and_a_benchmark_that_was_broken_off_goes_on(
+    fulmar, brief, tmp_path
+):
+    words = ("--tasks", "a,d", "--controllers", "lqi", "--scenarios", "exact", "--no-report", "--json")
+    again, moment = [], ("wall_s", "command")
+    for folder in ("whole", "broken", "broken"):
+        code, out, err = fulmar("benchmark", "falcon", *words, "--out", tmp_path / folder)
+        assert code == 0
+        again.append(({key: value for key, value in json.loads(out).items() if key not in moment}, err))
+        (tmp_path / folder / "outcomes" / "airship_v7_d_lqi_exact.npz").unlink()
+    for document, _ in again:
+        for by in document["tasks"].values():
+            by["lqi"]["exact"].pop("wall_s")
+    assert again[0][0] == again[1][0] == again[2][0]
+    assert again[2][1].count("evaluated before") == 1
+
+
+def test_a_check_ends_with_one_where_something_is_not_met(fulmar, brief, tmp_path, monkeypatch):
+    words = ("--tasks", "a", "--controllers", "lqi", "--scenarios", "exact", "--no-report", "--check")
+    assert fulmar("benchmark", "falcon", *words, "--out", tmp_path)[0] == 0
+    monkeypatch.setattr("fulmar_benchmarks.falcon.campaign.HALF", 0.0001)
+    assert fulmar("benchmark", "falcon", *words, "--out", tmp_path)[0] == 1

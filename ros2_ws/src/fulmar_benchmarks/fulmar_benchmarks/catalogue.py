@@ -34,6 +34,7 @@ class Selector:
     known: str = ""  # all of them: `module:NAME`, or `configs/FOLDER`
     usual: str = ""  # same, where nothing is given
     every: str = "all"  # stands for all of them
+    nothing: str = ""  # stands for none of them
     as_given: bool = False  # the order of names is kept
     numbers: tuple[float, float] | None = (
         None  # its value is numbers from one to the other, with commas between
@@ -52,6 +53,8 @@ class Selector:
             return value
         if self.numbers:
             return self._numbers(value, *self.numbers)
+        if self.nothing and value == self.nothing:
+            return ()
         return read_names(value, self) if self.family else value
 
     def _numbers(self, text: str, low: float, high: float) -> tuple[float, ...]:

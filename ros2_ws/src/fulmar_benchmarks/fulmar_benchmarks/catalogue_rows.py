@@ -63,4 +63,42 @@ EVENTS = Row(
     measures="windows",
 )  # fmt: skip
 
-ROWS = (EVENTS, INERTIA)
+FALCON = Row(
+    "falcon",
+    "fulmar_benchmarks.falcon.campaign:Falcon",
+    """Fly a ground-effect craft along the references of the thesis, beside its Tables 5.2 and 5.6 to 5.8.
+
+    Flights of 60 s in the core's dynamics: `hold` one metre over the water, and (a) to (f) of thesis §5.5.2. Scenarios:
+    exact (state as it is), calm (sensors of 100 Hz with 0.05 m, 0.05 m/s, 0.01 rad, 0.01 rad/s), calm with twice the
+    noise, measurements (`delay`) or commands (`late`) that are 20 ms late, light or severe Dryden turbulence, or noise,
+    delay and light turbulence in `all`. `rmse_per_axis_m` is √(mean e² / 3), as the thesis prints it, `rmse_m` √(mean
+    e²), `peak_error_m` the largest distance (`overshoot_m` in the thesis), `energy` the mean squared throttle,
+    `energy_per_m` [s/m] that over the speed, medians over the flights that survive, and `wall_s` what the flights of a
+    cell took side by side. The `usual` scenarios are exact, calm, light and severe of lqr and pid, exact of mppi, in 5
+    flights that differ by the seeds of its noise, and all of them of lqi and policy. A flight survives if the hull
+    touches no water and no angle of attack goes beyond 1.5 times the stall's.
+
+    Try:
+
+    fulmar benchmark falcon --tasks a,d --controllers lqi --scenarios exact,calm --json
+
+    fulmar benchmark falcon --tasks hold --controllers policy --scenarios calm,light --episodes 256
+
+    fulmar benchmark falcon --tasks a,b,c,d,e,f --controllers lqi,mppi,pid --scenarios exact
+    """,
+    (
+        Selector("robot", "NAME", "An aircraft.", "airship_v7"),
+        Selector("tasks", "T,...", "Out of hold and a to f, or all.", "all",
+                 family="task", known="fulmar_benchmarks.falcon.cells:TASKS"),
+        Selector("controllers", "C,...", "Out of lqi, lqr, mppi, pid and policy, or all.", "all",
+                 family="controller", known="fulmar_benchmarks.falcon.cells:CONTROLLERS"),
+        Selector("scenarios", "S,...",
+                 "Out of exact, calm, noise, delay, late, light, severe and all, or every, or usual.", "usual",
+                 family="scenario", known="fulmar_benchmarks.falcon.cells:SCENARIOS", every="every", nothing="usual"),
+        Selector("episodes", "N", "Flights of each cell; 1 with exact state on a path, at most 5 of mppi.", 20, int, 1),
+        POLICY,
+    ),
+    measures="flights",
+)  # fmt: skip
+
+ROWS = (EVENTS, FALCON, INERTIA)

@@ -20,7 +20,7 @@ from fulmar_core.loop.policy_bundle import read_passport
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.tasks import load_task
 from fulmar_evaluation.evaluation import Trial
-from policy_server.controllers import policies_directory
+from policy_server.controllers import policies_directory, shipped_policy
 
 KINDS = ("policy", "classical")
 
@@ -92,6 +92,12 @@ def with_law(robot: str, task: str, name: str) -> Pair:
     found = controller.metadata()
     law = str(getattr(controller, "law", name))
     return Pair(robot, task, "classical", name, law=law, sha256=str(found["sha256"]))
+
+
+def policy_hash(robot: str, task: str, controller: str, folder: str = "") -> str:
+    """Hash of the bundle that drives, in a folder or the shipped one; empty for a controller without one."""
+    bundle = (folder or shipped_policy(robot, task)) if controller == "policy" else None
+    return read_passport(Path(bundle)).sha256 if bundle else ""
 
 
 def plan_of(pair: Pair, *, scenario: str, seed: int, duration_s: float | None = None) -> RunPlan:

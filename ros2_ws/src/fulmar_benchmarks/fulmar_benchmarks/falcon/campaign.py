@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fulmar_benchmarks.falcon.cells import RANDOM, SCENARIOS, Cell, fly
-from fulmar_benchmarks.workers import mapped
-from fulmar_core.config.errors import ConfigError, FulmarError
+from fulmar_benchmarks.falcon.cells import RANDOM, SCENARIOS, FalconCell
+from fulmar_benchmarks.shape import Benchmark, Cell, Check, Figures, Found
+from fulmar_benchmarks.tables import number
+from fulmar_core.config.errors import ConfigError
 from fulmar_core.dynamics.flight_trim import Trim, find_trim
 from fulmar_core.robots.airframe.ground_effect import induced_drag_ratio, lift_ratio
 from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.robot_file import load_robot
 from policy_server.controllers import shipped_policy
 
-Progress = Callable[[float, float], None]
+if TYPE_CHECKING:
+    from fulmar_evaluation.report.page import Plot
+
 HEIGHTS_M = (1.0, 2.5, 5.0, 10.0, 100.0)  # of thesis Table 5.2
 THESIS_ENERGY = (0.303, 0.590, 0.689, 0.723, 0.743)  # same
 HALF = 0.5  # of the thesis' RMSE, which exact state must stay below
@@ -35,76 +38,97 @@ SURVIVAL = 0.95
 POLICY_LIMITS = {"calm": (0.12, 0.04, 0.99), "light": (0.20, None, 0.97)}
 
 
-@dataclass(frozen=True)
-class Request:
-    """What to fly."""
-
-    robot: str
-    tasks: tuple[str, ...]
-    controllers: tuple[str, ...]
-    scenarios: tuple[str, ...]  # empty: the usual ones of each controller
-    episodes: int
-    seed: int
-    jobs: int
-    policy: str = ""  # folder of a bundle; empty: the shipped ones
-
-
 Flights = dict[str, dict[str, dict[str, Any]]]  # by task and controller, as in `cells.first_flight`
 
 
-def run_falcon(request: Request, progress: Progress) -> tuple[dict[str, Any], Flights]:
-    """Fly every cell; all figures, JSON-ready, and a flight of each task by each controller, in calm if flown."""
-    cells = cells_of(request)
-    flown = mapped(_fly, [(cell,) for cell in cells], jobs=request.jobs, progress=progress)
-    tasks: dict[str, Any] = {}
-    flights: Flights = {}
-    for cell, (figures, flight) in zip(cells, flown, strict=True):
-        tasks.setdefault(cell.task, {}).setdefault(cell.controller, {})[cell.scenario] = figures
-        if flight and (cell.scenario == DRAWN or cell.controller not in flights.get(cell.task, {})):
-            flights.setdefault(cell.task, {})[cell.controller] = flight | {"scenario": cell.scenario}
-    document = {
-        "robot": request.robot,
-        "seed": request.seed,
-        "episodes": request.episodes,
-        "tasks": tasks,
-        "ground_effect": ground_effect(request.robot),
-    }
-    return document, flights
+class Falcon(Benchmark):
+    """Every task by every controller in every scenario, and ground effect over height."""
 
+    name = "falcon"
+    width = 130
 
-def cells_of(request: Request) -> list[Cell]:
-    """What is flown, in its order; of policies only those that are shipped."""
-    return [
-        Cell(
-            request.robot,
-            task,
-            controller,
-            scenario,
-            _episodes(request, task, controller, scenario),
-            request.seed,
-            request.policy,
-        )
-        for task in request.tasks
-        for controller in request.controllers
-        for scenario in request.scenarios or USUAL.get(controller, tuple(SCENARIOS))
-        if controller != "policy"
-        or request.policy
-        or shipped_policy(request.robot, f"fly_{task}") is not None
-    ]
+    @property
+    def title(self) -> str:  # type: ignore[override]
+        """Of its page."""
+        return f"{self.choice.robot} over the water"
 
+    def check(self) -> None:
+        """Refuse what does not fly."""
+        if load_robot(self.choice.robot).airframe is None:
+            raise ConfigError(
+                f"--robot = '{self.choice.robot}' is no aircraft; `fulmar list robots` names them."
+            )
 
-def _episodes(request: Request, task: str, controller: str, scenario: str) -> int:
-    """Flights of a cell; with exact state those along a path of a controller that draws nothing are all alike."""
-    if scenario != "exact" or task == HOLD:
-        return request.episodes
-    return min(request.episodes, SEEDS) if controller in RANDOM else 1
+    def cells(self) -> list[FalconCell]:
+        """What is flown, in its order; of policies only those that are shipped."""
+        asked = self.choice
+        return [
+            FalconCell(
+                asked.robot, task, by, scenario, self._episodes(task, by, scenario), asked.seed, self._policy
+            )
+            for task in asked.tasks
+            for by in asked.controllers
+            for scenario in asked.scenarios or USUAL.get(by, tuple(SCENARIOS))
+            if by != "policy" or self._policy or shipped_policy(asked.robot, f"fly_{task}") is not None
+        ]
 
+    @property
+    def _policy(self) -> str:
+        return str(self.choice.policy or "")
 
-def _fly(cell: Cell) -> tuple[dict[str, Any], dict[str, Any]]:
-    try:
-        return fly(cell)
-    except FulmarError as error:
-        return {"error": str(error), "survival": None, "episodes": 0}, {}
+    def _episodes(self, task: str, controller: str, scenario: str) -> int:
+        """Flights of a cell; with exact state those along a path of a controller that draws nothing are all alike."""
+        if scenario != "exact" or task == HOLD:
+            return int(self.choice.episodes)
+        return min(self.choice.episodes, SEEDS) if controller in RANDOM else 1
+
+    def document(self, found: Found) -> dict[str, Any]:
+        """See `fulmar benchmark falcon --help`."""
+        tasks: dict[str, Any] = {}
+        for cell in self.cells():
+            each = found[cell.name]
+            figures = (
+                {"error": each, "survival": None, "episodes": 0} if isinstance(each, str) else each["figures"]
+            )
+            tasks.setdefault(cell.task, {}).setdefault(cell.controller, {})[cell.scenario] = figures
+        return {
+            "robot": self.choice.robot,
+            "seed": self.choice.seed,
+            "episodes": self.choice.episodes,
+            "tasks": tasks,
+            "ground_effect": ground_effect(self.choice.robot),
+        }
+
+    def checks(self, document: Mapping[str, Any]) -> list[Check]:
+        """Of what was flown."""
+        return requirements(document)
+
+    def tables(self, document: Mapping[str, Any]) -> list[str]:
+        """Every figure beside the thesis', then what is required."""
+        return [*lines(document), *self.check_lines(document)]
+
+    def plots(self, document: Mapping[str, Any], found: Found) -> list[Plot]:
+        """Errors, flights and ground effect."""
+        from fulmar_benchmarks.falcon.report import plots
+
+        return plots(document, self._flights(found))
+
+    def _flights(self, found: Found) -> Flights:
+        """A flight of each task by each controller, in calm if flown."""
+        flights: Flights = {}
+        for cell in self.cells():
+            each = found[cell.name]
+            if not isinstance(each, str) and (
+                cell.scenario == DRAWN or cell.controller not in flights.get(cell.task, {})
+            ):
+                drawn = each["flight"] | {"scenario": cell.scenario}
+                flights.setdefault(cell.task, {})[cell.controller] = drawn
+        return flights
+
+    def said(self, cell: Cell, figures: Figures) -> str:
+        """The error of a cell."""
+        one = figures["figures"]
+        return f"RMSE per axis {number(one['rmse_per_axis_m'], 4, '-')} m, {one['survival']:.2f} alive"
 
 
 def ground_effect(name: str) -> dict[str, Any]:
@@ -138,60 +162,89 @@ def _least_energy(robot: Robot, speed: float) -> Trim:
     return min(trims, key=lambda trim: float(trim.throttle**2 / trim.speed))
 
 
-def requirements(document: dict[str, Any]) -> list[tuple[str, str, str, bool]]:
-    """What is required, what was asked and found, and whether it is met; of what was flown."""
-    rows = []
+def requirements(document: Mapping[str, Any]) -> list[Check]:
+    """What is required of what was flown; a cell that could not be flown does not meet it."""
+    found = []
     for task, controllers in document["tasks"].items():
         if task in MPPI_LIMIT and "exact" in controllers.get("mppi", {}):
-            rows.append(_mppi_row(task, controllers["mppi"]["exact"]))
-        for scenario, found in controllers.get("lqi", {}).items():
-            rmse, thesis = found.get("rmse_per_axis_m"), found.get("thesis", {}).get("rmse_per_axis_m")
-            limit = None
-            if thesis and scenario == "exact":
-                limit = HALF * thesis
-            elif thesis and scenario == "calm":
-                limit = WITH_SENSORS.get(task, thesis)
-            if limit is not None:
-                good = rmse is not None and rmse <= limit and found["survival"] == 1.0
-                shown = "crashed" if rmse is None else f"{rmse:.4f} m"
-                rows.append((f"LQI, ({task}), {scenario}: RMSE per axis", f"<= {limit:.4f} m", shown, good))
-            if scenario in ("noise", "delay", "late", "light") and task in STEADY:
-                rows.append(_survival_row(f"LQI, {task}, {scenario}", found["survival"], SURVIVAL))
-        if task == HOLD:
-            rows += _policy_rows(controllers.get("policy", {}))
-    return rows
-
-
-def _policy_rows(scenarios: dict[str, Any]) -> list[tuple[str, str, str, bool]]:
-    rows = []
-    for scenario, (whole, late, survival) in POLICY_LIMITS.items():
-        if scenario not in scenarios:
-            continue
-        found = scenarios[scenario]
-        about = f"policy, hold, {scenario}, {found['episodes']} flights"
-        rows.append(_survival_row(about, found["survival"], survival))
-        for name, what, limit in (
-            ("altitude_rmse_m", "altitude RMSE", whole),
-            ("late_altitude_rmse_m", "same after 10 s", late),
-        ):
-            if limit is not None:
-                rmse = found.get(name)
-                shown = "crashed" if rmse is None else f"{rmse:.4f} m"
-                rows.append(
-                    (f"{about}: {what}", f"<= {limit:g} m", shown, rmse is not None and rmse <= limit)
+            one = controllers["mppi"]["exact"]
+            name = f"MPPI, ({task}), exact, {one['episodes']} seeds: largest RMSE per axis [m]"
+            found.append(_most(name, one, "rmse_per_axis_worst_m", MPPI_LIMIT[task]))
+        for scenario, one in controllers.get("lqi", {}).items():
+            thesis = one.get("thesis", {}).get("rmse_per_axis_m")
+            if thesis and scenario in ("exact", "calm"):
+                limit = HALF * thesis if scenario == "exact" else WITH_SENSORS.get(task, thesis)
+                found.append(
+                    _most(f"LQI, ({task}), {scenario}: RMSE per axis [m]", one, "rmse_per_axis_m", limit)
                 )
-    return rows
+            if scenario in ("noise", "delay", "late", "light") and task in STEADY:
+                found.append(_alive(f"LQI, {task}, {scenario}", one, SURVIVAL))
+        for scenario, (whole, late, survival) in POLICY_LIMITS.items() if task == HOLD else ():
+            if scenario not in controllers.get("policy", {}):
+                continue
+            one = controllers["policy"][scenario]
+            about = f"policy, hold, {scenario}, {one['episodes']} flights"
+            found.append(_alive(about, one, survival))
+            found.append(_most(f"{about}: altitude RMSE [m]", one, "altitude_rmse_m", whole, lost=True))
+            if late is not None:
+                found.append(
+                    _most(f"{about}: same after 10 s [m]", one, "late_altitude_rmse_m", late, lost=True)
+                )
+    return found
 
 
-def _survival_row(about: str, alive: float | None, least: float) -> tuple[str, str, str, bool]:
-    """Share of flights that must survive; None: they could not be flown."""
-    shown = "not flown" if alive is None else f"{alive:.3f}"
-    return f"{about}: survival", f">= {least:g}", shown, alive is not None and alive >= least
+def _most(name: str, one: Mapping[str, Any], figure: str, limit: float, *, lost: bool = False) -> Check:
+    """An error that must not be larger; unless some may be `lost`, every flight has to survive."""
+    check = Check.most(name, one.get(figure), limit)
+    return replace(check, met=bool(check.met) and (lost or one["survival"] == 1.0))
 
 
-def _mppi_row(task: str, found: dict[str, Any]) -> tuple[str, str, str, bool]:
-    worst, limit = found.get("rmse_per_axis_worst_m"), MPPI_LIMIT[task]
-    alive = found["survival"] == 1.0
-    shown = f"{worst:.4f} m" if worst is not None and alive else "crashed"
-    what = f"MPPI, ({task}), exact, {found['episodes']} seeds: largest RMSE per axis"
-    return what, f"<= {limit:.4f} m", shown, worst is not None and worst <= limit and alive
+def _alive(about: str, one: Mapping[str, Any], least: float) -> Check:
+    """Share of flights that must survive."""
+    check = Check.least(f"{about}: survival", one["survival"], least)
+    return replace(check, met=bool(check.met))
+
+
+def lines(document: Mapping[str, Any]) -> list[str]:
+    """Every figure beside the thesis', then what is required."""
+    found = [
+        f"{document['robot']}, seed {document['seed']}; RMSE per axis in m, of the thesis in brackets (*: crashed)",
+        f"{'task':5} {'by':7} {'scenario':8} {'RMSE':>17} {'worst':>8} {'altitude':>8} {'peak':>7} {'settles':>8} "
+        f"{'energy':>7} {'alive':>6} {'wall s':>7}",
+    ]
+    for task, controllers in document["tasks"].items():
+        for controller, scenarios in controllers.items():
+            for scenario, each in scenarios.items():
+                if "error" in each:
+                    found.append(f"{task:5} {controller:7} {scenario:8} {each['error']}")
+                    continue
+                thesis = each["thesis"].get("rmse_per_axis_m")
+                crash = "*" if each["thesis"].get("crashed") else ""
+                beside = f"({thesis:.3f}{crash})" if thesis is not None else ""
+                found.append(
+                    f"{task:5} {controller:7} {scenario:8} {number(each['rmse_per_axis_m'], 4, '-'):>8}{beside:>9} "
+                    f"{number(each['rmse_per_axis_worst_m'], 4, '-'):>8} {number(each['altitude_rmse_m'], 4, '-'):>8} "
+                    f"{number(each['peak_error_m'], 3, '-'):>7} {number(each['settling_s'], 2, '-'):>8} "
+                    f"{number(each['energy'], 3, '-'):>7} {each['survival']:>6.2f} "
+                    f"{number(each['wall_s'], 1, '-'):>7}"
+                )
+    ground = document["ground_effect"]
+    found.append("mean squared throttle in level flight over height, and of the thesis (Table 5.2):")
+    found += [
+        f"  {height:g} m: {ours:.3f} ({theirs:.3f})"
+        for height, ours, theirs in zip(
+            ground["heights_m"], ground["energy"], ground["thesis_energy"], strict=True
+        )
+    ]
+    found.append(
+        f"energy, the mean squared throttle added up over time, per metre at {ground['heights_m'][0]:g} m [s/m]: "
+        f"{1e3 * ground['energy_per_m']:.3f}e-3 in trim at the task's speed, at least "
+        f"{1e3 * ground['least_energy_per_m']:.3f}e-3, at {ground['least_energy_speed']:.1f} m/s; flown:"
+    )
+    found += [
+        f"  {by}, {scenario}: {1e3 * each['energy_per_m']:.3f}e-3"
+        for by, scenarios in document["tasks"].get("hold", {}).items()
+        for scenario, each in scenarios.items()
+        if each.get("energy_per_m") is not None
+    ]
+    return found

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from fulmar_benchmarks.falcon.cells import reference
+from fulmar_core.simulation.flight_figures import reference
 from fulmar_evaluation.report.style import quiet_grid
 
 COLUMNS = ("height [m]", "to the left [m]", "elevator [deg]", "aileron, rudder (dashed) [deg]", "energy [s]")

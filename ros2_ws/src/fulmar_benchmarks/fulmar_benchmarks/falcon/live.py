@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from fulmar_bags.run_record import read_run
-from fulmar_benchmarks.falcon.cells import figures
 from fulmar_bringup.completion import completed
 from fulmar_bringup.domains import own_domain
 from fulmar_bringup.plan_checks import checked
 from fulmar_bringup.run_executor import execute
 from fulmar_core.config.errors import RunFailed
+from fulmar_core.simulation.flight_figures import flight_figures as figures
 from fulmar_core.simulation.metrics import join
 from fulmar_evaluation.evaluation import Trial, runs_of
 from fulmar_evaluation.run_evaluation import evaluate_run

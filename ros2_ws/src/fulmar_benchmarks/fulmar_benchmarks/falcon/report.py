@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from html import escape
-from pathlib import Path
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from fulmar_benchmarks.falcon.campaign import Flights, requirements
+from fulmar_benchmarks.falcon.campaign import Flights
 from fulmar_benchmarks.falcon.cells import SCENARIOS
 from fulmar_benchmarks.falcon.flight_plots import draw_flights, name_lines
-from fulmar_benchmarks.falcon.tables import lines
-from fulmar_evaluation.report.page import Part, Plot, headline
-from fulmar_evaluation.report.style import house_style, quiet_grid
-from fulmar_evaluation.report.writer import write_benchmark
+from fulmar_evaluation.report.page import Plot
+from fulmar_evaluation.report.style import quiet_grid
 
 _ERRORS = """
 RMSE per axis of each task, median over the flights that survive, by scenario. A cross at the top: none survives. The
@@ -29,20 +26,17 @@ Left: lift and induced drag near the ground over those in free air at the same a
 had other constants."""
 
 
-def write_report(document: dict[str, Any], flights: Flights, out: Path) -> Path:
-    """Write the page and its plots into a folder; arguments as `run_falcon` returns them. Returns the page."""
-    met = requirements(document)
-    with house_style():
-        parts: list[Part] = [headline(f"{sum(good for *_, good in met)} of {len(met)} requirements are met.")]
-        parts.append(Plot("Errors by task", _ERRORS, draw_errors(document), "errors"))
-        if flights:
-            parts.append(Plot("Flights", _FLIGHTS, draw_flights(flights), "flights"))
-        parts.append(Plot("Ground effect", _GROUND, draw_ground(document), "ground_effect"))
-        parts.append("<h2>All figures</h2><pre>" + escape("\n".join(lines(document))) + "</pre>")
-        return write_benchmark(out, f"{document['robot']} over the water", parts)
+def plots(document: Mapping[str, Any], flights: Flights) -> list[Plot]:
+    """What is drawn of a document, and of flights by task and controller."""
+    drawn = [Plot("Flights", _FLIGHTS, draw_flights(flights), "flights")] if flights else []
+    return [
+        Plot("Errors by task", _ERRORS, draw_errors(document), "errors"),
+        *drawn,
+        Plot("Ground effect", _GROUND, draw_ground(document), "ground_effect"),
+    ]
 
 
-def draw_errors(document: dict[str, Any]) -> Figure:
+def draw_errors(document: Mapping[str, Any]) -> Figure:
     """RMSE of every task, one panel for each controller."""
     by: dict[str, dict[str, Any]] = {}
     for task, controllers in document["tasks"].items():
@@ -87,7 +81,7 @@ def draw_errors(document: dict[str, Any]) -> Figure:
     return figure
 
 
-def draw_ground(document: dict[str, Any]) -> Figure:
+def draw_ground(document: Mapping[str, Any]) -> Figure:
     """Ratios near the ground, and energy over height."""
     ground = document["ground_effect"]
     figure = Figure(figsize=(8.4, 3.6), layout="constrained")

@@ -11,7 +11,6 @@ import typer
 from fulmar_benchmarks.catalogue import rows
 from fulmar_cli.commands.benchmark_descent import descent
 from fulmar_cli.commands.benchmark_drift import drift
-from fulmar_cli.commands.benchmark_falcon import falcon
 from fulmar_cli.commands.benchmark_flights import flights
 from fulmar_cli.commands.benchmark_latency import endurance, latency
 from fulmar_cli.commands.benchmark_rans3d import rans3d
@@ -43,7 +42,6 @@ for command in (
     descent,
     drift,
     endurance,
-    falcon,
     flights,
     latency,
     rans3d,
