@@ -11,10 +11,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fulmar_benchmarks.campaign import run
+from fulmar_benchmarks.catalogue import choice
 from fulmar_benchmarks.descent.batch import fly_in_batch
-from fulmar_benchmarks.descent.campaign import requirements, summary
+from fulmar_benchmarks.descent.campaign import Descents, requirements, summary
 from fulmar_benchmarks.descent.flights import KILLED_S, Descent, DescentLog, Flights
 from fulmar_benchmarks.descent.live import fly_in_lockstep
+from fulmar_benchmarks.shape import ALONE
 from fulmar_core.config.errors import ConfigError, UnknownNameError
 from fulmar_core.robots.actuators.refuge import StopAtOnce
 from fulmar_core.robots.robot_file import load_robot
@@ -144,6 +147,23 @@ def test_without_a_controller_the_watchdog_acts_at_the_tick_at_which_it_would_by
     assert moving.index(False) == round(0.2 / dt) + 1  # the first tick beyond the limit
     assert not any(moving[moving.index(False) :])
     assert clock.now_ns - began_ns == round(20e9 * dt)
+
+
+def test_flights_that_were_flown_are_kept_and_a_benchmark_that_was_broken_off_goes_on(tmp_path, monkeypatch):
+    monkeypatch.setattr("fulmar_benchmarks.descent.campaign.POOL", ALONE)  # in this process
+    monkeypatch.setattr(
+        "fulmar_benchmarks.descent.live.fly_in_lockstep", lambda _, number: replace(GOOD, number=number)
+    )
+    given = {"heights": "1", "flights": 2, "through": "batch,lockstep", "jobs": 1}
+    documents, kept = [], []
+    for folder in ("whole", "broken", "broken"):
+        descents = Descents(choice("descent", **given, out=tmp_path / folder))
+        result = run(descents, on_done=lambda cell, figures, before: kept.append(before))
+        documents.append({key: value for key, value in result.document.items() if key != "wall_s"})
+        (tmp_path / folder / "outcomes" / "airship_v7_lqi_1_m_lockstep_1.npz").unlink()
+    assert documents[0] == documents[1] == documents[2]
+    assert kept[-3:] == [True, True, False]
+    assert [check["met"] for check in documents[0]["checks"]] == [True, True]
 
 
 @pytest.mark.slow

@@ -17,10 +17,11 @@ from fulmar_core.worlds.scenario import load_scenario
 
 mujoco = pytest.importorskip("mujoco")
 
+from fulmar_benchmarks.catalogue import rows  # noqa: E402
 from fulmar_benchmarks.jsbsim_pace import JsbsimPace  # noqa: E402
 from fulmar_benchmarks.mujoco_pace import SEED, AfloatPace, MujocoPace  # noqa: E402
 from fulmar_benchmarks.throughput import BatchPace, Library, SharedPace, shared_worlds  # noqa: E402
-from fulmar_cli.commands.benchmark_throughput import throughput  # noqa: E402
+from fulmar_cli.commands.benchmark_row import command_of  # noqa: E402
 from sim_nodes.mujoco_model import Scene  # noqa: E402
 
 BOAT, TASK, RANDOMISED = load_robot("kingfisher"), load_task("go_to_pose"), load_scenario("randomised")
@@ -32,11 +33,31 @@ LIBRARY = {"numpy": ("--library", "numpy"), "compiled": ("--library", "compiled"
 ONE_OR_TWO_CORES = pytest.mark.parametrize("cores", ["1", pytest.param("2", marks=pytest.mark.slow)])
 
 
-@pytest.fixture(scope="module")
-def command():
+@pytest.fixture
+def command(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     app = typer.Typer()
-    app.command()(throughput)
+    app.command()(command_of(rows()["throughput"]))
     return lambda *words, library="numpy": CliRunner().invoke(app, (*words, *LIBRARY[library]))
+
+
+def test_paces_are_measured_again_unless_one_goes_on_with_those_that_are_kept(command):
+    small = (
+        "--robots",
+        "kingfisher,turtlebot2",
+        "--worlds",
+        "6",
+        "--seconds",
+        "0.05",
+        "--cores",
+        "1",
+        "--json",
+    )
+    command(*small[2:], "--robots", "turtlebot2")
+    whole, again = (json.loads(command(*small, "--resume").stdout) for _ in range(2))
+    assert whole["robots"] == again["robots"]
+    assert {"machine", "libraries", "git_revision", "command"} <= set(whole)
+    assert json.loads(command(*small).stdout)["robots"] != whole["robots"]
 
 
 @ONE_OR_TWO_CORES

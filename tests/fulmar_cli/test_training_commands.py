@@ -13,7 +13,8 @@ from typer.testing import CliRunner
 
 pytest.importorskip("stable_baselines3")
 
-from fulmar_cli.commands.benchmark_training import training
+from fulmar_benchmarks.catalogue import rows
+from fulmar_cli.commands.benchmark_row import command_of
 from fulmar_cli.commands.policies import policies
 from fulmar_cli.commands.train import train
 from fulmar_core.config.errors import ConfigError
@@ -23,6 +24,7 @@ from training.progress import LearningBar
 from training.run_folder import learning_in, read_start, write_start
 from training.settings import StopAtSuccess
 
+training = command_of(rows()["training"])
 PLATFORM = ("floating_platform", "go_to_pose")
 
 
@@ -324,3 +326,9 @@ def test_the_comparison_with_stock_ppo_prints_both_and_fails_if_a_run_does(asked
     code, reported = call(training, "--seeds", 2, "--seconds", 8, "--out", tmp_path / "again", "--json")
     assert code == 1
     assert json.loads(reported)["failed"] == ["stock 2: no memory left", "fast 2: no memory left"]
+
+
+def test_runs_that_ended_are_kept_and_those_that_failed_run_again(asked, tmp_path):
+    for more in ((), ("--resume",), ("--resume",)):
+        call(training, "--seeds", 2, "--seconds", 8, "--out", tmp_path, *more)
+    assert [job.seed for job in asked] == [1, 1, 2, 2, 2, 2, 2, 2]

@@ -6,9 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from fulmar_benchmarks.latency.cells import Cell, cells_of, measure
+from fulmar_benchmarks.campaign import run
+from fulmar_benchmarks.catalogue import choice
+from fulmar_benchmarks.latency import cells
+from fulmar_benchmarks.latency.cells import Latency
 from fulmar_benchmarks.latency.endurance import endure
-from fulmar_cli.commands.benchmark_latency import latency
 from fulmar_core.config.errors import ConfigError
 
 real_time = pytest.mark.real_time
@@ -18,15 +20,15 @@ real_time = pytest.mark.real_time
 @pytest.mark.slow
 def test_a_cell_states_latency_errors_of_the_period_and_what_each_node_uses() -> None:
     """rclpy's own executor, whose figures nothing is asked of, at 100 Hz."""
-    figures = measure([Cell(100.0, False, "default")], 1.0, lambda _done: None)
-    (row,) = figures["cells"]
+    cell = cells.LatencyCell(100.0, False, "default", 1.0)
+    row = cell.measure(lambda _done: None)
     assert row["failure"] is None
     assert row["answers"] > 100
     assert 0.0 < row["latency_ms"]["p50"] < 20.0
     assert row["controller_period_error_ms"]["p99"] is not None
     assert set(row["cpu_share"]) == {"plant", "controller", "recorder"}
     assert all(0.0 < share < 1.5 for share in row["cpu_share"].values())
-    assert figures["required"] == []
+    assert cells._required([row]) == []
 
 
 @real_time
@@ -40,12 +42,40 @@ def test_a_long_run_states_growth_of_memory_and_commands_that_the_bag_lacks(tmp_
 
 
 def test_idle_cells_come_first_and_loads_do_not_reach_into_them() -> None:
-    cells = cells_of((5.0, 50.0), ("events", "default"))
-    assert len(cells) == 8
-    assert [cell.loaded for cell in cells] == [False] * 4 + [True] * 4
+    asked = Latency(choice("latency", rates="5,50")).cells()
+    assert len(asked) == 8
+    assert [cell.loaded for cell in asked] == [False] * 4 + [True] * 4
 
 
 @pytest.mark.parametrize("wrong", [{"rates": "0"}, {"rates": "fast"}, {"executors": "mine"}])
 def test_rates_and_executors_that_do_not_exist_are_reported(wrong: dict[str, str]) -> None:
-    with pytest.raises(ConfigError, match=next(iter(wrong))):
-        latency(**{"rates": "50", "seconds": 1.0, "executors": "events", "as_json": False, **wrong})
+    with pytest.raises(ConfigError, match=next(iter(wrong)).removesuffix("s")):
+        choice("latency", **wrong)
+
+
+def test_cells_that_were_measured_are_kept_and_one_that_failed_is_measured_again(
+    tmp_path, monkeypatch
+) -> None:
+    measured: list[float] = []
+
+    def row(cell, seconds, folder):
+        measured.append(cell.hz)
+        if cell.hz == 10.0 and measured.count(10.0) == 1:
+            return {"failure": "it ended", cells.AGAIN: True}
+        spread = {"p50": 1.0, "p99": 2.0, "max": 3.0}
+        return {
+            "failure": None, "latency_ms": spread, "controller_period_error_ms": spread, "watchdog_trips": 0,
+            "cpu_share": dict.fromkeys(cells.NODES, 0.1),
+        }  # fmt: skip
+
+    monkeypatch.setattr(cells, "_row", row)
+    documents = [
+        run(
+            Latency(choice("latency", rates="10,50", executors="events", out=tmp_path, resume=resume))
+        ).document
+        for resume in (False, True, True)
+    ]
+    assert measured == [10.0, 50.0, 10.0, 50.0, 10.0]
+    assert documents[0]["cells"][0]["failure"] == "it ended"
+    assert documents[1]["cells"] == documents[2]["cells"]
+    assert [check["met"] for check in documents[2]["checks"]] == [True, True]

@@ -13,7 +13,7 @@ from typing import Any
 
 from fulmar_benchmarks.outcomes import keep, keys_of, library_version, read
 from fulmar_benchmarks.pool import measure_all
-from fulmar_benchmarks.shape import Benchmark, Cell, Figures, Found, tally
+from fulmar_benchmarks.shape import AGAIN, Benchmark, Cell, Figures, Found, tally
 from fulmar_core.config.atomic_write import whole_file
 from fulmar_core.config.provenance import fulmar_version, git_revision
 
@@ -116,7 +116,7 @@ def measured(
     total = sum(cell.cost for cell in left)
 
     def note(cell: Cell, figures: Figures | str) -> None:
-        if not isinstance(figures, str):
+        if not isinstance(figures, str) and not figures.pop(AGAIN, False):
             figures = keep(folder / f"{cell.name}.npz", keys[cell.name], figures)
         found[cell.name] = figures
         on_done(cell, figures, False)

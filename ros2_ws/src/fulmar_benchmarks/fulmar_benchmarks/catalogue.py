@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib import import_module
@@ -40,6 +41,7 @@ class Selector:
         None  # its value is numbers from one to the other, with commas between
     )
     names: tuple[str, ...] = ()
+    positional: bool = False
 
     def read(self, value: Any) -> Any:
         """The value of a choice, from what was given.
@@ -107,8 +109,9 @@ class Row:
     needs: Callable[[Choice], Sequence[str]] = lambda choice: ()  # modules of extras
     shared: Sequence[str] = ("seed", "jobs", "resume", "report", "check")  # of SHARED, beside out
     always_checked: bool = False  # it ends with code 1 even without `--check`
-    out: str = ""  # folder; runs/benchmark/NAME by default
-    measures: str = "measuring"  # beside the bar
+    timed: bool = False  # its figures are times: they are measured again unless one says `--resume`
+    dated: bool = False  # its folder is a new one each time: runs/benchmark/TIME_NAME
+    measures: str = "measuring"  # beside the bar; empty: it has bars of its own
 
     def load(self) -> type[Benchmark]:
         """Import it."""
@@ -160,9 +163,11 @@ def choice(name: str, **given: Any) -> Choice:
         if option not in (*own, *SHARED, "command"):
             raise ConfigError(no_such_selector(name, option))
     values = {**{each.name: each.default for each in SHARED.values()}, "command": ""}
+    values |= {"resume": not row.timed, "report": "report" in row.shared}
     values |= {each.name: each.default for each in row.selectors} | given
     values |= {option: each.read(values[option]) for option, each in own.items()}
-    values["out"] = Path(values["out"] or row.out or f"runs/benchmark/{name}")
+    new = f"{time.strftime('%Y%m%d_%H%M%S')}_" if row.dated else ""
+    values["out"] = Path(values["out"] or f"runs/benchmark/{new}{name}")
     return Choice(**values, fresh=not values["resume"])
 
 
@@ -185,4 +190,9 @@ def no_such_selector(name: str, option: str) -> str:
 
 def spellings(row: Row) -> list[str]:
     """Selectors of a benchmark as options."""
-    return [name for each in row.selectors for name in each.names or (f"--{each.name.replace('_', '-')}",)]
+    return [
+        name
+        for each in row.selectors
+        if not each.positional
+        for name in each.names or (f"--{each.name.replace('_', '-')}",)
+    ]

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 POOL, ALONE, ROS = "pool", "alone", "ros"  # where a cell is measured; `ros`: on the workers of `ros_pool`
 Choice = SimpleNamespace  # what one run is asked for, by the names of `catalogue.Row.selectors` and `catalogue.SHARED`
 Figures = dict[str, Any]  # JSON-ready, but that values may be arrays
+AGAIN = "again"  # key of figures that are not kept, as one of the runs in them failed
 Found = Mapping[str, Figures | str]  # by name of a cell; a sentence where it could not be measured
 Progress = Callable[[float], None]  # how much of the cost of a cell is done
 

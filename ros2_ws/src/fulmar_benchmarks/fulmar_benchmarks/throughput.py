@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import multiprocessing
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
@@ -32,6 +32,7 @@ from fulmar_core.tasks import Task
 from fulmar_core.worlds.scenario import Scenario
 
 # What is timed beside the batch, and the name of the ratio to it.
+ROUNDS = 5  # measurements of each, in turns
 MUJOCO, IN_WATER, BY_EULER, JSBSIM = "mujoco", "mujoco_with_water", "mujoco_euler", "jsbsim"
 RATIOS = {
     MUJOCO: "ratio",
@@ -229,64 +230,60 @@ def shared_worlds(
 
 
 def measure(
-    pairs: Sequence[tuple[Robot, Task]],
+    robot: Robot,
+    task: Task,
     scenario: Scenario,
     *,
     worlds: int,
     library: Library,
     cores: int,
     seconds: float,
-    rounds: int,
-    progress: Callable[[], None] = lambda: None,
-) -> dict[str, dict[str, Any]]:
-    """Measure robots one after another.
+    progress: Callable[[float], None] = lambda rounds: None,
+) -> dict[str, Any]:
+    """Measure one robot, in turns with what else moves it.
 
     Args:
-        pairs: Which, and what the batch of each plays.
+        robot: Which.
+        task: What the batch plays.
         scenario: What its worlds are drawn from.
         worlds: Of the batch, >= 1.
         library: Of the batch.
         cores: Processes of the batch and of JSBSim, and threads of MuJoCo's rollout.
         seconds: Of each measurement [s].
-        rounds: Measurements of each, in turns.
-        progress: Called after every round.
+        progress: Called after every round, with how many are over.
 
     Returns:
-        For each robot's name its `task` and medians: `batch_steps_per_s`, `<other>_steps_per_s` of what else moves it,
-        and its ratio to that, by the names of `RATIOS`; with MuJoCo also `mujoco_integrator` and `mujoco_step_s`.
+        Its `task` and medians of `ROUNDS` measurements: `batch_steps_per_s`, `<other>_steps_per_s` of what else moves
+        it, and its ratio to that, by the names of `RATIOS`; with MuJoCo also `mujoco_integrator` and `mujoco_step_s`.
         Aircraft fly in JSBSim in MuJoCo's place, which has no air of theirs.
     """
-    found: dict[str, dict[str, Any]] = {}
     with ExitStack() as stack:
-        shared = None
+        batch: Pace
         if library.device == "cpu" and cores > 1:
             shared = SharedPace(min(cores, worlds))
             stack.callback(shared.close)
-        for robot, task in pairs:
-            if shared is not None:
-                shared.take(
-                    shared_worlds(
-                        robot, task, scenario, worlds=worlds, library=library, processes=len(shared)
-                    )
-                )
-            batch = shared or BatchPace(robot, task, scenario, worlds=worlds, library=library)
-            with ExitStack() as peers:
-                others = _others(robot, task, scenario, worlds=worlds, cores=cores, stack=peers)
-                paces = [batch, *others.values()]
-                for pace in paces:
-                    pace.steps_per_s(0.3 * seconds)  # caches and thread pools warm up
-                measured = []
-                for _ in range(rounds):
-                    measured.append([pace.steps_per_s(seconds) for pace in paces])
-                    progress()
-            ours, *theirs = (float(value) for value in np.median(np.array(measured), axis=0))
-            figures: dict[str, Any] = {"task": task.name, "batch_steps_per_s": ours}
-            for (name, pace), its in zip(others.items(), theirs, strict=True):
-                figures |= {f"{name}_steps_per_s": its, RATIOS[name]: ours / its}
-                if name == MUJOCO and isinstance(pace, MujocoPace):
-                    figures |= {"mujoco_integrator": pace.integrator, "mujoco_step_s": pace.step_s}
-            found[robot.name] = figures
-    return found
+            parts = shared_worlds(
+                robot, task, scenario, worlds=worlds, library=library, processes=len(shared)
+            )
+            shared.take(parts)
+            batch = shared
+        else:
+            batch = BatchPace(robot, task, scenario, worlds=worlds, library=library)
+        others = _others(robot, task, scenario, worlds=worlds, cores=cores, stack=stack)
+        paces = [batch, *others.values()]
+        for pace in paces:
+            pace.steps_per_s(0.3 * seconds)  # caches and thread pools warm up
+        measured = []
+        for done in range(ROUNDS):
+            measured.append([pace.steps_per_s(seconds) for pace in paces])
+            progress(float(done + 1))
+    ours, *theirs = (float(value) for value in np.median(np.array(measured), axis=0))
+    figures: dict[str, Any] = {"task": task.name, "batch_steps_per_s": ours}
+    for (name, pace), its in zip(others.items(), theirs, strict=True):
+        figures |= {f"{name}_steps_per_s": its, RATIOS[name]: ours / its}
+        if name == MUJOCO and isinstance(pace, MujocoPace):
+            figures |= {"mujoco_integrator": pace.integrator, "mujoco_step_s": pace.step_s}
+    return figures
 
 
 def _others(

@@ -2,78 +2,150 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from fulmar_benchmarks.descent.flights import MOST_BANK_DEG, MOST_SINK, SHARE, Descent, Flights
-from fulmar_benchmarks.workers import mapped
-from fulmar_bringup.console import log_line
+from fulmar_benchmarks.descent.flights import MOST_BANK_DEG, MOST_SINK, SHARE, TASK, Descent, Flights
+from fulmar_benchmarks.pairs import policy_hash
+from fulmar_benchmarks.shape import ALONE, POOL, Benchmark, Cell, Check, Choice, Figures, Found, Progress
+from fulmar_benchmarks.tables import number
 
 BATCH, LOCKSTEP, REAL_TIME = WAYS = ("batch", "lockstep", "realtime")
-Progress = Callable[[float, float], None]
 
 
 @dataclass(frozen=True)
-class Request:
-    """What to fly."""
+class DescentCell(Cell):
+    """Flights of one height in the batch, or one of them through ROS."""
 
-    flights: tuple[Flights, ...]  # of each height
-    ways: tuple[str, ...]  # out of WAYS
-    real_time: int  # flights in real time at each height
-    jobs: int  # flights in lock step at once
+    modules = tuple(f"{__package__}.{name}" for name in ("batch", "flights", "live"))
+    flights: Flights
+    through: str  # one of WAYS
+    number: int = -1  # of the flight; -1: all of them
 
+    @property
+    def name(self) -> str:
+        """File name without suffix."""
+        number = "" if self.number < 0 else f"_{self.number}"
+        return (
+            f"{self.flights.robot}_{self.flights.controller}_{self.flights.height:g}_m_{self.through}{number}"
+        )
 
-def run_descents(request: Request, progress: Progress) -> dict[str, Any]:
-    """Fly everything; figures by height and way, ready for JSON.
+    @property
+    def where(self) -> str:
+        """Flights in real time need the whole computer."""
+        return ALONE if self.through == REAL_TIME else POOL
 
-    Raises:
-        FulmarError: A robot that does not fly, or no such controller.
-    """
-    heights = []
-    for done, flights in enumerate(request.flights):
-        row: dict[str, Any] = {"height_m": flights.height}
-        for part, way in enumerate(request.ways):
+    @property
+    def way(self) -> str:
+        """Through ROS all of Fulmar counts."""
+        return "batch" if self.through == BATCH else "ros"
 
-            def moved(now: float, total: float, whole: float = done + part / len(request.ways)) -> None:
-                progress(whole + now / max(total, 1.0) / len(request.ways), float(len(request.flights)))
+    def parts(self) -> dict[str, Any]:
+        """A bundle counts by what is in it; through ROS how many fly besides does not count."""
+        its = self.flights
+        policy, count = policy_hash(its.robot, TASK, its.controller, its.policy), max(self.number, its.count)
+        flights = asdict(replace(its, policy=policy, count=count if self.number < 0 else 0))
+        return {"flights": flights, "through": self.through, "number": self.number}
 
-            row[way] = summary(_fly(flights, way, request, moved))
-            log_line(words(row, way))  # an interrupted benchmark has said what it knows
-        heights.append(row)
-    first = request.flights[0]
-    rows = requirements(heights)
-    return {
-        "robot": first.robot,
-        "controller": first.controller,
-        "scenario": first.scenario,
-        "seed": first.seed,
-        "heights": heights,
-        "required": rows,
-        "passed": all(row["passed"] for row in rows),
-    }
+    def measure(self, progress: Progress, pool: Any = None) -> Figures:
+        """Each flight as `Descent`."""
+        if self.through == BATCH:
+            from fulmar_benchmarks.descent.batch import fly_in_batch
 
+            return {"flown": [asdict(each) for each in fly_in_batch(self.flights)]}
+        from fulmar_benchmarks.descent.live import fly_in_lockstep, fly_in_real_time
 
-def _fly(flights: Flights, way: str, request: Request, progress: Progress) -> list[Descent | str]:
-    if way == BATCH:
-        from fulmar_benchmarks.descent.batch import fly_in_batch
-
-        return list(fly_in_batch(flights))
-    count, jobs = (request.real_time, 1) if way == REAL_TIME else (flights.count, request.jobs)
-    items = [(flights, number, way) for number in range(count)]
-    return mapped(_flown, items, jobs=max(1, min(jobs, count)), progress=progress)
+        fly = fly_in_lockstep if self.through == LOCKSTEP else fly_in_real_time
+        return {"flown": [asdict(fly(self.flights, self.number))]}
 
 
-def _flown(flights: Flights, number: int, way: str) -> Descent | str:
-    """One flight through ROS, in a process of a pool; a sentence where it could not be flown."""
-    from fulmar_benchmarks.descent.live import fly_in_lockstep, fly_in_real_time
+class Descents(Benchmark):
+    """Flights at every height, in the batch, through ROS in lock step, and in real time."""
 
-    try:
-        return (fly_in_lockstep if way == LOCKSTEP else fly_in_real_time)(flights, number)
-    except Exception as error:  # noqa: BLE001 - one flight that cannot be flown must not cost the others
-        return f"flight {number}: {type(error).__name__}: {error}"
+    name = "descent"
+    title = "Aircraft whose controller is killed"
+
+    def __init__(self, choice: Choice) -> None:
+        """Flights of each height."""
+        super().__init__(choice)
+        folder = str(choice.policy.absolute()) if choice.policy else ""
+        self._flights = [
+            Flights(
+                choice.robot, choice.controller, height, choice.flights, choice.seed, choice.scenario, folder
+            )
+            for height in choice.heights
+        ]
+
+    def check(self) -> None:
+        """Refuse what cannot be flown."""
+        for flights in self._flights:
+            flights.check()
+
+    def cells(self) -> list[DescentCell]:
+        """Every height in every way."""
+        return [
+            cell
+            for flights in self._flights
+            for way in self.choice.through
+            for cell in self._of(flights, way)
+        ]
+
+    def _of(self, flights: Flights, way: str) -> list[DescentCell]:
+        if way == BATCH:
+            return [DescentCell(flights, way)]
+        count = self.choice.real_time if way == REAL_TIME else flights.count
+        return [DescentCell(flights, way, number) for number in range(count)]
+
+    def document(self, found: Found) -> dict[str, Any]:
+        """Figures by height and way."""
+        heights = [
+            {"height_m": flights.height}
+            | {way: summary(_descents(self._of(flights, way), found)) for way in self.choice.through}
+            for flights in self._flights
+        ]
+        rows = requirements(heights)
+        return {
+            **{key: getattr(self.choice, key) for key in ("robot", "controller", "scenario", "seed")},
+            "heights": heights,
+            "required": rows,
+            "passed": all(row["passed"] for row in rows),
+        }
+
+    def checks(self, document: Mapping[str, Any]) -> list[Check]:
+        """Shares of good flights."""
+        return [
+            Check(
+                row["what"],
+                row["good"] / row["flights"] if row["flights"] else None,
+                row["limit"],
+                row["passed"],
+            )
+            for row in document["required"]
+        ]
+
+    def tables(self, document: Mapping[str, Any]) -> list[str]:
+        """Every flight, then the figures of each height and way, then what is required."""
+        return [*lines(document), *self.check_lines(document)]
+
+    def said(self, cell: Cell, figures: Figures) -> str:
+        """How many flights were good."""
+        good = sum(Descent(**each).good for each in figures["flown"])
+        return f"{good} of {len(figures['flown'])} good"
+
+
+def _descents(cells: Sequence[DescentCell], found: Found) -> list[Descent | str]:
+    """What came of each flight; a sentence where it could not be flown."""
+    flown: list[Descent | str] = []
+    for cell in cells:
+        each = found[cell.name]
+        if isinstance(each, str):
+            flown.append(f"flight {cell.number}: {each}")
+        else:
+            flown += [Descent(**one) for one in each["flown"]]
+    return flown
 
 
 def summary(found: Sequence[Descent | str]) -> dict[str, Any]:
@@ -93,19 +165,16 @@ def summary(found: Sequence[Descent | str]) -> dict[str, Any]:
     }
 
 
-def words(row: dict[str, Any], way: str) -> str:
+def words(row: Mapping[str, Any], way: str) -> str:
     """Figures of one height and way, in a line."""
     found = row[way]
-    return (
-        f"{way:8} {row['height_m']:g} m: {found['good']} of {found['flights']} good, bank at most "
-        f"{written(found['bank_max_deg'])} deg, sink at touch-down {written(found['sink_median_m_s'])} m/s, at most "
-        f"{written(found['sink_max_m_s'])} m/s"
+    bank, median, most = (
+        number(found[key], 2, "-") for key in ("bank_max_deg", "sink_median_m_s", "sink_max_m_s")
     )
-
-
-def written(value: float | None) -> str:
-    """A number, or a dash."""
-    return "-" if value is None else f"{value:.2f}"
+    return (
+        f"{way:8} {row['height_m']:g} m: {found['good']} of {found['flights']} good, bank at most {bank} deg, sink at "
+        f"touch-down {median} m/s, at most {most} m/s"
+    )
 
 
 def requirements(heights: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
@@ -122,3 +191,19 @@ def requirements(heights: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
         for way in WAYS
         if way in row
     ]
+
+
+def lines(document: Mapping[str, Any]) -> list[str]:
+    """Every flight, then the figures of each height and way."""
+    found = [
+        f"{document['robot']} by {document['controller']}, {document['scenario']}, seed {document['seed']}"
+    ]
+    for row in document["heights"]:
+        for way in (way for way in WAYS if way in row):
+            found += [
+                f"  {way:8} {row['height_m']:g} m, flight {each['number']:3}: bank {each['bank_deg']:5.2f} deg, "
+                f"sink {number(each['sink_m_s'], 2, '-')} m/s after {each['seconds']:.1f} s"
+                for each in row[way]["each"]
+            ]
+            found += [f"  {way:8} {row['height_m']:g} m, {sentence}" for sentence in row[way]["not_flown"]]
+    return found + [words(row, way) for row in document["heights"] for way in WAYS if way in row]

@@ -3,24 +3,42 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from fulmar_bags.run_record import read_run
+from fulmar_benchmarks.pairs import policy_hash
+from fulmar_benchmarks.shape import (
+    ALONE,
+    POOL,
+    ROS,
+    Benchmark,
+    Cell,
+    Check,
+    Choice,
+    Figures,
+    Found,
+    Progress,
+    known,
+)
+from fulmar_benchmarks.tables import number
 from fulmar_bringup.completion import completed
 from fulmar_bringup.domains import own_domain
 from fulmar_bringup.plan_checks import checked
 from fulmar_bringup.run_executor import execute
 from fulmar_core.config.errors import RunFailed
-from fulmar_core.simulation.flight_figures import flight_figures as figures
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.simulation.flight_figures import flight_figures
 from fulmar_core.simulation.metrics import join
+from fulmar_core.tasks import load_task
 from fulmar_evaluation.evaluation import Trial, runs_of
 from fulmar_evaluation.run_evaluation import evaluate_run
 from fulmar_evaluation.run_summary import summarise
+from fulmar_evaluation.trial_plan import plan_trial
+from policy_server.controllers import usual_hz
 
-Progress = Callable[[float, float], None]
 ALTITUDE = "altitude_rmse_m"
 APART_M = 0.02  # figures through nodes may differ so much from those of the batch
 PERIOD_MS = 3.0  # limit of the 99th percentile of the control period's error, in real time
@@ -28,69 +46,134 @@ SHOWN = (ALTITUDE, "late_altitude_rmse_m", "rmse_per_axis_m", "peak_error_m", "s
 
 
 @dataclass(frozen=True)
-class LiveRequest:
-    """What to fly."""
+class LiveCell(Cell):
+    """The same flights in one way."""
 
-    trial: Trial  # through ros: the flights in lock step
-    real_time: int  # flights by the clock
+    modules = (f"{__package__}.cells",)
+    trial: Trial
+    way_of_flying: str  # batch, lockstep, or realtime: one flight, with its twin in the batch
+
+    @property
+    def name(self) -> str:
+        """File name without suffix."""
+        plan = self.trial.plan
+        seed = f"_{plan.seed}" if self.way_of_flying == "realtime" else ""
+        return f"{plan.robot}_{plan.task}_{plan.controller}_{self.way_of_flying}{seed}"
+
+    @property
+    def where(self) -> str:
+        """Flights in real time need the whole computer."""
+        return {"batch": POOL, "lockstep": ROS, "realtime": ALONE}[self.way_of_flying]
+
+    @property
+    def way(self) -> str:
+        """Through ROS all of Fulmar counts."""
+        return "batch" if self.way_of_flying == "batch" else "ros"
+
+    @property
+    def cost(self) -> float:
+        """In control steps through ROS."""
+        steps = self.trial.episodes * round(self.trial.plan.duration_s * self.trial.plan.control_hz)
+        return steps * (0.01 if self.way_of_flying == "batch" else 1.0)
+
+    def parts(self) -> dict[str, Any]:
+        """A bundle counts by what is in it."""
+        plan = self.trial.plan
+        policy = policy_hash(plan.robot, plan.task, plan.controller, plan.policy)
+        return {"plan": asdict(replace(plan, policy=policy)), "episodes": self.trial.episodes}
+
+    def measure(self, progress: Progress, pool: Any = None) -> Figures:
+        """Figures of the way; of a flight in real time those of its twin, too."""
+        if self.way_of_flying == "lockstep":
+            return _flown(self.trial, progress, pool)
+        batch = _flown(replace(self.trial, through="batch"))
+        return batch if self.way_of_flying == "batch" else {**_by_the_clock(self.trial), "batch": batch}
 
 
-def fly_live(request: LiveRequest, progress: Progress) -> dict[str, Any]:
-    """Fly everything; figures by way, ready for JSON.
+class LiveFlights(Benchmark):
+    """Flights in the batch, through nodes in lock step, and in real time."""
 
-    Raises:
-        RunFailed: A controller ended, or refused to start.
-        LockstepError: One did not answer in time.
-    """
-    trial, plan = request.trial, request.trial.plan
-    steps = trial.episodes * round(plan.duration_s * plan.control_hz)
-    clocked = request.real_time * round(plan.duration_s * plan.control_hz)
-    total = float(steps + clocked)
-    batch = _flown(replace(trial, through="batch"))
-    lockstep = _flown(trial, lambda done: progress(float(done), total))
-    clock = []
-    for number in range(request.real_time):
-        seed = plan.seed + number
-        twin = _flown(replace(trial, through="batch", episodes=1, plan=replace(plan, seed=seed)))
-        clock.append({"seed": seed, **_by_the_clock_or_error(trial, seed), "batch": twin})
-        progress(steps + clocked * (number + 1) / request.real_time, total)
-    required = requirements(batch, lockstep, clock)
-    return {
-        "robot": plan.robot,
-        "task": plan.task,
-        "controller": plan.controller,
-        "control_hz": plan.control_hz,
-        "scenario": plan.scenario,
-        "seed": plan.seed,
-        "episode_s": plan.duration_s,
-        "episodes": trial.episodes,
-        "batch": batch,
-        "lockstep": lockstep,
-        "realtime": clock,
-        "required": required,
-        "passed": all(row["passed"] for row in required),
-    }
+    name = "flights"
+    title = "Flights through nodes beside the batch"
+
+    def __init__(self, choice: Choice) -> None:
+        """Plan the flights in lock step.
+
+        Raises:
+            ConfigError: There is no such robot, task or controller, or one does not fit.
+        """
+        super().__init__(choice)
+        hz = choice.control_hz or usual_hz(
+            choice.controller, load_robot(choice.robot), load_task(choice.task), choice.policy
+        )
+        self._trial = plan_trial(
+            robot=choice.robot, task=choice.task, controller=choice.controller, policy=choice.policy, through="ros",
+            episodes=choice.episodes, seed=choice.seed, scenario=choice.scenario, control_hz=hz, jobs=choice.jobs,
+            episode_s=choice.episode_s, steps=None, worlds=None, bounds=None,
+        )  # fmt: skip
+
+    def cells(self) -> list[LiveCell]:
+        """Batch, lock step, and each flight in real time."""
+        plan, seeds = self._trial.plan, range(self.choice.seed, self.choice.seed + self.choice.real_time)
+        ones = [replace(self._trial, episodes=1, plan=replace(plan, seed=seed)) for seed in seeds]
+        return [
+            LiveCell(self._trial, "batch"),
+            LiveCell(self._trial, "lockstep"),
+            *(LiveCell(one, "realtime") for one in ones),
+        ]
+
+    def document(self, found: Found) -> dict[str, Any]:
+        """Figures by way."""
+        batch, lockstep, *ones = self.cells()
+        plan = self._trial.plan
+        clock = [{"seed": one.trial.plan.seed, **_or_error(found[one.name])} for one in ones]
+        figures = known(found, batch.name), known(found, lockstep.name)
+        required = requirements(*figures, clock)
+        return {
+            **{
+                key: getattr(plan, key)
+                for key in ("robot", "task", "controller", "control_hz", "scenario", "seed")
+            },
+            "episode_s": plan.duration_s,
+            "episodes": self._trial.episodes,
+            "batch": figures[0],
+            "lockstep": figures[1],
+            "realtime": clock,
+            "required": required,
+            "passed": all(row["passed"] for row in required),
+        }
+
+    def checks(self, document: Mapping[str, Any]) -> list[Check]:
+        """What is required of figures through nodes."""
+        return [
+            Check(row["what"], row["value"], row["limit"], row["passed"], "less")
+            for row in document["required"]
+        ]
+
+    def tables(self, document: Mapping[str, Any]) -> list[str]:
+        """Figures of every way, and what is required."""
+        return [*lines(document), *self.check_lines(document)]
+
+    def said(self, cell: Cell, figures: Figures) -> str:
+        """Its altitude."""
+        return f"altitude RMSE {number(figures[ALTITUDE], 4, '-')} m"
 
 
-def _flown(trial: Trial, progress: Callable[[int], None] = lambda steps: None) -> dict[str, Any]:
-    found = figures(join(list(runs_of(trial, progress))), trial.plan.task.removeprefix("fly_"), trial.robot)
+def _flown(trial: Trial, progress: Progress = lambda steps: None, pool: Any = None) -> Figures:
+    runs = join(list(runs_of(trial, progress, pool=pool)))
+    found = flight_figures(runs, trial.plan.task.removeprefix("fly_"), trial.robot)
     return {name: found[name] for name in SHOWN}
 
 
-def _by_the_clock_or_error(trial: Trial, seed: int) -> dict[str, Any]:
-    """As `_by_the_clock`; of a run that failed `error`, which keeps what others have flown."""
-    try:
-        return _by_the_clock(trial, seed)
-    except RunFailed as error:
-        return {
-            **dict.fromkeys(SHOWN),
-            "survival": 0.0,
-            "period_error_ms": {"p99": None},
-            "error": str(error),
-        }
+def _or_error(figures: Figures | str) -> dict[str, Any]:
+    """Figures of a flight in real time; of one that failed `error`, which keeps what others have flown."""
+    if not isinstance(figures, str):
+        return figures
+    lost = {**dict.fromkeys(SHOWN), "survival": 0.0, "period_error_ms": {"p99": None}}
+    return {**lost, "error": figures, "batch": dict.fromkeys(SHOWN)}
 
 
-def _by_the_clock(trial: Trial, seed: int) -> dict[str, Any]:
+def _by_the_clock(trial: Trial) -> Figures:
     """One flight in real time, as `fulmar run` does it, with its bag."""
     plan = trial.plan
     with tempfile.TemporaryDirectory(prefix="fulmar_", ignore_cleanup_errors=True) as folder, own_domain():
@@ -98,7 +181,6 @@ def _by_the_clock(trial: Trial, seed: int) -> dict[str, Any]:
             plan,
             start=(),
             lockstep=False,
-            seed=seed,
             record=str(Path(folder) / "bag"),
             command="fulmar benchmark flights",
         )
@@ -107,8 +189,8 @@ def _by_the_clock(trial: Trial, seed: int) -> dict[str, Any]:
         record = read_run(Path(asked.record))
         result, summary = evaluate_run(record), summarise(record)
     if execution.failure or result is None:
-        raise RunFailed(f"flight of seed {seed}: {execution.failure or 'nothing of it was recorded'}")
-    found = figures(result.run, plan.task.removeprefix("fly_"), trial.robot)
+        raise RunFailed(f"flight of seed {plan.seed}: {execution.failure or 'nothing of it was recorded'}")
+    found = flight_figures(result.run, plan.task.removeprefix("fly_"), trial.robot)
     return {
         **{name: found[name] for name in SHOWN},
         "period_error_ms": summary["period_error_ms"],
@@ -145,29 +227,21 @@ def requirements(
     return rows
 
 
-def print_live(document: dict[str, Any], write: Callable[[str], None]) -> None:
-    """Print the figures of every way, and what is required."""
-    write(
-        f"{document['robot']}, {document['task']} by {document['controller']} at {document['control_hz']:g} Hz, "
-        f"{document['episode_s']:g} s, {document['scenario']}, seed {document['seed']}"
-    )
-    write(f"{'':24} {'altitude RMSE':>14} {'after 10 s':>11} {'peak':>7} {'alive':>6} {'period p99':>11}")
+def lines(document: Mapping[str, Any]) -> list[str]:
+    """Figures of every way."""
     ways = [("batch", document["batch"]), ("lock step", document["lockstep"])]
     ways += [(f"real time, seed {each['seed']}", each) for each in document["realtime"]]
-    for name, found in ways:
-        period = found.get("period_error_ms", {}).get("p99")
-        write(
-            f"{name:24} {_number(found[ALTITUDE]):>12} m {_number(found['late_altitude_rmse_m']):>9} m "
-            f"{_number(found['peak_error_m']):>5} m {found['survival']:>6.2f} {_number(period):>8} ms"
+    found = [
+        f"{document['robot']}, {document['task']} by {document['controller']} at {document['control_hz']:g} Hz, "
+        f"{document['episode_s']:g} s, {document['scenario']}, seed {document['seed']}",
+        f"{'':24} {'altitude RMSE':>14} {'after 10 s':>11} {'peak':>7} {'alive':>6} {'period p99':>11}",
+    ]
+    for name, each in ways:
+        period = each.get("period_error_ms", {}).get("p99")
+        figures = [number(each[key], 4, "-") for key in (ALTITUDE, "late_altitude_rmse_m", "peak_error_m")]
+        found.append(
+            f"{name:24} {figures[0]:>12} m {figures[1]:>9} m {figures[2]:>5} m {each['survival']:>6.2f} "
+            f"{number(period, 4, '-'):>8} ms"
         )
-        if "error" in found:
-            write(f"{'':24} {found['error']}")
-    for row in document["required"]:
-        write(
-            f"{'met' if row['passed'] else 'NOT MET':8} {row['what']}: {_number(row['value'])} "
-            f"(limit {row['limit']:g})"
-        )
-
-
-def _number(value: float | None) -> str:
-    return "-" if value is None else f"{value:.4f}"
+        found += [f"{'':24} {each['error']}"] if "error" in each else []
+    return found

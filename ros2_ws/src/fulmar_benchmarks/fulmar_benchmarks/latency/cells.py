@@ -9,63 +9,115 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from fulmar_benchmarks.latency.watched_system import REPORT_S, plan_at, watched_system
+from fulmar_benchmarks.shape import AGAIN, ALONE, Benchmark, Cell, Check, Figures, Found, Progress, known
+from fulmar_benchmarks.tables import Entry, Row, Shown, Table, number
 from fulmar_core.config.errors import RunFailed
 from fulmar_ros.runtime import EXECUTOR
 
-RATES_HZ = (5.0, 10.0, 20.0, 50.0, 100.0, 200.0)
+EXECUTORS = ("events", "default")
 REQUIRED_HZ, REQUIRED_P99_MS = 50.0, 3.0
 
 
 @dataclass(frozen=True)
-class Cell:
+class LatencyCell(Cell):
     """What is measured together."""
 
+    modules = (f"{__package__}.watched_system",)
     hz: float  # steps and commands a second
     loaded: bool  # every core has a busy process of ordinary priority besides
     executor: str  # events, or default: that of rclpy
+    seconds: float = 1.0  # after it has begun to act [s]
 
+    @property
+    def name(self) -> str:
+        """File name without suffix."""
+        return f"{self.executor}_{self.hz:g}_hz_{'loaded' if self.loaded else 'idle'}"
 
-def cells_of(rates_hz: tuple[float, ...], executors: tuple[str, ...]) -> list[Cell]:
-    """Every combination, the idle ones first."""
-    return [
-        Cell(hz, loaded, executor)
-        for loaded, executor, hz in itertools.product((False, True), executors, rates_hz)
-    ]
+    @property
+    def where(self) -> str:
+        """It needs the whole computer."""
+        return ALONE
 
+    @property
+    def way(self) -> str:
+        """Through ROS all of Fulmar counts."""
+        return "ros"
 
-def measure(cells: list[Cell], seconds: float, progress: Callable[[int], None]) -> dict[str, Any]:
-    """Measure cell by cell.
-
-    Args:
-        cells: Which.
-        seconds: Of each, after it has begun to act [s].
-        progress: Called with how many are over.
-
-    Returns:
-        Figures by name, ready for JSON.
-    """
-    rows = []
-    for count, cell in enumerate(cells, 1):
+    def measure(self, progress: Progress, pool: Any = None) -> Figures:
+        """Spreads of latency and periods, and what the nodes use; `failure` where a node ended."""
         with tempfile.TemporaryDirectory(prefix="fulmar_", ignore_cleanup_errors=True) as folder:
-            rows.append(asdict(cell) | _row(cell, seconds, Path(folder)))
-        progress(count)
-    required = _required(rows)
-    return {
-        "seconds": seconds,
-        "cores": len(os.sched_getaffinity(0)),
-        "cells": rows,
-        "required": required,
-        "passed": all(line["passed"] for line in required),
-    }
+            its = {key: value for key, value in asdict(self).items() if key != "seconds"}
+            return its | _row(self, self.seconds, Path(folder))
 
 
-def _row(cell: Cell, seconds: float, folder: Path) -> dict[str, Any]:
+class Latency(Benchmark):
+    """How late commands come at several rates."""
+
+    name = "latency"
+    title = "From state to command"
+    width = 150
+
+    def cells(self) -> list[LatencyCell]:
+        """Every combination, the idle ones first."""
+        each = itertools.product((False, True), self.choice.executors, self.choice.rates)
+        return [LatencyCell(hz, loaded, executor, self.choice.seconds) for loaded, executor, hz in each]
+
+    def document(self, found: Found) -> dict[str, Any]:
+        """Figures by cell."""
+        rows = [known(found, cell.name) for cell in self.cells()]
+        required = _required(rows)
+        return {
+            "seconds": self.choice.seconds,
+            "cores": len(os.sched_getaffinity(0)),
+            "cells": rows,
+            "required": required,
+            "passed": all(line["passed"] for line in required),
+        }
+
+    def checks(self, document: Mapping[str, Any]) -> list[Check]:
+        """At 50 Hz."""
+        return [
+            Check(row["what"], row["value"], row["limit"], row["passed"], "less")
+            for row in document["required"]
+        ]
+
+    def tables(self, document: Mapping[str, Any]) -> list[Shown]:
+        """A row for each cell."""
+        title = f"from state to command, {document['seconds']:g} s each, {document['cores']} cores"
+        rows = [Row(tuple(map(Entry, _written(row)))) for row in document["cells"]]
+        return [Table(title, HEADS, rows, words=2), *self.check_lines(document)]
+
+    def said(self, cell: LatencyCell, figures: Figures) -> str:
+        """Its latency."""
+        return figures["failure"] or f"p99 {number(figures['latency_ms']['p99'], 2, '-')} ms"
+
+
+NODES = ("plant", "controller", "recorder")
+HEADS = (
+    "load", "executor", "Hz", "p50 ms", "p99 ms", "max ms", "period p99 ms", "trips", "CPU %: plant", "controller",
+    "recorder",
+)  # fmt: skip
+
+
+def _written(row: Mapping[str, Any]) -> list[str]:
+    head = ["full" if row["loaded"] else "idle", row["executor"], f"{row['hz']:g}"]
+    if row["failure"]:
+        return [*head, row["failure"], *[""] * 7]
+    numbers = [
+        *(row["latency_ms"][key] for key in ("p50", "p99", "max")),
+        row["controller_period_error_ms"]["p99"],
+    ]
+    shares = [f"{100.0 * row['cpu_share'][name]:.0f}" for name in NODES]
+    return [*head, *(number(each, 2, "-") for each in numbers), str(row["watchdog_trips"]), *shares]
+
+
+def _row(cell: LatencyCell, seconds: float, folder: Path) -> dict[str, Any]:
     try:
         with watched_system(plan_at(cell.hz, folder), {EXECUTOR: cell.executor}) as system, _load(cell):
             began_s, before = time.monotonic(), system.cpu_s()
@@ -73,7 +125,7 @@ def _row(cell: Cell, seconds: float, folder: Path) -> dict[str, Any]:
             took_s, after = time.monotonic() - began_s, system.cpu_s()
             plant, controller = system.reports()
     except RunFailed as error:
-        return {"failure": str(error)}
+        return {"failure": str(error), AGAIN: True}
     return {
         "failure": None,
         "answers": int(plant["answers"]),
@@ -93,7 +145,7 @@ def _spread(report: Any, name: str) -> dict[str, float | None]:
 
 
 @contextlib.contextmanager
-def _load(cell: Cell) -> Iterator[None]:
+def _load(cell: LatencyCell) -> Iterator[None]:
     """A process that never rests for each core, if the cell has them."""
     count = len(os.sched_getaffinity(0)) if cell.loaded else 0
     busy = [

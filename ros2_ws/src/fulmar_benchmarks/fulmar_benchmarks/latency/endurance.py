@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,10 +12,92 @@ import numpy as np
 
 from fulmar_bags.run_record import read_run
 from fulmar_benchmarks.latency.watched_system import STEP_HZ, plan_at, watched_system
+from fulmar_benchmarks.shape import ALONE, Benchmark, Cell, Check, Figures, Found, Progress, known
+from fulmar_core.config.errors import ConfigError
 
 ALLOWED_MB = 5.0
 WARM_UP_SHARE = 0.1  # of the time: pools fill and windows of statistics grow to their size
 LOOK_S = 5.0
+
+
+@dataclass(frozen=True)
+class EnduranceCell(Cell):
+    """One long run."""
+
+    modules = (f"{__package__}.watched_system",)
+    simulated_s: float
+    rate: float
+    folder: Path  # of policy and bag
+
+    @property
+    def name(self) -> str:
+        """File name without suffix."""
+        return f"{self.simulated_s:g}_s_at_{self.rate:g}"
+
+    @property
+    def where(self) -> str:
+        """It needs the whole computer."""
+        return ALONE
+
+    @property
+    def way(self) -> str:
+        """Through ROS all of Fulmar counts."""
+        return "ros"
+
+    @property
+    def cost(self) -> float:
+        """In seconds of the robot's time."""
+        return self.simulated_s
+
+    def parts(self) -> dict[str, Any]:
+        """Not where the bag lies."""
+        return {"simulated_s": self.simulated_s, "rate": self.rate}
+
+    def measure(self, progress: Progress, pool: Any = None) -> Figures:
+        """As in `endure`."""
+        return endure(simulated_s=self.simulated_s, rate=self.rate, folder=self.folder, progress=progress)
+
+
+class Endurance(Benchmark):
+    """Does memory grow, and is every command in the bag?"""
+
+    name = "endurance"
+    title = "A long run"
+
+    def check(self) -> None:
+        """Refuse a folder with a bag."""
+        if (self.choice.out / "bag").exists() and not (self.choice.out / "outcomes").exists():
+            raise ConfigError(
+                f"{self.choice.out} exists already; nothing recorded is overwritten. Give --out another folder."
+            )
+
+    def cells(self) -> list[EnduranceCell]:
+        """The run."""
+        return [EnduranceCell(self.choice.simulated_s, self.choice.rate, self.choice.out)]
+
+    def document(self, found: Found) -> dict[str, Any]:
+        """Its figures."""
+        return known(found, self.cells()[0].name)
+
+    def checks(self, document: Mapping[str, Any]) -> list[Check]:
+        """No command is lost, no node grows."""
+        most = max(document["memory_growth_mb"].values())
+        return [
+            Check.most("commands that are not in the bag", document["commands_lost"], 0),
+            Check("growth of a node's memory [MB]", most, ALLOWED_MB, most < ALLOWED_MB, "less"),
+        ]
+
+    def tables(self, document: Mapping[str, Any]) -> list[str]:
+        """Commands, and memory of each node."""
+        head = (
+            f"{document['simulated_s']:g} s at {document['rate']:g} times real time: {document['commands_lost']} of "
+            f"{document['commands_answered']} commands are not in the bag"
+        )
+        nodes = [
+            f"{name}: {document['memory_mb'][name]:.0f} MB, grown by {grown:.1f} MB"
+            for name, grown in document["memory_growth_mb"].items()
+        ]
+        return [head, *nodes, *self.check_lines(document)]
 
 
 def endure(

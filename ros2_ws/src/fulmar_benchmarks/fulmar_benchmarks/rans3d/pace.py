@@ -7,14 +7,13 @@ from importlib.util import find_spec
 from typing import Any
 
 from fulmar_benchmarks.rans3d.targets import RANDOMISED, ROBOTS
-from fulmar_benchmarks.throughput import Library, measure
+from fulmar_benchmarks.throughput import ROUNDS, Library, measure
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.tasks import load_task
 from fulmar_core.worlds.scenario import load_scenario
 
 TASK = "go_to_pose_3d"
 LIBRARIES = ("numpy", "compiled")
-ROUNDS = 5
 
 
 def measure_pace(
@@ -40,27 +39,25 @@ def measure_pace(
         "cores": cores,
     }
     for number, name in enumerate(LIBRARIES):
-        reason = why_not(name)
-        done = iter(range(number * ROUNDS + 1, (number + 1) * ROUNDS + 1))
+        reason, done = why_not(name), float(number * ROUNDS)
 
-        def further(done: Any = done) -> None:
-            progress(float(next(done)), float(len(LIBRARIES) * ROUNDS))
+        def further(rounds: float, done: float = done) -> None:
+            progress(done + rounds, float(len(LIBRARIES) * ROUNDS))
 
         found[name] = None
         if reason:
             found["reason"] = reason
             continue
-        figures = measure(
-            [(robot, task)],
+        found[name] = measure(
+            robot,
+            task,
             scenario,
             worlds=worlds,
             library=Library(name),
             cores=cores,
             seconds=seconds,
-            rounds=ROUNDS,
             progress=further,
         )
-        found[name] = figures[robot.name]
     return found
 
 

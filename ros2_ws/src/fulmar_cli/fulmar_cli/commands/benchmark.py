@@ -9,15 +9,10 @@ from pathlib import Path
 import typer
 
 from fulmar_benchmarks.catalogue import rows
-from fulmar_cli.commands.benchmark_descent import descent
 from fulmar_cli.commands.benchmark_drift import drift
-from fulmar_cli.commands.benchmark_flights import flights
-from fulmar_cli.commands.benchmark_latency import endurance, latency
 from fulmar_cli.commands.benchmark_rans3d import rans3d
 from fulmar_cli.commands.benchmark_roboran import roboran
 from fulmar_cli.commands.benchmark_row import OneBenchmark, command_of
-from fulmar_cli.commands.benchmark_throughput import throughput
-from fulmar_cli.commands.benchmark_training import training
 from fulmar_core.config.errors import ConfigError
 
 # Of our own machinery, by module of `tests/benchmarks`: they come with a checkout, not with an installed Fulmar.
@@ -39,15 +34,9 @@ benchmark = typer.Typer(
     rich_markup_mode=None,
 )
 for command in (
-    descent,
     drift,
-    endurance,
-    flights,
-    latency,
     rans3d,
     roboran,
-    throughput,
-    training,
 ):
     benchmark.command()(command)
 for row in rows().values():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import inspect
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Annotated, Any
@@ -55,17 +56,19 @@ def command_of(row: Row) -> Callable[..., None]:
 
 
 def _parameter(selector: Selector, row: Row) -> inspect.Parameter:
-    limits = {"min": selector.least, "max": selector.most}
+    limits: dict[str, Any] = {"min": selector.least, "max": selector.most}
     given = {name: value for name, value in limits.items() if value is not None}
-    default = selector.default
-    if selector.name == "out" and default is None and not row.out:
-        default = SHARED["out"].kind(f"runs/benchmark/{row.name}")
-    option = typer.Option(
-        *selector.names,
-        metavar=selector.metavar or None,
-        help=selector.help,
-        show_default=selector.name != "jobs",
-        **given,  # type: ignore[arg-type]
+    default = not row.timed if selector.name == "resume" else selector.default
+    words: dict[str, Any] = {
+        "metavar": selector.metavar or None,
+        "help": selector.help,
+        "show_default": selector.name != "jobs",
+    }
+    if selector.name == "out":
+        place = "<time>..." if row.dated else row.name
+        words["help"] = f"{selector.help} runs/benchmark/{place} by default."
+    option = (
+        typer.Argument(**words) if selector.positional else typer.Option(*selector.names, **words, **given)
     )
     kind = selector.kind if default is not None else selector.kind | None
     return inspect.Parameter(
@@ -87,7 +90,8 @@ def run_row(row: Row, given: dict[str, Any], *, as_json: bool) -> None:
     from fulmar_benchmarks.tables import print_shown
 
     benchmark = row.load()(asked)
-    with work_bar(row.measures) as progress:
+    bar = work_bar(row.measures) if row.measures else contextlib.nullcontext(lambda done, total: None)
+    with bar as progress:
         result = run(benchmark, progress=progress, on_done=_saying(benchmark))
     path, document = write(result, report=asked.report), result.document
 
