@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from rich.console import Console
 from typer.testing import CliRunner
 
-from fulmar_benchmarks.cells import BAD, GOOD
-from fulmar_benchmarks.drift.cells import path_lines, pose_lines, unmet
+from fulmar_benchmarks.catalogue import Selector, read_names
+from fulmar_benchmarks.drift.cells import path_lines, pose_lines, shown, unmet
 from fulmar_benchmarks.drift.conditions import CONDITIONS, CONTROLLERS, PATHS, ROWS
-from fulmar_benchmarks.drift.tables import print_tables
 from fulmar_benchmarks.drift.targets import (
     BANDS,
     FIGURES,
@@ -24,11 +24,12 @@ from fulmar_benchmarks.drift.targets import (
     published,
     requirements,
 )
-from fulmar_cli.commands.values import read_names
+from fulmar_benchmarks.tables import BAD, GOOD, print_shown
 from fulmar_cli.main import app
 from fulmar_core.config.errors import UnknownNameError
 from fulmar_core.worlds.scenario import load_scenario
 
+KNOWN = ("policy", "lqr", "mpc")
 FEW = "benchmark drift --through batch --controllers lqr --episodes 3 --rows ideal,two_lost,square --jobs 1"
 
 
@@ -182,7 +183,7 @@ def test_episodes_whose_pose_can_be_held_are_reported_beside_all(document):
 
 
 def test_people_get_both_tables_with_marks_and_a_result(document, capsys):
-    print_tables(document, Console(highlight=False))
+    print_shown(shown(document), Console(highlight=False), 170)
     text = capsys.readouterr().out
     for words in (
         "Go to pose under disturbances",
@@ -196,7 +197,9 @@ def test_people_get_both_tables_with_marks_and_a_result(document, capsys):
 
 
 def test_controllers_are_evaluated_in_the_order_that_was_given():
-    known = ("policy", "lqr", "mpc")
-    assert read_names("mpc,policy", "controller", known, as_given=True) == ("mpc", "policy")
-    assert read_names("mpc,policy", "controller", known) == ("policy", "mpc")
-    assert read_names("all", "controller", known, as_given=True) == known
+    given = Selector(
+        "controllers", "K,...", "", family="controller", known=f"{__name__}:KNOWN", as_given=True
+    )
+    assert read_names("mpc,policy", given) == ("mpc", "policy")
+    assert read_names("mpc,policy", replace(given, as_given=False)) == ("policy", "mpc")
+    assert read_names("all", given) == KNOWN

@@ -10,14 +10,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fulmar_benchmarks import pairs, results, workers
+from fulmar_benchmarks import outcomes as kept
+from fulmar_benchmarks import results, workers
 from fulmar_benchmarks import unit as units
-from fulmar_benchmarks.pairs import code_hash, find_pair, units_of
-from fulmar_benchmarks.results import QUANTILES, PairResult
+from fulmar_benchmarks.campaign import measured
+from fulmar_benchmarks.outcomes import code_hash, keys_of
+from fulmar_benchmarks.pairs import cells_of, find_pair
+from fulmar_benchmarks.results import QUANTILES, PairResult, outcome_of
 from fulmar_benchmarks.roboran.campaign import document_of
 from fulmar_benchmarks.roboran.document import wilson
 from fulmar_benchmarks.roboran.targets import LEAST, ROBOTS, TABLE, TASKS, checks_of, main_figure, thesis_row
-from fulmar_benchmarks.unit import done_already
 from fulmar_evaluation import bounds
 from policy_server.controllers import policies_directory
 
@@ -28,8 +30,13 @@ def unit_of(
     folder, *, controller="classical", robot="floating_platform", task="go_to_pose", way="batch", episodes=3
 ):
     pair = find_pair(robot, task, controller)
-    (unit,) = units_of(pair, {way: episodes}, seed=7, scenario="nominal", folder=folder, worlds=64)
-    return unit
+    (cell,) = cells_of(pair, {way: episodes}, seed=7, scenario="nominal", bounds=folder, worlds=64)
+    return cell
+
+
+def key_of(cell):
+    (key,) = keys_of([cell]).values()
+    return key
 
 
 def test_the_thesis_times_are_control_steps_and_ours_are_seconds():
@@ -92,8 +99,8 @@ def test_the_interval_of_a_share_holds_it_and_shrinks_with_episodes():
 def test_an_outcome_is_read_as_it_was_written(tmp_path):
     unit = unit_of(tmp_path)
     reported = []
-    outcome = units.run_unit(unit, reported.append)
-    again = PairResult.load(unit.path)
+    outcome = unit.result(reported.append)
+    again = outcome_of(kept.keep(tmp_path / "one.npz", "key", dict(vars(outcome))))
     for field in dataclasses.fields(PairResult):
         value, other = getattr(outcome, field.name), getattr(again, field.name)
         if field.name == "figures":
@@ -112,39 +119,36 @@ def test_an_outcome_is_read_as_it_was_written(tmp_path):
 
 def test_an_outcome_counts_only_for_what_it_was_made_of(tmp_path, monkeypatch):
     unit = unit_of(tmp_path)
-    assert unit.done_before() is None
-    units.run_unit(unit)
-    assert unit.done_before() is not None
-    assert replace(unit, trial=replace(unit.trial, episodes=4)).done_before() is None
-    assert replace(unit, defines="other code").done_before() is None
-    unit.path.write_bytes(b"cut off")
-    assert unit.done_before() is None
+    assert key_of(unit) == key_of(unit)
+    assert key_of(replace(unit, trial=replace(unit.trial, episodes=4))) != key_of(unit)
+    assert key_of(replace(unit, defines="another controller")) != key_of(unit)
 
 
-def test_what_was_evaluated_before_is_taken_from_its_file_unless_it_is_asked_anew(tmp_path):
-    unit = unit_of(tmp_path)
-    assert done_already([unit], fresh=False) == {}
-    outcome = units.run_unit(unit)
-    assert done_already([unit], fresh=False)[unit].about["key"] == outcome.about["key"]
-    assert done_already([unit], fresh=True) == {}
+def test_what_was_evaluated_before_is_taken_from_its_file_unless_it_is_asked_anew(tmp_path, monkeypatch):
+    monkeypatch.setattr(units.TrialCell, "where", "alone")
+    told = []
+    for fresh in (False, False, True):
+        given = {"folder": tmp_path, "jobs": 1, "fresh": fresh}
+        measured([unit_of(tmp_path)], **given, on_done=lambda cell, figures, before: told.append(before))
+    assert told == [False, True, False]
 
 
 def test_an_outcome_does_not_depend_on_where_the_policy_lies(tmp_path):
     unit = unit_of(tmp_path)
     elsewhere = replace(unit, trial=replace(unit.trial, plan=replace(unit.trial.plan, policy="/else/where")))
-    assert elsewhere.key == unit.key
+    assert key_of(elsewhere) == key_of(unit)
 
 
 def test_small_batches_give_the_same_numbers(tmp_path):
     unit = unit_of(tmp_path, robot="turtlebot2", episodes=units.FEW_WORLDS + 6)
-    outcome = units.run_unit(unit)
+    outcome = unit.result()
     assert outcome.about["same_at_64_worlds"] is True
     assert outcome.about["compared_episodes"] == units.FEW_WORLDS + 6
 
 
 def test_waypoints_are_counted_over_an_episode_over_a_thousand_steps_and_over_as_long_as_the_thesis(tmp_path):
     unit = unit_of(tmp_path, task="go_through_positions", episodes=2)
-    outcome = units.run_unit(unit)
+    outcome = unit.result()
     figures = outcome.figures
     assert outcome.over_time.shape[1] == 1000
     assert outcome.paths.shape[1] == 300, "60 s at 5 Hz"
@@ -176,8 +180,8 @@ def test_the_hash_of_the_code_knows_the_simulator_only_where_it_is_used():
 
 @pytest.mark.parametrize("library", ["numpy", "onnxruntime", "mujoco"])
 def test_the_hash_of_the_code_knows_which_libraries_computed(library, monkeypatch):
-    before, version = code_hash("mujoco"), pairs.version
-    monkeypatch.setattr(pairs, "version", lambda name: "another" if name == library else version(name))
+    before, version = code_hash("mujoco"), kept.version
+    monkeypatch.setattr(kept, "version", lambda name: "another" if name == library else version(name))
     assert code_hash("mujoco") != before
 
 
@@ -190,7 +194,7 @@ def test_a_pair_without_anybody_says_why(tmp_path):
 def test_only_what_a_policy_drives_counts_as_asked(met, counted):
     policy = {"robot": "kingfisher", "task": "go_to_pose", "kind": "policy", "status": "judged", "met": met}
     entries = [policy, {**policy, "kind": "classical", "met": None}]
-    document = document_of(entries, episodes={"batch": 1}, seed=1, scenario="nominal", command="", wall_s=0.0)
+    document = document_of(entries, episodes={"batch": 1}, seed=1, scenario="nominal")
     assert (document["asked"], document["met"], document["open"]) == counted
 
 
@@ -204,17 +208,16 @@ def test_a_damaged_bundle_is_missing_with_its_reason(tmp_path):
     assert "not the one that was exported" in pair.reason
 
 
-def test_the_fault_of_one_unit_is_a_sentence_and_costs_no_other(tmp_path, monkeypatch):
-    def broken(unit, progress, *, pool=None):
+def test_the_fault_of_one_cell_is_a_sentence_and_costs_no_other(tmp_path, monkeypatch):
+    def broken(unit, progress, pool=None):
         raise RuntimeError("it broke")
 
     unit = unit_of(tmp_path, way="ros", episodes=1)
-    monkeypatch.setattr(workers, "run_unit", broken)
+    monkeypatch.setattr(units.TrialCell, "measure", broken)
     seen = []
-    outcomes = workers.do_all(
+    workers.measure_all(
         [unit], jobs=1, progress=lambda done: None, on_done=lambda *reported: seen.append(reported)
     )
-    assert outcomes == {unit: "RuntimeError: it broke"}
     assert seen == [(unit, "RuntimeError: it broke")]
 
 

@@ -13,14 +13,17 @@ from typer.testing import CliRunner
 
 pytest.importorskip("mujoco")
 
+from fulmar_benchmarks.catalogue import choice
+from fulmar_benchmarks.outcomes import keys_of
 from fulmar_benchmarks.rans3d import pace
 from fulmar_benchmarks.rans3d.bound import most_targets
-from fulmar_benchmarks.rans3d.campaign import _pair, _unit
-from fulmar_benchmarks.rans3d.document import Request, document_of, figures_of
-from fulmar_benchmarks.rans3d.tables import print_tables
+from fulmar_benchmarks.rans3d.campaign import Rans3d, cell_of, pair_of
+from fulmar_benchmarks.rans3d.document import document_of, figures_of
+from fulmar_benchmarks.rans3d.tables import shown
 from fulmar_benchmarks.rans3d.targets import DEAD, EPISODES, ROBOTS, SHIPPED, TASKS, published
 from fulmar_benchmarks.rans3d.unit import HELD, SpaceExtra, longest_run, started_within
 from fulmar_benchmarks.results import PairResult
+from fulmar_benchmarks.tables import print_shown
 from fulmar_cli.main import app
 from fulmar_core.config.errors import UnknownNameError
 from fulmar_core.robots.robot_file import load_robot
@@ -31,6 +34,10 @@ from fulmar_core.worlds.scenario import load_scenario
 
 FEW = "benchmark rans3d --episodes 2 --robots spacecraft_16 --tasks go_to_pose_3d --controllers lqr,policy"
 CELL = {"success_rate", "position_error_m", "attitude_error_deg", "episodes", "published"}
+
+
+def request_of(out, episodes=1, **more):
+    return choice("rans3d", out=out, episodes=episodes, seed=1, **more)
 
 
 def run(words: str, *more: str):
@@ -155,17 +162,17 @@ def test_the_spacecraft_has_all_that_rans_sets(task, file, settings):
 @pytest.mark.parametrize("task", TASKS)
 def test_every_pair_has_published_settings_and_laws(robot, task, tmp_path):
     assert published(robot, task)["source"]
-    request = Request(tmp_path, 1, 1, policies=tmp_path)
+    request = request_of(tmp_path, policies=tmp_path)
     for name in ("lqr", "pd"):
-        assert not _pair(request, robot, task, name).missing
-    reason = _pair(request, robot, task, "policy").reason
+        assert not pair_of(request, robot, task, name).missing
+    reason = pair_of(request, robot, task, "policy").reason
     assert ("fulmar policies" if task in SHIPPED[robot] else "fulmar train") in reason
 
 
 @pytest.mark.parametrize("task", TASKS)
 def test_int_ball2_starts_within_two_metres_and_has_a_minute(task, tmp_path):
-    request = Request(tmp_path, 64, 1)
-    trial = _unit(request, _pair(request, "int_ball2", task, "lqr"), "nominal", "").trial
+    request = request_of(tmp_path, 64)
+    trial = cell_of(request, pair_of(request, "int_ball2", task, "lqr"), "nominal").trial
     farthest, seconds = EPISODES["int_ball2"]
     assert trial.task.episode_s == seconds
     drawn = trial.drawn(np.arange(64))
@@ -175,11 +182,10 @@ def test_int_ball2_starts_within_two_metres_and_has_a_minute(task, tmp_path):
 
 def test_the_start_decides_on_what_is_kept(tmp_path):
     """Outcomes of other starts are not taken for these."""
-    request = Request(tmp_path, 1, 1)
-    pair = _pair(request, "spacecraft_16", "go_to_pose_3d", "lqr")
-    units = [_unit(request, each, "nominal", "") for each in (pair, replace(pair, robot="int_ball2"))]
-    assert units[0].key != units[1].key
-    assert units[0].path != units[1].path
+    request = request_of(tmp_path)
+    pair = pair_of(request, "spacecraft_16", "go_to_pose_3d", "lqr")
+    units = [cell_of(request, each, "nominal") for each in (pair, replace(pair, robot="int_ball2"))]
+    assert len(set(keys_of(units).values())) == 2
     task = load_task("go_to_pose_3d")
     assert started_within(task, 0.1).start.distance == (0.1, 0.1)
 
@@ -202,10 +208,10 @@ def test_so_many_thrusters_are_dead_in_every_episode(scenario, count):
 
 
 def test_only_disturbed_episodes_are_asked_whether_they_can_be_held(tmp_path):
-    request = Request(tmp_path, 3, 1)
-    pair = _pair(request, "spacecraft_16", "go_to_pose_3d", "lqr")
+    request = request_of(tmp_path, 3)
+    pair = pair_of(request, "spacecraft_16", "go_to_pose_3d", "lqr")
     calm, disturbed = (
-        SpaceExtra(_unit(request, pair, name, "").trial).arrays() for name in ("nominal", "randomised")
+        SpaceExtra(cell_of(request, pair, name).trial).arrays() for name in ("nominal", "randomised")
     )
     assert calm == {}
     assert disturbed[HELD].shape == (3,)
@@ -255,38 +261,38 @@ def test_the_bound_counts_what_a_point_mass_passes_along_a_line():
 
 
 def test_targets_are_printed_beside_their_bound(tmp_path, capsys):
-    request = Request(
-        tmp_path, 2, 1, robots=("spacecraft_16",), tasks=("go_through_poses_3d",), controllers=("lqr",),
+    request = request_of(
+        tmp_path, 2, robots=("spacecraft_16",), tasks=("go_through_poses_3d",), controllers=("lqr",),
         scenarios=("nominal",), parts=("tasks",),
     )  # fmt: skip
     place = ("spacecraft_16", "go_through_poses_3d", "lqr")
     result = result_of([True, True])
     result.figures["goals_reached"] = np.array([5.0, 10.0])
     document = document_of(
-        request, pairs={place: _pair(request, *place)}, keys=[(*place, "nominal")],
+        request, pairs={place: pair_of(request, *place)}, keys=[(*place, "nominal")],
         found={(*place, "nominal"): result}, bounds={place[:2]: np.array([10, 20])}, integrator=None,
-        throughput=None, wall_s=1.0,
+        throughput=None,
     )  # fmt: skip
     cell = document["tasks"]["go_through_poses_3d"]["lqr"]
     assert (cell["goals_reached"], cell["goals_bound"], cell["share_of_bound"]) == (7.5, 15.0, 0.5)
-    print_tables(document, Console())
+    print_shown(shown(document), Console(), 180)
     assert "7.5 of 15.0" in capsys.readouterr().out
 
 
 def test_an_evaluation_that_fails_is_named_and_open(tmp_path):
-    request = Request(
-        tmp_path, 1, 1, robots=("spacecraft_16",), tasks=("go_to_pose_3d",), controllers=("lqr",),
+    request = request_of(
+        tmp_path, 1, robots=("spacecraft_16",), tasks=("go_to_pose_3d",), controllers=("lqr",),
         scenarios=("nominal",), parts=("tasks",),
     )  # fmt: skip
     place = ("spacecraft_16", "go_to_pose_3d", "lqr")
     key = (*place, "nominal")
     document = document_of(
-        request, pairs={place: _pair(request, *place)}, keys=[key], found={key: "RunFailed: it fell"},
-        bounds={}, integrator=None, throughput=None, wall_s=1.0,
+        request, pairs={place: pair_of(request, *place)}, keys=[key], found={key: "RunFailed: it fell"},
+        bounds={}, integrator=None, throughput=None,
     )  # fmt: skip
     cell = document["tasks"]["go_to_pose_3d"]["lqr"]
     assert (cell["status"], cell["reason"]) == ("failed", "nominal: RunFailed: it fell")
-    assert (document["asked"], document["open"]) == (1, 1)
+    assert [check.met for check in Rans3d(request).checks(document)] == [None]
 
 
 def test_the_pace_has_both_integrators_of_mujoco_and_says_why_nothing_is_compiled(monkeypatch):

@@ -9,9 +9,12 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
+from fulmar_benchmarks.campaign import provenance
+from fulmar_benchmarks.catalogue import choice
+from fulmar_benchmarks.page import write_page
 from fulmar_benchmarks.pairs import Pair
 from fulmar_benchmarks.results import QUANTILES, PairResult
-from fulmar_benchmarks.roboran.campaign import CampaignResult, document_of
+from fulmar_benchmarks.roboran.campaign import Findings, Roboran, document_of
 from fulmar_benchmarks.roboran.document import pair_entry
 from fulmar_benchmarks.roboran.targets import ROBOTS, TASKS
 from fulmar_benchmarks.unit import KEPT
@@ -100,16 +103,18 @@ def findings():
         episodes={"batch": 300, "mujoco": 300},
         seed=1,
         scenario="nominal",
-        command="fulmar x",
-        wall_s=1.0,
     )
-    return CampaignResult(document, list(outcomes), outcomes)
+    return Findings(provenance("roboran", "fulmar x") | document, list(outcomes), outcomes)
+
+
+def write_report(findings, out):
+    from fulmar_benchmarks.roboran.report.sections import plots
+
+    return write_page(Roboran(choice("roboran", out=out)), findings.document, lambda: plots(findings))
 
 
 @pytest.fixture(scope="module")
 def written(findings, tmp_path_factory):
-    from fulmar_benchmarks.roboran.report import write_report
-
     return write_report(findings, tmp_path_factory.mktemp("out") / "new")
 
 
@@ -147,12 +152,10 @@ def test_a_page_says_what_every_figure_means(written):
 
 
 def test_a_task_that_nobody_did_has_no_plots(findings, tmp_path):
-    from fulmar_benchmarks.roboran.report import write_report
-
     pair = Pair("turtlebot2", "go_to_pose", "policy", reason="no policy is shipped")
     entries = [pair_entry(pair, {})]
-    document = document_of(entries, episodes={"batch": 1}, seed=1, scenario="nominal", command="", wall_s=0.1)
-    page = write_report(CampaignResult(document, [pair], {pair: {}}), tmp_path)
+    document = document_of(entries, episodes={"batch": 1}, seed=1, scenario="nominal")
+    page = write_report(Findings(provenance("roboran", "") | document, [pair], {pair: {}}), tmp_path)
     assert "no policy is shipped" in page.read_text()
     assert len(list((tmp_path / "pictures").iterdir())) == 1  # word: folder of reports
 
@@ -183,7 +186,7 @@ def test_the_overview_marks_its_scale_where_its_numbers_say(findings, low):
     from fulmar_benchmarks.roboran.report.glance_plot import draw_glance
 
     entries = [entry | {"judged": {"batch": low}} for entry in findings.document["pairs"][:1]]
-    figure = draw_glance(findings.document | {"pairs": entries})
+    figure = draw_glance(dict(findings.document) | {"pairs": entries})
     figure.canvas.draw()
     (axes,) = figure.axes
     for at, label in zip(axes.get_xticks(), axes.get_xticklabels(), strict=True):

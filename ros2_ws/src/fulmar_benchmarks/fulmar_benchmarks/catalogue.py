@@ -36,6 +36,8 @@ class Selector:
     usual: str = ""  # same, where nothing is given
     every: str = "all"  # stands for all of them
     nothing: str = ""  # stands for none of them
+    without: tuple[str, ...] = ()  # of those known
+    single: bool = False  # one of them alone
     as_given: bool = False  # the order of names is kept
     numbers: tuple[float, float] | None = (
         None  # its value is numbers from one to the other, with commas between
@@ -57,6 +59,10 @@ class Selector:
             return self._numbers(value, *self.numbers)
         if self.nothing and value == self.nothing:
             return ()
+        if self.single:
+            if value not in known_names(self.known):
+                raise UnknownNameError(self.family, value, known_names(self.known))
+            return value
         return read_names(value, self) if self.family else value
 
     def _numbers(self, text: str, low: float, high: float) -> tuple[float, ...]:
@@ -87,6 +93,7 @@ def read_names(text: str, selector: Selector) -> tuple[str, ...]:
         ConfigError: There is none.
     """
     known, every = known_names(selector.known), selector.every
+    known = tuple(name for name in known if name not in selector.without)
     names = list(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
     for name in names:
         if name not in (*known, every):
@@ -135,7 +142,8 @@ SHARED = {
         "check", "", "End with code 1 unless every requirement was measured and met.", False, bool,
         names=("--check",),
     ),
-    "out": Selector("out", "DIR", "Folder of the results and of the report with its figures.", None, Path),
+    "out": Selector("out", "DIR", "Folder of the results and of the report with its figures.", None, Path,
+        names=("--out", "--output")),
 }  # fmt: skip
 
 

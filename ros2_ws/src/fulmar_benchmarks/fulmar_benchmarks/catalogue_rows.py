@@ -173,6 +173,109 @@ FLIGHTS = Row(
     measures="flights",
 )  # fmt: skip
 
+DRIFT = Row(
+    "drift",
+    "fulmar_benchmarks.drift.campaign:Drift",
+    """Run the experiment of thesis Tables 3.5 and 3.6, and print both side by side.
+
+    Nine conditions of 256 trajectories from 3 to 4 m away, 250 steps of 0.2 s each, and three paths at 0.2 m/s; in
+    MuJoCo, through the deployed nodes. DIR keeps results for the same code, configuration and controller, so an
+    interrupted benchmark continues where it stopped. DIR/index.html is the report, DIR/drift.json the figures.
+
+    Try:
+
+    fulmar benchmark drift --rows ideal,torque --controllers lqr --through mujoco
+    """,
+    (
+        Selector("through", "batch|mujoco|ros", "ros: the deployed nodes over DDS, in lock step.", "ros",
+                 family="way", known="fulmar_evaluation.evaluation:WAYS", single=True),
+        Selector("controllers", "K,...", "Out of policy and the classical controllers.", "policy,lqr",
+                 family="controller", known="policy_server.controllers:CONTROLLERS", without=("classical",),
+                 as_given=True),
+        Selector("rows", "R,...", "Names of conditions and paths; all twelve by default.", family="row",
+                 known="fulmar_benchmarks.drift.conditions:ROWS", usual="fulmar_benchmarks.drift.conditions:ROWS"),
+        Selector("episodes", "N", "Trajectories of each condition; paths have at most 4.", 256, int, 1),
+        POLICY,
+        Selector("tracking_policy", "DIR", "Policy bundle for the paths; the shipped one by default.", None, Path),
+    ),
+    needs=lambda choice: (
+        *(("onnxruntime",) * ("policy" in choice.controllers)), *(("mujoco",) * (choice.through != "batch")),
+    ),
+    measures="evaluating",
+)  # fmt: skip
+
+POLICIES = Selector(
+    "policies", "DIR", "Folder of bundles named ROBOT_TASK; the shipped ones by default.", None, Path
+)
+RANS3D = Row(
+    "rans3d",
+    "fulmar_benchmarks.rans3d.campaign:Rans3d",
+    """Evaluate the controllers of bodies in space at the 3-D tasks of RANS, in MuJoCo.
+
+    Beside success and errors of spacecraft_16 and int_ball2, nominal and randomised: thrusters that are dead, what the
+    integrator keeps of a torque-free tumble, and the pace of the batch beside MuJoCo's rollout. A bundle that does not
+    exist leaves its cells empty and says how to make it. int_ball2 starts up to 2 m away and has 60 s. DIR keeps
+    results for the same code, configuration and controller, so an interrupted benchmark continues where it stopped.
+    DIR/index.html is the report, DIR/rans3d.json the figures.
+
+    Try:
+
+    fulmar benchmark rans3d --robots spacecraft_16 --tasks go_to_pose_3d --parts tasks,integrator
+    """,
+    (
+        Selector("robots", "R,...", "Out of spacecraft_16 and int_ball2, or all.", "all",
+                 family="robot", known="fulmar_benchmarks.rans3d.targets:ROBOTS"),
+        Selector("tasks", "T,...", "Out of the five tasks that end in _3d, or all.", "all",
+                 family="task", known="fulmar_benchmarks.rans3d.targets:TASKS"),
+        Selector("controllers", "K,...", "Out of lqr, pd and policy, or all.", "all",
+                 family="controller", known="fulmar_benchmarks.rans3d.targets:CONTROLLERS"),
+        Selector("scenarios", "S,...", "Out of nominal and randomised, or all.", "all",
+                 family="scenario", known="fulmar_benchmarks.rans3d.targets:SCENARIOS"),
+        Selector("parts", "P,...", "Out of tasks, dead (thrusters), integrator and throughput, or all.", "all",
+                 family="part", known="fulmar_benchmarks.rans3d.targets:PARTS"),
+        POLICIES,
+        Selector("episodes", "N", "Of each controller at each task and scenario.", 256, int, 1),
+        Selector("tumble_s", "S", "Length of the tumble by which the integrator is measured [s].", 3600.0, float, 1.0),
+        Selector("worlds", "N", "Worlds of the batch whose pace is measured.", 4096, int, 1),
+        Selector("seconds", "S", "Time of each measurement of the pace [s].", 1.0, float, 0.05),
+    ),
+    needs=lambda choice: ("mujoco", *(("onnxruntime",) * ("policy" in choice.controllers))),
+    measures="evaluating",
+)  # fmt: skip
+
+ROBORAN = Row(
+    "roboran",
+    "fulmar_benchmarks.roboran.campaign:Roboran",
+    """Evaluate the shipped policies as thesis Table 4.7 does, and print both side by side.
+
+    Success is evaluated on true states over the closing window, in 4,096 episodes of the core's batch and 256 in
+    MuJoCo. DIR keeps results for the same code, configuration and controller, so an interrupted benchmark continues
+    where it stopped. DIR/index.html is the report, DIR/roboran.json the figures.
+
+    Try:
+
+    fulmar benchmark roboran --robots turtlebot2 --tasks go_to_pose --controllers policy,classical
+    """,
+    (
+        Selector("robots", "R,...", "Names with commas between, or all; the thesis' three by default.",
+                 family="robot", known="configs/robots", usual="fulmar_benchmarks.roboran.targets:ROBOTS"),
+        Selector("tasks", "T,...", "Names with commas between, or all; five by default.",
+                 family="task", known="configs/tasks", usual="fulmar_benchmarks.roboran.targets:TASKS"),
+        Selector("through", "W,...", "Out of batch, mujoco and ros, or all.", "batch,mujoco",
+                 family="way", known="fulmar_benchmarks.roboran.targets:WAYS"),
+        Selector("controllers", "K,...", "policy: the shipped bundles. classical: the laws of the families.", "policy",
+                 family="kind of controller", known="fulmar_benchmarks.pairs:KINDS"),
+        POLICIES,
+        Selector("episodes", "N", "In every way; 4,096, 256 and 16 through ros by default.", None, int, 1),
+        SCENARIO,
+    ),
+    needs=lambda choice: (
+        *(("onnxruntime",) * ("policy" in choice.controllers)),
+        *(("mujoco",) * bool({"mujoco", "ros"} & set(choice.through))),
+    ),
+    measures="evaluating",
+)  # fmt: skip
+
 LATENCY = Row(
     "latency",
     "fulmar_benchmarks.latency.cells:Latency",
@@ -290,4 +393,17 @@ def _modules(campaign: str, choice: Choice) -> Sequence[str]:
     return needs(choice)
 
 
-ROWS = (DESCENT, ENDURANCE, EVENTS, FALCON, FLIGHTS, INERTIA, LATENCY, THROUGHPUT, TRAINING)
+ROWS = (
+    DESCENT,
+    DRIFT,
+    ENDURANCE,
+    EVENTS,
+    FALCON,
+    FLIGHTS,
+    INERTIA,
+    LATENCY,
+    RANS3D,
+    ROBORAN,
+    THROUGHPUT,
+    TRAINING,
+)

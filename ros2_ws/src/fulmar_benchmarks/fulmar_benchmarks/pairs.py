@@ -2,20 +2,13 @@
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import dataclass, field
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-import fulmar_core
-import fulmar_evaluation
-import policy_server
-import sim_nodes
-from fulmar_benchmarks.unit import Unit
+from fulmar_benchmarks.unit import TrialCell
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_core.config.errors import BundleError, ConfigError
-from fulmar_core.config.paths import config_files
 from fulmar_core.loop.policy_bundle import read_passport
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.tasks import load_task
@@ -116,39 +109,11 @@ def plan_of(pair: Pair, *, scenario: str, seed: int, duration_s: float | None = 
     )
 
 
-def units_of(
-    pair: Pair, ways: dict[str, int], *, seed: int, scenario: str, folder: Path, worlds: int
-) -> list[Unit]:
-    """The work on one pair."""
+def cells_of(
+    pair: Pair, ways: dict[str, int], *, seed: int, scenario: str, bounds: Path, worlds: int
+) -> list[TrialCell]:
+    """The work on one pair, so many episodes in each way."""
     plan = plan_of(pair, scenario=scenario, seed=seed)
     return [
-        Unit(Trial(plan, way, episodes, worlds), hash_of(pair.sha256, code_hash(way)), folder)
-        for way, episodes in ways.items()
+        TrialCell(Trial(plan, way, episodes, worlds), pair.sha256, bounds) for way, episodes in ways.items()
     ]
-
-
-def code_hash(way: str) -> str:
-    """Hash of the code, the configuration and the libraries that outcomes of one way depend on."""
-    packages = (fulmar_core, fulmar_evaluation, policy_server, *((sim_nodes,) if way != "batch" else ()))
-    files = [
-        path for package in packages for path in sorted(Path(str(package.__file__)).parent.rglob("*.py"))
-    ]
-    files += sorted(
-        path
-        for family in ("robots", "tasks", "scenarios", "controllers", "goals")
-        for path in config_files(family).values()
-    )
-    installed = [_version(name) for name in ("numpy", "onnxruntime", "mujoco")]
-    return hash_of(*(hashlib.sha256(path.read_bytes()).hexdigest() for path in files), *installed)
-
-
-def _version(library: str) -> str:
-    try:
-        return version(library)
-    except PackageNotFoundError:
-        return ""
-
-
-def hash_of(*parts: str) -> str:
-    """SHA-256 of some texts in their order."""
-    return hashlib.sha256("\n".join(parts).encode()).hexdigest()

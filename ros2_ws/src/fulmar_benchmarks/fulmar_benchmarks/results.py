@@ -1,25 +1,23 @@
-"""Results of one pair and waypoint bounds, kept in .npz files."""
+"""Results of one pair; bounds on waypoints, kept in .npz files."""
 
 from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any, Generic, Self, TypeVar
+from typing import Any
 
 import numpy as np
 
 import fulmar_evaluation.bounds
+from fulmar_benchmarks.shape import Figures
 from fulmar_core.config.atomic_write import whole_file
 from fulmar_core.simulation.episode import Episode
 from fulmar_evaluation.evaluation import Trial
 from fulmar_evaluation.waypoint_score import WaypointBound, waypoint_bound
 
-Key = TypeVar("Key")
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)  # of what is kept over time
-FIGURE, MORE = "figure:", "more:"  # prefixes of figures and of further arrays in a file
 
 
 @dataclass(frozen=True)
@@ -38,51 +36,28 @@ class PairResult:
     obstacles: np.ndarray  # (kept, m, 3) x, y, radius [m]
     more: dict[str, np.ndarray] = field(default_factory=dict)  # whatever else a benchmark keeps
 
-    def save(self, path: Path) -> None:
-        """Write one file, whole or not at all."""
-        arrays = {name: getattr(self, name) for name in _ARRAYS}
-        arrays |= {FIGURE + name: values for name, values in self.figures.items()}
-        arrays |= {MORE + name: values for name, values in self.more.items()}
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with whole_file(path) as file:
-            np.savez_compressed(file, about=np.array(json.dumps(self.about)), **arrays)
-
-    @classmethod
-    def load(cls, path: Path) -> PairResult:
-        """Read what `save` wrote.
-
-        Raises:
-            OSError, ValueError, KeyError: It is no such file.
-        """
-        with np.load(path, allow_pickle=False) as file:
-            named = {
-                prefix: {
-                    name.removeprefix(prefix): file[name] for name in file.files if name.startswith(prefix)
-                }
-                for prefix in (FIGURE, MORE)
-            }
-            return cls(
-                json.loads(str(file["about"])),
-                figures=named[FIGURE],
-                more=named[MORE],
-                **{name: file[name] for name in _ARRAYS},
-            )
+    @property
+    def time_s(self) -> np.ndarray:
+        """Ends of the control steps of `paths`, shape (steps,) [s]."""
+        return float(self.about["control_dt"]) * np.arange(1, self.paths.shape[1] + 1)
 
 
-@dataclass(frozen=True)
-class CampaignResult(Generic[Key]):
-    """The document of a benchmark, and what plots are drawn from: the outcomes that there are."""
-
-    document: dict[str, Any]
-    outcomes: dict[Key, PairResult]
-
-    @classmethod
-    def of(cls, document: dict[str, Any], found: Mapping[Key, PairResult | str]) -> Self:
-        """Of everything that was found, or why it was not."""
-        return cls(document, {key: one for key, one in found.items() if isinstance(one, PairResult)})
+Outcome = PairResult | str  # a sentence where it could not be measured
 
 
-_ARRAYS = tuple(each.name for each in fields(PairResult) if each.name not in ("about", "figures", "more"))
+def outcome_of(figures: Figures | str) -> Outcome:
+    """What `unit.TrialCell.measure` found."""
+    return figures if isinstance(figures, str) else PairResult(**figures)
+
+
+def statistics(values: np.ndarray) -> dict[str, float | None]:
+    """Mean, median, 5th and 95th percentile of what is a number, shape (episodes,)."""
+    known = np.asarray(values, dtype=float)
+    known = known[np.isfinite(known)]
+    if not known.size:
+        return {"mean": None, "median": None, "p5": None, "p95": None}
+    low, middle, high = (float(value) for value in np.percentile(known, (5, 50, 95)))
+    return {"mean": float(np.mean(known)), "median": middle, "p5": low, "p95": high}
 
 
 def cached_bound(trial: Trial, drawn: Episode, duration_s: float, folder: Path) -> WaypointBound:

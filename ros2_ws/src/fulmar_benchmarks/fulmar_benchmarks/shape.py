@@ -47,6 +47,11 @@ class Cell:
         raise NotImplementedError
 
     @property
+    def title(self) -> str:
+        """Its name for people."""
+        return self.name
+
+    @property
     def cost(self) -> float:
         """How long it takes, beside other cells."""
         return 1.0

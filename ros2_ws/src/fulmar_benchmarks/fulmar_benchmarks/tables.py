@@ -33,6 +33,7 @@ MARKS = {
     "": ("", ""),
 }  # behind an entry of that tone, and its style
 NOTHING = "–"
+LONGEST = 150  # characters of a line that keeps its columns
 
 
 def display_name(name: str) -> str:
@@ -128,12 +129,14 @@ def shown_as_html(shown: Iterable[Shown]) -> list[str]:
     parts: list[str] = []
     lines: list[str] = []
     for each in [*shown, None]:
-        if isinstance(each, str):
+        if isinstance(each, str) and len(each) <= LONGEST:
             lines.append(each)
             continue
         if lines:
             parts.append(f"<pre>{escape(chr(10).join(lines))}</pre>")
             lines = []
-        if each is not None:
+        if isinstance(each, str):
+            parts.append(f'<p class="faint">{escape(each)}</p>')
+        elif each is not None:
             parts += [f"<h2>{escape(each.title)}</h2>", each.html()]
     return parts

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 import time
-from collections.abc import Iterable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fulmar_benchmarks.results import QUANTILES, PairResult, cached_bound
+from fulmar_benchmarks.shape import POOL, ROS, Cell, Figures, Progress
+from fulmar_benchmarks.tables import display_name
 from fulmar_core.simulation.episode import Episode, episode_steps
 from fulmar_core.simulation.metrics import Trajectories, counts_targets, first_steps
 from fulmar_core.states.planar import wrapped
-from fulmar_evaluation.evaluation import Progress, Tally, Trial, runs_of
+from fulmar_evaluation.evaluation import Tally, Trial, runs_of
 from fulmar_evaluation.waypoint_score import bound_figures, has_bound
 
 if TYPE_CHECKING:
@@ -47,12 +46,47 @@ class Extra:
 
 
 @dataclass(frozen=True)
-class Unit:
-    """A trial, and where its outcome is kept."""
+class TrialCell(Cell):
+    """A trial of a pair: run it in one way, evaluate it, keep what tables and plots need."""
 
+    modules = ("fulmar_benchmarks.results",)
     trial: Trial
-    defines: str  # hash of whatever else the outcome depends on: code, configuration, controller
-    folder: Path
+    defines: str  # hash of the controller
+    bounds: Path  # folder of bounds, which several cells share
+
+    @property
+    def where(self) -> str:
+        """Those through ros are on nodes that use all cores themselves."""
+        return ROS if self.trial.through == "ros" else POOL
+
+    @property
+    def way(self) -> str:
+        """As the trial is run."""
+        return self.trial.through
+
+    @property
+    def name(self) -> str:
+        """File name without suffix."""
+        plan = self.trial.plan
+        return f"{plan.robot}_{plan.task}_{plan.controller}_{self.trial.through}"
+
+    @property
+    def title(self) -> str:
+        """Name for people."""
+        plan = self.trial.plan
+        return f"{display_name(plan.robot)}, {display_name(plan.task).lower()}, {plan.controller}, {self.way}"
+
+    @property
+    def cost(self) -> float:
+        """In steps of a batch."""
+        steps = self.trial.episodes * episode_steps(_long(self.trial).task, _control_dt(self.trial))
+        return steps * STEP_COSTS[self.trial.through]
+
+    def parts(self) -> dict[str, Any]:
+        """Not where the policy lies, nor how many processes there are."""
+        trial = self.trial
+        plan = asdict(replace(trial.plan, policy=""))
+        return {"plan": plan, "through": trial.through, "episodes": trial.episodes, "defines": self.defines}
 
     def extra(self) -> Extra:
         """What is gathered beside what every benchmark keeps."""
@@ -62,96 +96,55 @@ class Unit:
         """Where each episode lies in the map of successes, shape (episodes, 2)."""
         return _map_place(drawn, self.trial)
 
-    @property
-    def name(self) -> str:
-        """File name without suffix."""
-        plan = self.trial.plan
-        return f"{plan.robot}_{plan.task}_{plan.controller}_{self.trial.through}"
+    def measure(self, progress: Progress, pool: RosPool | None = None) -> Figures:
+        """Fields of a `PairResult`."""
+        return dict(vars(self.result(progress, pool)))
 
-    @property
-    def key(self) -> str:
-        """Hash of everything that the outcome depends on; not of where it runs."""
-        trial = self.trial
-        plan = asdict(replace(trial.plan, policy=""))
-        parts = {"plan": plan, "through": trial.through, "episodes": trial.episodes, "defines": self.defines}
-        return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
+    def result(self, progress: Progress = lambda steps: None, pool: RosPool | None = None) -> PairResult:
+        """Run it and evaluate it."""
+        began = time.monotonic()
+        trial, weight = _long(self.trial), STEP_COSTS[self.trial.through]
+        short = self.trial.task
+        steps = episode_steps(short, _control_dt(trial))
+        tally, errors, kept, extra = Tally(short), [], _Kept(), self.extra()
+        goals: list[np.ndarray] = []
+        for run in runs_of(trial, lambda done: progress(weight * done), pool=pool):
+            beginning = first_steps(run, steps)
+            tally.add(beginning)
+            errors.append(_main_column(run, short))
+            kept.add(beginning)
+            extra.add(beginning)
+            goals.append(run.goals)
+        drawn = trial.drawn(np.arange(trial.episodes))
+        figures, about = tally.figures | extra.figures(), _about(self.trial, tally.steps)
+        if counts_targets(short):
+            _count_goals(trial, drawn, np.concatenate(goals), figures, about, self.bounds)
+        if trial.through == "batch":
+            about["same_at_64_worlds"], about["compared_episodes"] = _same_with_few_worlds(
+                self.trial, figures
+            )
+        about["wall_s"] = time.monotonic() - began
+        sample = drawn[slice(0, KEPT)]  # type: ignore[index]
+        where = sample.start.logged()
+        return PairResult(
+            about=about,
+            succeeded=tally.succeeded,
+            figures=figures,
+            map_xy=self.map_place(drawn).astype(np.float32),
+            over_time=np.quantile(np.concatenate(errors), QUANTILES, axis=0).astype(np.float32),
+            paths=kept.paths,
+            starts=np.stack([where[name] for name in ("x", "y", "yaw")], axis=-1),
+            targets=np.asarray(sample.goal.targets),
+            goals=kept.goals,
+            obstacles=np.asarray(sample.goal.obstacles)[..., :3],
+            more=extra.arrays(),
+        )
 
-    @property
-    def path(self) -> Path:
-        """File of the outcome."""
-        return self.folder / f"{self.name}.npz"
 
-    @property
-    def cost(self) -> float:
-        """How long it takes, in steps of a batch."""
-        steps = self.trial.episodes * episode_steps(_long(self.trial).task, _control_dt(self.trial))
-        return steps * STEP_COSTS[self.trial.through]
-
-    def done_before(self) -> PairResult | None:
-        """The outcome of an earlier run with the same key, if there is one."""
-        try:
-            result = PairResult.load(self.path)
-        except (OSError, ValueError, KeyError):
-            return None
-        return result if result.about.get("key") == self.key else None
-
-
-def done_already(units: Iterable[Unit], *, fresh: bool) -> dict[Unit, PairResult]:
-    """What is known of some units from earlier runs."""
-    known = {}
-    for unit in units:
-        if not fresh and (before := unit.done_before()) is not None:
-            known[unit] = before
-    return known
-
-
-def run_unit(
-    unit: Unit, progress: Progress = lambda steps: None, *, pool: RosPool | None = None
-) -> PairResult:
-    """Run and evaluate a unit, and keep the outcome in its file.
-
-    Args:
-        unit: What to do.
-        progress: Called with how many steps have been done, of `cost`.
-        pool: Processes that stay for one unit after another, through ros.
-    """
-    began = time.monotonic()
-    trial, weight = _long(unit.trial), STEP_COSTS[unit.trial.through]
-    short = unit.trial.task
-    steps = episode_steps(short, _control_dt(trial))
-    tally, errors, kept, extra = Tally(short), [], _Kept(), unit.extra()
-    goals: list[np.ndarray] = []
-    for run in runs_of(trial, lambda done: progress(int(weight * done)), pool=pool):
-        beginning = first_steps(run, steps)
-        tally.add(beginning)
-        errors.append(_main_column(run, short))
-        kept.add(beginning)
-        extra.add(beginning)
-        goals.append(run.goals)
-    drawn = trial.drawn(np.arange(trial.episodes))
-    figures, about = tally.figures | extra.figures(), _about(unit, tally.steps)
-    if counts_targets(short):
-        _count_goals(trial, drawn, np.concatenate(goals), figures, about, unit.folder)
-    if trial.through == "batch":
-        about["same_at_64_worlds"], about["compared_episodes"] = _same_with_few_worlds(unit.trial, figures)
-    about["wall_s"] = time.monotonic() - began
-    sample = drawn[slice(0, KEPT)]  # type: ignore[index]
-    where = sample.start.logged()
-    outcome = PairResult(
-        about=about,
-        succeeded=tally.succeeded,
-        figures=figures,
-        map_xy=unit.map_place(drawn).astype(np.float32),
-        over_time=np.quantile(np.concatenate(errors), QUANTILES, axis=0).astype(np.float32),
-        paths=kept.paths,
-        starts=np.stack([where[name] for name in ("x", "y", "yaw")], axis=-1),
-        targets=np.asarray(sample.goal.targets),
-        goals=kept.goals,
-        obstacles=np.asarray(sample.goal.obstacles)[..., :3],
-        more=extra.arrays(),
-    )
-    outcome.save(unit.path)
-    return outcome
+def said_of(cell: Cell, figures: Figures, main: str) -> str:
+    """Main figure of a trial, and how fast it went."""
+    about = figures["about"]
+    return f"{main}, {about['wall_s']:.1f} s, {about['control_steps'] / about['wall_s']:,.0f} steps/s"
 
 
 class _Kept:
@@ -197,10 +190,8 @@ def _main_column(run: Trajectories, task: object) -> np.ndarray:
     return run.position_error if np.isfinite(run.position_error[0, 0]) else run.velocity_error
 
 
-def _about(unit: Unit, steps: int) -> dict[str, object]:
-    trial = unit.trial
+def _about(trial: Trial, steps: int) -> dict[str, object]:
     return {
-        "key": unit.key,
         "robot": trial.plan.robot,
         "task": trial.plan.task,
         "controller": trial.plan.controller,

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
+import functools
+from collections.abc import Mapping
 from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 from fulmar_benchmarks.drift.bounds import physics_of
+from fulmar_benchmarks.drift.cells import STYLE, conclusion, shown
 from fulmar_benchmarks.drift.conditions import (
     CONDITIONS,
     PATH_EPISODE_S,
@@ -17,12 +19,13 @@ from fulmar_benchmarks.drift.conditions import (
     POSE_TASK,
     ROBOT,
 )
-from fulmar_benchmarks.drift.document import Key, Request, document_of
-from fulmar_benchmarks.drift.unit import DriftUnit
-from fulmar_benchmarks.pairs import Pair, code_hash, hash_of, plan_of, with_law, with_policy
-from fulmar_benchmarks.results import CampaignResult
-from fulmar_benchmarks.unit import Unit
-from fulmar_benchmarks.workers import Outcome, evaluate_units
+from fulmar_benchmarks.drift.document import Key, document_of
+from fulmar_benchmarks.drift.unit import DriftCell
+from fulmar_benchmarks.pairs import Pair, plan_of, with_law, with_policy
+from fulmar_benchmarks.results import Outcome, PairResult, outcome_of
+from fulmar_benchmarks.shape import Benchmark, Cell, Check, Figures, Found
+from fulmar_benchmarks.tables import Shown
+from fulmar_benchmarks.unit import said_of
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.simulation.counts import check_episodes
 from fulmar_core.simulation.episode import episode_steps
@@ -30,92 +33,118 @@ from fulmar_core.tasks import load_task
 from fulmar_evaluation.evaluation import Trial
 from policy_server.controllers import policies_directory
 
+if TYPE_CHECKING:
+    from fulmar_evaluation.report.page import Plot
 
-def run_drift(
-    request: Request,
-    *,
-    progress: Callable[[float, float], None],
-    on_done: Callable[[Unit, Outcome, bool], None],
-) -> CampaignResult[Key]:
-    """Evaluate every controller in every row, but for what was evaluated before with the same code and configuration.
 
-    Arguments beside the request as in `evaluate_units`.
-    """
-    began = time.monotonic()
-    robot = load_robot(ROBOT)
-    steps = episode_steps(load_task(POSE_TASK), robot.timing.control_s)
-    units_at_once = min(request.jobs, len(request.rows) * len(request.controllers))
-    check_episodes(
-        robot,
-        episodes=request.episodes,
-        steps=steps,
-        jobs=request.jobs,
-        at_once=1 if request.through == "ros" else units_at_once,  # through ros units come one by one
-    )
-    pairs = {
-        (task, controller): _pair(request, task, controller)
-        for task in dict.fromkeys(_task_of_row(row) for row in request.rows)
-        for controller in request.controllers
-    }
-    code = code_hash(request.through)
-    units = {
-        (row, controller): _unit(request, row, controller, pairs[_task_of_row(row), controller], code)
-        for row in request.rows
-        for controller in request.controllers
-        if not pairs[_task_of_row(row), controller].missing
-    }
-    outcomes = evaluate_units(
-        list(units.values()), jobs=request.jobs, fresh=request.fresh, progress=progress, on_done=on_done
-    )
-    found = {key: outcomes[unit] for key, unit in units.items()}
-    document = document_of(
-        request,
-        pairs={
-            (row, name): pairs[_task_of_row(row), name]
-            for row in request.rows
-            for name in request.controllers
-        },
-        found=found,
-        physics={
-            row: physics_of(_trial(request, row, pairs[POSE_TASK, request.controllers[0]]))
-            for row in request.rows
+class Drift(Benchmark):
+    """Every controller in every row."""
+
+    name = "drift"
+    title = "Fulmar beside DRIFT"
+    width = 170
+
+    def check(self) -> None:
+        """Refuse more episodes than the memory holds."""
+        asked, robot = self.choice, load_robot(ROBOT)
+        steps = episode_steps(load_task(POSE_TASK), robot.timing.control_s)
+        at_once = min(asked.jobs, len(asked.rows) * len(asked.controllers))
+        at_once = 1 if asked.through == "ros" else at_once  # through ros cells come one by one
+        check_episodes(robot, episodes=asked.episodes, steps=steps, jobs=asked.jobs, at_once=at_once)
+
+    @functools.cached_property
+    def pairs(self) -> dict[Key, Pair]:
+        """Who drives, by row and controller."""
+        by_task = {
+            (task, name): self._pair(task, name)
+            for task in dict.fromkeys(map(_task_of_row, self.choice.rows))
+            for name in self.choice.controllers
+        }
+        return {
+            (row, name): by_task[_task_of_row(row), name]
+            for row in self.choice.rows
+            for name in self.choice.controllers
+        }
+
+    def _pair(self, task: str, controller: str) -> Pair:
+        if controller != "policy":
+            return with_law(ROBOT, task, controller)
+        given = self.choice.policy if task == POSE_TASK else self.choice.tracking_policy
+        return with_policy(ROBOT, task, given or policies_directory() / f"{ROBOT}_{task}")
+
+    def _trial(self, row: str, pair: Pair) -> Trial:
+        asked = self.choice
+        condition = next((one for one in CONDITIONS if one.name == row), None)
+        path = next((one for one in PATHS if one.name == row), None)
+        plan = plan_of(
+            pair,
+            scenario=condition.scenario if condition else PATH_SCENARIO,
+            seed=asked.seed,
+            duration_s=PATH_EPISODE_S if path else None,
+        )
+        episodes = min(asked.episodes, PATH_EPISODES) if path else asked.episodes
+        plan = replace(plan, goals=path.goals if path else "")
+        return Trial(plan, asked.through, episodes, episodes, asked.jobs)
+
+    def cells(self) -> list[DriftCell]:
+        """Every pair that somebody drives."""
+        bounds = self.choice.out / "outcomes"
+        return [
+            DriftCell(self._trial(row, pair), pair.sha256, bounds, row=row, controller=name)
+            for (row, name), pair in self.pairs.items()
+            if not pair.missing
+        ]
+
+    def outcomes(self, found: Found) -> dict[Key, Outcome]:
+        """What came of each row and controller."""
+        return {(cell.row, cell.controller): outcome_of(found[cell.name]) for cell in self.cells()}
+
+    def document(self, found: Found) -> dict[str, Any]:
+        """docs/evaluation.md names its keys."""
+        physics = {
+            row: physics_of(self._trial(row, self.pairs[row, self.choice.controllers[0]]))
+            for row in self.choice.rows
             if _task_of_row(row) == POSE_TASK
-        },
-        wall_s=time.monotonic() - began,
-    )
-    return CampaignResult.of(document, found)
+        }
+        return document_of(self.choice, pairs=self.pairs, found=self.outcomes(found), physics=physics)
+
+    def checks(self, document: Mapping[str, Any]) -> list[Check]:
+        """Of each row and controller."""
+        return [
+            Check(f"{one['row']}, {one['controller']}: {one['figure']}", one["measured"], one["limit"], one["met"],
+                  one["better"])
+            for one in document["requirements"]
+        ]  # fmt: skip
+
+    def tables(self, document: Mapping[str, Any]) -> list[Shown]:
+        """Both tables, what their figures are, what is not met, and the conclusion."""
+        return shown(document)
+
+    def conclusion(self, document: Mapping[str, Any]) -> str:
+        """One sentence on what was required and met."""
+        return conclusion(document)
+
+    @property
+    def style(self) -> str:  # type: ignore[override]
+        """Colours of the bands."""
+        return STYLE
+
+    def plots(self, document: Mapping[str, Any], found: Found) -> list[Plot]:
+        """At a glance, over time, starts and paths."""
+        from fulmar_benchmarks.drift.report.sections import plots
+
+        every = self.outcomes(found)
+        return plots(document, {key: one for key, one in every.items() if isinstance(one, PairResult)})
+
+    def said(self, cell: Cell, figures: Figures) -> str:
+        """Its main figure."""
+        own = figures["figures"]
+        if "PT5_percent" in own:
+            main = f"PT5 {own['PT5_percent'].mean():.1f} %, OT5 {own['OT5_percent'].mean():.1f} %"
+        else:
+            main = f"velocity error {own['velocity_error_m_s'].mean():.4f} m/s"
+        return said_of(cell, figures, main)
 
 
 def _task_of_row(row: str) -> str:
     return PATH_TASK if any(path.name == row for path in PATHS) else POSE_TASK
-
-
-def _pair(request: Request, task: str, controller: str) -> Pair:
-    if controller != "policy":
-        return with_law(ROBOT, task, controller)
-    given = request.policy if task == POSE_TASK else request.tracking_policy
-    return with_policy(ROBOT, task, given or policies_directory() / f"{ROBOT}_{task}")
-
-
-def _unit(request: Request, row: str, controller: str, pair: Pair, code: str) -> DriftUnit:
-    return DriftUnit(
-        _trial(request, row, pair),
-        hash_of(pair.sha256, code),
-        request.folder / "outcomes",
-        row=row,
-        controller=controller,
-    )
-
-
-def _trial(request: Request, row: str, pair: Pair) -> Trial:
-    condition = next((one for one in CONDITIONS if one.name == row), None)
-    path = next((one for one in PATHS if one.name == row), None)
-    plan = plan_of(
-        pair,
-        scenario=condition.scenario if condition else PATH_SCENARIO,
-        seed=request.seed,
-        duration_s=PATH_EPISODE_S if path else None,
-    )
-    plan = replace(plan, goals=path.goals if path else "")
-    episodes = min(request.episodes, PATH_EPISODES) if path else request.episodes
-    return Trial(plan, request.through, episodes, episodes, request.jobs)

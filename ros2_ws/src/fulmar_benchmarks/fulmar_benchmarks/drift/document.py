@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from fulmar_benchmarks.cells import heading_of, tally
 from fulmar_benchmarks.drift.bounds import Physics
 from fulmar_benchmarks.drift.conditions import CONDITIONS, PATHS
 from fulmar_benchmarks.drift.targets import FIGURES, TRACKING, band_of, drop_percent, published, requirements
 from fulmar_benchmarks.pairs import Pair
-from fulmar_benchmarks.results import PairResult
+from fulmar_benchmarks.results import PairResult, statistics
+from fulmar_benchmarks.shape import Choice
 
 Key = tuple[str, str]  # row and controller
 # Names of our figures by those of the thesis.
@@ -37,78 +34,43 @@ OF_PATHS = {
 }
 
 
-@dataclass(frozen=True)
-class Request:
-    """What to evaluate."""
-
-    rows: Sequence[str]
-    controllers: Sequence[str]
-    through: str  # batch, mujoco or ros
-    episodes: int  # of each condition; paths have at most their own number
-    seed: int
-    folder: Path  # outcomes are kept below it
-    policy: Path | None = None  # bundle for the pose; the shipped one by default
-    tracking_policy: Path | None = None  # bundle for the paths; the shipped one by default
-    jobs: int = 2
-    fresh: bool = False  # evaluate again what was evaluated before
-    command: str = ""  # for the record
-
-
 def document_of(
-    request: Request,
-    *,
-    pairs: dict[Key, Pair],
-    found: dict[Key, PairResult | str],
-    physics: dict[str, Physics],
-    wall_s: float,
+    choice: Choice, *, pairs: dict[Key, Pair], found: dict[Key, PairResult | str], physics: dict[str, Physics]
 ) -> dict[str, Any]:
     """The whole document; docs/evaluation.md names its keys.
 
     Args:
-        request: What was asked for.
+        choice: What was asked for.
         pairs: Who drives, by row and controller.
         found: Results, or why there is none.
         physics: What is possible in the conditions, by row.
-        wall_s: How long it took [s].
     """
     rows = {
-        row.name: _row(row, request, pairs, found, physics.get(row.name))
+        row.name: _row(row, choice, pairs, found, physics.get(row.name))
         for row in (*CONDITIONS, *PATHS)
-        if row.name in request.rows
+        if row.name in choice.rows
     }
     _add_drops(rows)
-    checks = [check for row in rows for name in request.controllers for check in _checks(row, name, rows)]
     results = [one for one in found.values() if isinstance(one, PairResult)]
     steps = sum(one.about["control_steps"] for one in results)
     busy_s = sum(one.about["wall_s"] for one in results)
     return {
-        **heading_of("drift", request.command),
-        "through": request.through,
-        "seed": request.seed,
-        "episodes": request.episodes,
-        "controllers": list(request.controllers),
+        "through": choice.through,
+        "seed": choice.seed,
+        "episodes": choice.episodes,
+        "controllers": list(choice.controllers),
         "rows": rows,
-        "requirements": checks,
-        **tally(check["met"] for check in checks),
+        "requirements": [
+            each for row in rows for name in choice.controllers for each in _checks(row, name, rows)
+        ],
         "control_steps": steps,
         "steps_per_s": steps / busy_s if busy_s else None,
-        "wall_s": round(wall_s, 1),
     }
-
-
-def statistics(values: np.ndarray) -> dict[str, float | None]:
-    """Mean, median, 5th and 95th percentile of what is a number, shape (episodes,)."""
-    known = np.asarray(values, dtype=float)
-    known = known[np.isfinite(known)]
-    if not known.size:
-        return {"mean": None, "median": None, "p5": None, "p95": None}
-    low, middle, high = (float(value) for value in np.percentile(known, (5, 50, 95)))
-    return {"mean": float(np.mean(known)), "median": middle, "p5": low, "p95": high}
 
 
 def _row(
     row: Any,
-    request: Request,
+    choice: Choice,
     pairs: dict[Key, Pair],
     found: dict[Key, PairResult | str],
     physics: Physics | None,
@@ -126,7 +88,7 @@ def _row(
         }
     entry["controllers"] = {
         name: _entry(row.name, name, physics, pairs[row.name, name], found.get((row.name, name)))
-        for name in request.controllers
+        for name in choice.controllers
     }
     return entry
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from fulmar_benchmarks.cells import Check
+from fulmar_benchmarks.shape import Check
 
 FIGURES = ("PT5", "PT2", "PT1", "OT5", "OT2", "OT1", "ALV", "AAV", "AAS")
 DIGITS = {name: 0 if name[1] == "T" else 2 for name in FIGURES}  # as printed there
@@ -100,10 +100,7 @@ class Requirement:
 
     def check(self, measured: float | None) -> Check:
         """Compare with a measurement; None where there is none."""
-        met = None
-        if measured is not None:
-            met = measured >= self.limit if self.at_least else measured <= self.limit
-        return Check(self.figure, measured, self.limit, met)
+        return (Check.least if self.at_least else Check.most)(self.figure, measured, self.limit)
 
 
 def requirements(row: str, controller: str) -> list[Requirement]:

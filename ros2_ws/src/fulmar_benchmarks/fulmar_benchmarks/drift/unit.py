@@ -8,7 +8,7 @@ import numpy as np
 
 from fulmar_benchmarks.drift.conditions import RUN_UP_S
 from fulmar_benchmarks.results import QUANTILES
-from fulmar_benchmarks.unit import KEPT, Extra, Unit
+from fulmar_benchmarks.unit import KEPT, Extra, TrialCell
 from fulmar_core.simulation.metrics import Trajectories
 from fulmar_core.tasks.path_task import FollowPath
 
@@ -16,9 +16,10 @@ BANDS = ("distance_m", "heading_error_deg", "speed_m_s", "turn_rate_deg_s")  # k
 
 
 @dataclass(frozen=True)
-class DriftUnit(Unit):
+class DriftCell(TrialCell):
     """A trial of one row."""
 
+    modules = (*TrialCell.modules, f"{__package__}.conditions")
     row: str = ""  # of conditions.ROWS
     controller: str = ""  # as it was asked for
 
@@ -26,6 +27,11 @@ class DriftUnit(Unit):
     def name(self) -> str:
         """File name without suffix."""
         return f"{self.row}_{self.controller}_{self.trial.through}"
+
+    @property
+    def title(self) -> str:
+        """Name for people."""
+        return f"{self.row}, {self.controller}"
 
     def extra(self) -> Extra:
         """Bands over time of a pose row, errors over time of a path row."""

@@ -6,34 +6,52 @@ spheres. So whatever is too much in the plane is too much in space, for any plan
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from fulmar_benchmarks.rans3d.unit import SpaceTrial
-from fulmar_benchmarks.workers import mapped
+from fulmar_benchmarks.shape import Cell, Figures, Progress
 from fulmar_core.robots.robot import Robot
 from fulmar_core.simulation.episode import Episode
 from fulmar_core.tasks import Task
 from fulmar_evaluation.bounds.time_optimal import time_optimal_bound
 
-Pair = tuple[str, str]  # robot and task
-
 PLANES = ((0, 1), (1, 2), (2, 0))  # by their axes in the world
 BOUNDED = 64  # episodes, from the first on: each takes a tenth of a second
 
 
-def bounds_of(trials: Mapping[Pair, SpaceTrial], *, jobs: int) -> dict[Pair, np.ndarray]:
-    """Bound the first `BOUNDED` episodes of some trials, by what they are called."""
-    if not trials:
-        return {}
-    work = [(trial,) for trial in trials.values()]
-    return dict(zip(trials, mapped(_bound, work, jobs=jobs, progress=lambda *_: None), strict=True))
+@dataclass(frozen=True)
+class BoundCell(Cell):
+    """Bound on the first `BOUNDED` episodes of a trial."""
 
+    modules = ("fulmar_benchmarks.rans3d.unit",)
+    trial: SpaceTrial
 
-def _bound(trial: SpaceTrial) -> np.ndarray:
-    drawn = trial.drawn(np.arange(min(trial.episodes, BOUNDED)))
-    return most_targets(trial.robot, trial.task, drawn)
+    @property
+    def name(self) -> str:
+        """File name without suffix."""
+        return f"bound_{self.trial.plan.robot}_{self.trial.plan.task}"
+
+    @property
+    def numbers(self) -> np.ndarray:
+        """Of the episodes."""
+        return np.arange(min(self.trial.episodes, BOUNDED))
+
+    @property
+    def cost(self) -> float:
+        """In steps of a batch."""
+        return 5e4 * len(self.numbers)
+
+    def parts(self) -> dict[str, Any]:
+        """Whoever drives."""
+        plan = asdict(replace(self.trial.plan, policy="", controller=""))
+        return {"plan": plan, "farthest_m": self.trial.farthest_m, "episodes": len(self.numbers)}
+
+    def measure(self, progress: Progress, pool: Any = None) -> Figures:
+        """Whole targets of each episode."""
+        return {"goals": most_targets(self.trial.robot, self.trial.task, self.trial.drawn(self.numbers))}
 
 
 def most_targets(robot: Robot, task: Task, drawn: Episode) -> np.ndarray:

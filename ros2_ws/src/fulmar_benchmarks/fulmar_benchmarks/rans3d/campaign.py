@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
-from typing import Any, cast
+import functools
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, cast
 
-from fulmar_benchmarks.pairs import Pair, code_hash, hash_of, plan_of, with_law, with_policy
-from fulmar_benchmarks.rans3d.bound import bounds_of
-from fulmar_benchmarks.rans3d.document import Key, Request, document_of
-from fulmar_benchmarks.rans3d.integrator import measure_integrator
-from fulmar_benchmarks.rans3d.pace import measure_pace
+from fulmar_benchmarks.pairs import Pair, plan_of, with_law, with_policy
+from fulmar_benchmarks.rans3d.bound import BoundCell
+from fulmar_benchmarks.rans3d.document import Key, document_of
+from fulmar_benchmarks.rans3d.integrator import integrator_of, tumbles
+from fulmar_benchmarks.rans3d.pace import PaceCell
+from fulmar_benchmarks.rans3d.tables import conclusion, shown
 from fulmar_benchmarks.rans3d.targets import (
     DEAD,
     DEAD_CONTROLLERS,
@@ -19,106 +20,162 @@ from fulmar_benchmarks.rans3d.targets import (
     ROBOTS,
     how_to_make,
 )
-from fulmar_benchmarks.rans3d.unit import SpaceTrial, SpaceUnit
-from fulmar_benchmarks.results import CampaignResult
-from fulmar_benchmarks.unit import Unit
-from fulmar_benchmarks.workers import Outcome, evaluate_units
+from fulmar_benchmarks.rans3d.unit import SpaceCell, SpaceTrial
+from fulmar_benchmarks.results import Outcome, PairResult, outcome_of
+from fulmar_benchmarks.shape import Benchmark, Cell, Check, Choice, Figures, Found, known
+from fulmar_benchmarks.tables import Shown
+from fulmar_benchmarks.unit import said_of
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.simulation.counts import check_episodes
 from fulmar_core.simulation.episode import episode_steps
 from fulmar_core.tasks import load_task
 from policy_server.controllers import policies_directory
 
+if TYPE_CHECKING:
+    from fulmar_evaluation.report.page import Plot
+
 WAY = "mujoco"
 
 
-def run_rans3d(
-    request: Request,
-    *,
-    progress: Callable[[float, float], None],
-    on_done: Callable[[Unit, Outcome, bool], None],
-) -> CampaignResult[Key]:
-    """Measure everything that is asked for; evaluations with the same code and configuration are not repeated.
+class Rans3d(Benchmark):
+    """Every controller at every task, thrusters that are dead, the integrator and the pace."""
 
-    Arguments beside the request as in `evaluate_units`.
-    """
-    began = time.monotonic()
-    keys = _keys(request)
-    _check(request, keys)
-    pairs = {key[:3]: _pair(request, *key[:3]) for key in keys}
-    code = code_hash(WAY) if keys else ""
-    units = {key: _unit(request, pairs[key[:3]], key[3], code) for key in keys if not pairs[key[:3]].missing}
-    outcomes = evaluate_units(
-        list(units.values()), jobs=request.jobs, fresh=request.fresh, progress=progress, on_done=on_done
-    )
-    found = {key: outcomes[unit] for key, unit in units.items()}
-    counting = {
-        key[:2]: cast(SpaceTrial, unit.trial)
-        for key, unit in units.items()
-        if unit.trial.task.required is not None
-    }
-    parts: dict[str, Any] = {
-        "bounds": bounds_of(counting, jobs=request.jobs),
-        "integrator": None,
-        "throughput": None,
-    }
-    if "integrator" in request.parts:
-        robots = [load_robot(name) for name in request.robots]
-        parts["integrator"] = measure_integrator(
-            robots, request.tumble_s, jobs=request.jobs, progress=progress
+    name = "rans3d"
+    title = "Fulmar at the 3-D tasks of RANS"
+    width = 180
+
+    @functools.cached_property
+    def keys(self) -> list[Key]:
+        """What is to be evaluated."""
+        return _keys(self.choice)
+
+    @functools.cached_property
+    def pairs(self) -> dict[tuple[str, str, str], Pair]:
+        """Who drives, by robot, task and controller."""
+        return {key[:3]: pair_of(self.choice, *key[:3]) for key in self.keys}
+
+    def check(self) -> None:
+        """Refuse more episodes than the memory holds."""
+        asked, keys = self.choice, self.keys
+        for name in dict.fromkeys(key[0] for key in keys):
+            robot = load_robot(name)
+            steps = max(
+                episode_steps(load_task(key[1]), robot.timing.control_s) for key in keys if key[0] == name
+            )
+            at_once = min(asked.jobs, len(keys))
+            check_episodes(robot, episodes=asked.episodes, steps=steps, jobs=asked.jobs, at_once=at_once)
+
+    @functools.cached_property
+    def _trials(self) -> dict[Key, SpaceCell]:
+        """Of those that somebody drives."""
+        return {
+            key: cell_of(self.choice, self.pairs[key[:3]], key[3])
+            for key in self.keys
+            if not self.pairs[key[:3]].missing
+        }
+
+    @property
+    def _bounds(self) -> dict[tuple[str, str], BoundCell]:
+        """Of robots and tasks that count targets."""
+        return {
+            key[:2]: BoundCell(cast(SpaceTrial, cell.trial))
+            for key, cell in self._trials.items()
+            if cell.trial.task.required is not None
+        }
+
+    def cells(self) -> list[Cell]:
+        """Trials and their bounds, tumbles, and the pace, last and alone."""
+        asked, parts = self.choice, self.choice.parts
+        return [
+            *self._trials.values(),
+            *self._bounds.values(),
+            *(tumbles(asked.robots, asked.tumble_s) if "integrator" in parts else []),
+            *([PaceCell(asked.worlds, asked.jobs, asked.seconds)] if "throughput" in parts else []),
+        ]
+
+    def outcomes(self, found: Found) -> dict[Key, Outcome]:
+        """What came of each trial."""
+        return {key: outcome_of(found[cell.name]) for key, cell in self._trials.items()}
+
+    def document(self, found: Found) -> dict[str, Any]:
+        """docs/evaluation.md names its keys."""
+        asked, parts = self.choice, self.choice.parts
+        return document_of(
+            asked,
+            pairs=self.pairs,
+            keys=self.keys,
+            found=self.outcomes(found),
+            bounds={place: known(found, cell.name)["goals"] for place, cell in self._bounds.items()},
+            integrator=integrator_of(asked.robots, asked.tumble_s, found) if "integrator" in parts else None,
+            throughput=known(found, "throughput") if "throughput" in parts else None,
         )
-    if "throughput" in request.parts:  # last and alone
-        parts["throughput"] = measure_pace(
-            worlds=request.worlds, cores=request.jobs, seconds=request.seconds, progress=progress
-        )
-    document = document_of(
-        request, pairs=pairs, keys=keys, found=found, wall_s=time.monotonic() - began, **parts
-    )
-    return CampaignResult.of(document, found)
+
+    def checks(self, document: Mapping[str, Any]) -> list[Check]:
+        """Success, drifts and pace."""
+        return [check_of(line) for line in document["requirements"]]
+
+    def tables(self, document: Mapping[str, Any]) -> list[Shown]:
+        """One table a robot, the other parts line by line, what is required and aimed at, and the conclusion."""
+        aims = [f"aim: {check_of(line).line}" for line in document["aims"]]
+        return [*shown(document), *self.check_lines(document), *aims, conclusion(document)]
+
+    def conclusion(self, document: Mapping[str, Any]) -> str:
+        """One sentence on what was required and met."""
+        return conclusion(document)
+
+    def plots(self, document: Mapping[str, Any], found: Found) -> list[Plot]:
+        """At a glance, and over time."""
+        from fulmar_benchmarks.rans3d.report.plots import plots
+
+        every = self.outcomes(found)
+        return plots(document, {key: one for key, one in every.items() if isinstance(one, PairResult)})
+
+    def said(self, cell: Cell, figures: Figures) -> str:
+        """Its success."""
+        if not isinstance(cell, SpaceCell):
+            return "measured"
+        return said_of(cell, figures, f"success {figures['succeeded'].mean():.3f}")
 
 
-def _keys(request: Request) -> list[Key]:
+def check_of(line: Mapping[str, Any]) -> Check:
+    """A requirement of a document."""
+    return Check(*(line[key] for key in ("name", "measured", "limit", "met", "better")))
+
+
+def _keys(asked: Choice) -> list[Key]:
     keys: list[Key] = []
-    if "tasks" in request.parts:
+    if "tasks" in asked.parts:
         keys += [
             (robot, task, controller, scenario)
-            for robot in request.robots
-            for task in request.tasks
-            for controller in request.controllers
-            for scenario in request.scenarios
+            for robot in asked.robots
+            for task in asked.tasks
+            for controller in asked.controllers
+            for scenario in asked.scenarios
         ]
-    if "dead" in request.parts and ROBOTS[0] in request.robots:
+    if "dead" in asked.parts and ROBOTS[0] in asked.robots:
         keys += [
             (ROBOTS[0], DEAD_TASK, controller, scenario)
             for scenario in DEAD
             for controller in DEAD_CONTROLLERS
-            if controller in request.controllers
+            if controller in asked.controllers
         ]
     return keys
 
 
-def _check(request: Request, keys: list[Key]) -> None:
-    for name in dict.fromkeys(key[0] for key in keys):
-        robot = load_robot(name)
-        steps = max(
-            episode_steps(load_task(key[1]), robot.timing.control_s) for key in keys if key[0] == name
-        )
-        at_once = min(request.jobs, len(keys))
-        check_episodes(robot, episodes=request.episodes, steps=steps, jobs=request.jobs, at_once=at_once)
-
-
-def _pair(request: Request, robot: str, task: str, controller: str) -> Pair:
+def pair_of(asked: Choice, robot: str, task: str, controller: str) -> Pair:
+    """Who drives a robot at a task, or why nobody does."""
     if controller != "policy":
         return with_law(robot, task, controller)
-    folder = (request.policies or policies_directory()) / f"{robot}_{task}"
+    folder = (asked.policies or policies_directory()) / f"{robot}_{task}"
     pair = with_policy(robot, task, folder)
     if folder.is_dir():
         return pair
     return Pair(robot, task, "policy", reason=f"there is no bundle {folder.name}: {how_to_make(robot, task)}")
 
 
-def _unit(request: Request, pair: Pair, scenario: str, code: str) -> SpaceUnit:
+def cell_of(asked: Choice, pair: Pair, scenario: str) -> SpaceCell:
+    """A pair in a scenario."""
     farthest, seconds = EPISODES.get(pair.robot, (0.0, None))
-    plan = plan_of(pair, scenario=scenario, seed=request.seed, duration_s=seconds)
-    trial = SpaceTrial(plan, WAY, request.episodes, request.episodes, farthest_m=farthest)
-    return SpaceUnit(trial, hash_of(pair.sha256, code, f"{farthest:g}"), request.folder / "outcomes")
+    plan = plan_of(pair, scenario=scenario, seed=asked.seed, duration_s=seconds)
+    trial = SpaceTrial(plan, WAY, asked.episodes, asked.episodes, farthest_m=farthest)
+    return SpaceCell(trial, pair.sha256, asked.out / "outcomes")

@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from pathlib import Path
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
-from fulmar_benchmarks.cells import heading_of, tally
 from fulmar_benchmarks.pairs import Pair
 from fulmar_benchmarks.rans3d.targets import (
     AIMED_RATIO,
     AIMED_STEPS_PER_S,
-    CONTROLLERS,
     DEAD,
     DEAD_CONTROLLERS,
     DEAD_TASK,
-    HOUR_S,
     LEAST_RATIO,
     LEAST_WITH_DEAD,
     MOST_DUTY,
@@ -30,17 +25,14 @@ from fulmar_benchmarks.rans3d.targets import (
     RANDOMISED,
     REQUIRED,
     ROBOTS,
-    SCENARIOS,
-    TASKS,
-    WORLDS,
     published,
 )
 from fulmar_benchmarks.rans3d.unit import HELD
 from fulmar_benchmarks.results import PairResult
 from fulmar_benchmarks.roboran.document import wilson
+from fulmar_benchmarks.shape import Choice
 from fulmar_core.simulation.metrics import summarise
 
-PARTS = ("tasks", "dead", "integrator", "throughput")
 Key = tuple[str, str, str, str]  # robot, task, controller, scenario
 Cells = dict[str, dict[str, dict[str, Any]]]  # by task and controller
 # Keys of a cell, by the figures whose means they are.
@@ -55,29 +47,8 @@ MEANS = {
 }
 
 
-@dataclass(frozen=True)
-class Request:
-    """What to measure."""
-
-    folder: Path  # outcomes are kept below it
-    episodes: int
-    seed: int
-    parts: Sequence[str] = PARTS
-    robots: Sequence[str] = ROBOTS
-    tasks: Sequence[str] = TASKS
-    controllers: Sequence[str] = CONTROLLERS
-    scenarios: Sequence[str] = SCENARIOS
-    policies: Path | None = None  # folder of bundles; the shipped ones by default
-    jobs: int = 2
-    fresh: bool = False  # evaluate again what was evaluated before
-    tumble_s: float = HOUR_S  # length of the tumble [s]
-    worlds: int = WORLDS  # of the batch whose pace is measured
-    seconds: float = 1.0  # of each measurement of the pace [s]
-    command: str = ""  # for the record
-
-
 def document_of(
-    request: Request,
+    choice: Choice,
     *,
     pairs: dict[tuple[str, str, str], Pair],
     keys: list[Key],
@@ -85,21 +56,19 @@ def document_of(
     bounds: dict[tuple[str, str], np.ndarray],
     integrator: dict[str, Any] | None,
     throughput: dict[str, Any] | None,
-    wall_s: float,
 ) -> dict[str, Any]:
     """The whole document; docs/evaluation.md names its keys.
 
     Args:
-        request: What was asked for.
+        choice: What was asked for.
         pairs: Who drives, by robot, task and controller.
         keys: What was to be evaluated.
         found: Results, or why there is none.
         bounds: Most targets of the first episodes, by robot and task that counts them.
         integrator: Of `measure_integrator`; None: not measured.
         throughput: Of `measure_pace`; None: not measured.
-        wall_s: How long it took [s].
     """
-    cells = {robot: _cells(request, robot, pairs, found, bounds) for robot in ROBOTS}
+    cells = {robot: _cells(choice, robot, pairs, found, bounds) for robot in ROBOTS}
     dead = [
         figures_of(found.get((ROBOTS[0], DEAD_TASK, controller, scenario)))
         | {"scenario": scenario, "dead": count, "of": 16, "task": DEAD_TASK, "controller": controller}
@@ -109,12 +78,11 @@ def document_of(
     ]
     requirements = [*_of_cells(cells), *_of_integrator(integrator), *_of_pace(throughput)]
     return {
-        **heading_of("rans3d", request.command),
-        "seed": request.seed,
+        "seed": choice.seed,
         "through": "mujoco",
-        "episodes": request.episodes,
-        "controllers": list(request.controllers),
-        "scenarios": list(request.scenarios),
+        "episodes": choice.episodes,
+        "controllers": list(choice.controllers),
+        "scenarios": list(choice.scenarios),
         "published_note": PUBLISHED_NOTE,
         "tasks": cells[ROBOTS[0]],
         ROBOTS[1]: cells[ROBOTS[1]],
@@ -123,39 +91,37 @@ def document_of(
         "throughput": throughput,
         "requirements": requirements,
         "aims": [*_aims_of_cells(cells, dead), *_aims_of_pace(throughput)],
-        **tally(one["met"] for one in requirements),
-        "wall_s": round(wall_s, 1),
     }
 
 
 def _cells(
-    request: Request,
+    choice: Choice,
     robot: str,
     pairs: dict[tuple[str, str, str], Pair],
     found: dict[Key, PairResult | str],
     bounds: dict[tuple[str, str], np.ndarray],
 ) -> Cells:
-    if robot not in request.robots or "tasks" not in request.parts:
+    if robot not in choice.robots or "tasks" not in choice.parts:
         return {}
     return {
         task: {
             name: _cell(
-                request, pairs[robot, task, name], (robot, task, name), found, bounds.get((robot, task))
+                choice, pairs[robot, task, name], (robot, task, name), found, bounds.get((robot, task))
             )
-            for name in request.controllers
+            for name in choice.controllers
         }
-        for task in request.tasks
+        for task in choice.tasks
     }
 
 
 def _cell(
-    request: Request,
+    choice: Choice,
     pair: Pair,
     place: tuple[str, str, str],
     found: dict[Key, PairResult | str],
     bound: np.ndarray | None,
 ) -> dict[str, Any]:
-    outcomes = {scenario: found.get((*place, scenario)) for scenario in request.scenarios}
+    outcomes = {scenario: found.get((*place, scenario)) for scenario in choice.scenarios}
     faults = [f"{scenario}: {one}" for scenario, one in outcomes.items() if isinstance(one, str)]
     missing, good = pair.missing, any(isinstance(one, PairResult) for one in outcomes.values())
     entry = figures_of(outcomes.get(NOMINAL)) | {

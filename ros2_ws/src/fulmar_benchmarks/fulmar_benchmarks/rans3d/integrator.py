@@ -2,53 +2,71 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor, wait
-from dataclasses import asdict
-from multiprocessing import get_context
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
 from fulmar_benchmarks.mujoco_pace import INTEGRATORS
 from fulmar_benchmarks.rans3d.mujoco_tumble import MOST_S, mujoco_drift
-from fulmar_benchmarks.workers import begin_worker, counted, ended_with_us, one_thread_each
-from fulmar_core.dynamics.tumble import AXIS, MOMENTS, RATE, Drift, drift_over, measured_order
-from fulmar_core.robots.robot import Robot
+from fulmar_benchmarks.shape import Cell, Figures, Found, Progress, known
+from fulmar_core.dynamics.tumble import AXIS, MOMENTS, RATE, drift_over, measured_order
+from fulmar_core.robots.robot_file import load_robot
 
 METHOD = "Runge-Kutta for the turn rate, Magnus expansion for the attitude"
+COST = 1e4  # of a second of the tumble, in steps of a batch
 TYPES = {"float64": np.float64, "float32": np.float32}
 
 
-def measure_integrator(
-    robots: Sequence[Robot], seconds: float, *, jobs: int, progress: Callable[[float, float], None]
-) -> dict[str, Any]:
-    """Let the body tumble at the step of each robot.
+@dataclass(frozen=True)
+class TumbleCell(Cell):
+    """One tumble at the step of a robot, by our step in one precision, or by one of MuJoCo's methods."""
 
-    Args:
-        robots: Robots in space; only their integration steps matter.
-        seconds: Length of the tumble [s].
-        jobs: Processes at once.
-        progress: Called with how much is done, and of how much.
+    modules = tuple(f"fulmar_benchmarks.{name}" for name in ("rans3d.mujoco_tumble", "mujoco_pace"))
+    robot: str
+    how: str  # of TYPES, or of MuJoCo's INTEGRATORS
+    seconds: float
+
+    @property
+    def name(self) -> str:
+        """File name without suffix."""
+        return f"tumble_{self.robot}_{self.how}"
+
+    @property
+    def way(self) -> str:
+        """MuJoCo counts, too."""
+        return "mujoco"
+
+    @property
+    def cost(self) -> float:
+        """In steps of a batch."""
+        return COST * self.seconds
+
+    def measure(self, progress: Progress, pool: Any = None) -> Figures:
+        """Largest relative drifts."""
+        dt = load_robot(self.robot).timing.physics_dt
+        if self.how not in TYPES:
+            return asdict(mujoco_drift(self.how, self.seconds, dt))
+        return asdict(drift_over(self.seconds, dt, TYPES[self.how], lambda done: progress(COST * done)))
+
+
+def tumbles(robots: Sequence[str], seconds: float) -> list[TumbleCell]:
+    """Each robot in both precisions, and MuJoCo at the step of the first."""
+    ours = [TumbleCell(robot, how, seconds) for robot in robots for how in TYPES]
+    return ours + [TumbleCell(robots[0], how, seconds) for how in INTEGRATORS]
+
+
+def integrator_of(robots: Sequence[str], seconds: float, found: Found) -> dict[str, Any]:
+    """What came of `tumbles`.
 
     Returns:
         JSON-ready: method, order and body; by robot the `step_s`, and in each precision the largest relative drifts
         `energy`, `momentum` and `from_jacobi`. Under `mujoco` the same of MuJoCo's methods in float64, at the step of
         the first robot, for ten minutes at most.
     """
-    spawn = get_context("spawn")
-    work = [(robot.timing.physics_dt, name) for robot in robots for name in TYPES]
-    counts = spawn.Array("q", len(work), lock=False)
-    with (
-        one_thread_each(),
-        ended_with_us(ProcessPoolExecutor(jobs, spawn, begin_worker, (counts, os.getpid()))) as pool,
-    ):
-        futures = [pool.submit(_drift, seconds, *each, i) for i, each in enumerate(work)]
-        while wait(futures, timeout=0.5).not_done:
-            progress(float(sum(counts)), seconds * len(work))
-        drifts = [asdict(future.result()) for future in futures]
-    of_each = iter(drifts)
+    steps = {robot: load_robot(robot).timing.physics_dt for robot in robots}
+    mujoco = {how: known(found, f"tumble_{robots[0]}_{how}") for how in INTEGRATORS}
     return {
         "method": METHOD,
         "order": measured_order(),
@@ -56,20 +74,9 @@ def measure_integrator(
         "rate_rad_s": RATE,
         "axis": list(AXIS),
         "seconds": seconds,
-        "mujoco": {
-            "step_s": robots[0].timing.physics_dt,
-            "seconds": min(seconds, MOST_S),
-            **{
-                name: asdict(mujoco_drift(name, seconds, robots[0].timing.physics_dt)) for name in INTEGRATORS
-            },
-        },
+        "mujoco": {"step_s": steps[robots[0]], "seconds": min(seconds, MOST_S), **mujoco},
         "robots": {
-            robot.name: {"step_s": robot.timing.physics_dt, **{name: next(of_each) for name in TYPES}}
-            for robot in robots
+            robot: {"step_s": step, **{how: known(found, f"tumble_{robot}_{how}") for how in TYPES}}
+            for robot, step in steps.items()
         },
     }
-
-
-def _drift(seconds: float, dt: float, precision: str, index: int) -> Drift:
-    report = counted(index)
-    return drift_over(seconds, dt, TYPES[precision], lambda done: report(int(done)))

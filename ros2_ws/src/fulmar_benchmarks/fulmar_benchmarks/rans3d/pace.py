@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from importlib.util import find_spec
 from typing import Any
 
 from fulmar_benchmarks.rans3d.targets import RANDOMISED, ROBOTS
+from fulmar_benchmarks.shape import ALONE, Cell, Figures, Progress
 from fulmar_benchmarks.throughput import ROUNDS, Library, measure
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.tasks import load_task
@@ -14,6 +16,40 @@ from fulmar_core.worlds.scenario import load_scenario
 
 TASK = "go_to_pose_3d"
 LIBRARIES = ("numpy", "compiled")
+
+
+@dataclass(frozen=True)
+class PaceCell(Cell):
+    """The pace of the batch with every library."""
+
+    modules = tuple(f"fulmar_benchmarks.{name}" for name in ("throughput", "mujoco_pace"))
+    worlds: int
+    cores: int
+    seconds: float
+
+    @property
+    def name(self) -> str:
+        """File name without suffix."""
+        return "throughput"
+
+    @property
+    def where(self) -> str:
+        """Alone, and last."""
+        return ALONE
+
+    @property
+    def way(self) -> str:
+        """MuJoCo counts, too."""
+        return "mujoco"
+
+    def measure(self, progress: Progress, pool: Any = None) -> Figures:
+        """As in `measure_pace`."""
+        return measure_pace(
+            worlds=self.worlds,
+            cores=self.cores,
+            seconds=self.seconds,
+            progress=lambda done, of: progress(done / of),
+        )
 
 
 def measure_pace(

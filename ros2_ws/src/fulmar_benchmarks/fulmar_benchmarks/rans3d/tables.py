@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
-from rich.console import Console
-from rich.table import Table
-
-from fulmar_benchmarks.cells import BAD, GOOD, MARKS, NOTHING, Cell, display_name, number, tone_of, wide
 from fulmar_benchmarks.rans3d.targets import (
     RANDOMISED,
     RANS_ATTITUDE_RAD,
@@ -15,9 +12,8 @@ from fulmar_benchmarks.rans3d.targets import (
     RANS_STEPS,
     ROBOTS,
 )
+from fulmar_benchmarks.tables import NOTHING, Entry, Row, Shown, Table, display_name, number, tone_of
 
-_STYLES = {GOOD: "[green]{}[/]", BAD: "[bold red]{}[/]", "": "{}"}
-_WIDTH = 180  # columns, where the output is not a terminal
 HEADS = (
     "success",
     "distance [m]",
@@ -32,34 +28,34 @@ HEADS = (
 )
 
 
-def print_tables(document: dict[str, Any], output: Console) -> None:
-    """Print one table a robot, the other parts line by line, what is not met, and the conclusion."""
-    console = wide(output, _WIDTH)
-    for robot, tasks in robots_of(document).items():
-        table = Table(title=display_name(robot), title_justify="left")
-        for head in ("", ""):
-            table.add_column(head, no_wrap=True)
-        for head in HEADS:
-            table.add_column(head, justify="right")
-        for task, controllers in tasks.items():
-            for name, cell in controllers.items():
-                cells = cells_of(document, robot, task, name, cell)
-                texts = [_STYLES[each.tone].format(each.text + MARKS[each.tone]) for each in cells]
-                table.add_row(display_name(task), name, *texts, end_section=name == list(controllers)[-1])
-        console.print(table)
-    for line in missing(document):
-        console.print(line, markup=False, style="yellow", soft_wrap=True)
-    for line in [*notes(document), *other_lines(document), conclusion(document)]:
-        console.print(line, markup=False, soft_wrap=True)
+def shown(document: Mapping[str, Any]) -> list[Shown]:
+    """One table a robot, and the other parts line by line."""
+    tables = [
+        Table(
+            display_name(robot),
+            ("", "", *HEADS),
+            [
+                Row(
+                    (Entry(display_name(task)), Entry(name), *cells_of(document, robot, task, name, cell)),
+                    last=name == list(controllers)[-1],
+                )
+                for task, controllers in tasks.items()
+                for name, cell in controllers.items()
+            ],
+            words=2,
+        )
+        for robot, tasks in robots_of(document).items()
+    ]
+    return [*tables, *missing(document), *notes(document), *other_lines(document)]
 
 
-def robots_of(document: dict[str, Any]) -> dict[str, Any]:
+def robots_of(document: Mapping[str, Any]) -> dict[str, Any]:
     """Evaluated robots with their tasks."""
     every = {ROBOTS[0]: document["tasks"], ROBOTS[1]: document[ROBOTS[1]]}
     return {robot: tasks for robot, tasks in every.items() if tasks}
 
 
-def _tone(document: dict[str, Any], robot: str, task: str, name: str, *, held: bool) -> str:
+def _tone(document: Mapping[str, Any], robot: str, task: str, name: str, *, held: bool) -> str:
     """Whether a cell meets what is required of it."""
     for line in document["requirements"]:
         place = (line.get("robot"), line.get("task"), line.get("controller"), line.get("among_holdable"))
@@ -68,24 +64,26 @@ def _tone(document: dict[str, Any], robot: str, task: str, name: str, *, held: b
     return ""
 
 
-def cells_of(document: dict[str, Any], robot: str, task: str, name: str, cell: dict[str, Any]) -> list[Cell]:
+def cells_of(
+    document: Mapping[str, Any], robot: str, task: str, name: str, cell: dict[str, Any]
+) -> list[Entry]:
     """The cells of one row, below `HEADS`."""
     disturbed = cell.get(RANDOMISED, {})
     held = disturbed.get("holdable", {})
     return [
-        Cell(number(cell["success_rate"], 3), _tone(document, robot, task, name, held=False)),
-        Cell(_spread(cell, "final_position_error_m", 3)),
-        Cell(_spread(cell, "final_attitude_error_deg", 1)),
-        Cell(_spread(cell, "velocity_error_m_s", 3)),
-        Cell(_spread(cell, "rate_error_deg_s", 1)),
-        Cell(
+        Entry(number(cell["success_rate"], 3), _tone(document, robot, task, name, held=False)),
+        Entry(_spread(cell, "final_position_error_m", 3)),
+        Entry(_spread(cell, "final_attitude_error_deg", 1)),
+        Entry(_spread(cell, "velocity_error_m_s", 3)),
+        Entry(_spread(cell, "rate_error_deg_s", 1)),
+        Entry(
             number(cell["goals_reached"], 1)
             + (f" of {cell['goals_bound']:.1f}" if "goals_bound" in cell else "")
         ),
-        Cell(number(cell["rans_success_rate"], 3)),
-        Cell(number(cell["duty"], 2)),
-        Cell(number(disturbed.get("success_rate"), 3)),
-        Cell(number(held.get("success_rate"), 3), _tone(document, robot, task, name, held=True)),
+        Entry(number(cell["rans_success_rate"], 3)),
+        Entry(number(cell["duty"], 2)),
+        Entry(number(disturbed.get("success_rate"), 3)),
+        Entry(number(held.get("success_rate"), 3), _tone(document, robot, task, name, held=True)),
     ]
 
 
@@ -97,7 +95,7 @@ def _spread(cell: dict[str, Any], figure: str, digits: int) -> str:
     return f"{number(found['median'], digits)} ({number(found['p95'], digits)})"
 
 
-def missing(document: dict[str, Any]) -> list[str]:
+def missing(document: Mapping[str, Any]) -> list[str]:
     """What could not be evaluated, and why."""
     return [
         f"{display_name(robot)}, {display_name(task)}, {name}: {cell['reason']}"
@@ -108,7 +106,7 @@ def missing(document: dict[str, Any]) -> list[str]:
     ]
 
 
-def notes(document: dict[str, Any]) -> list[str]:
+def notes(document: Mapping[str, Any]) -> list[str]:
     """What one has to know to read the tables."""
     if not robots_of(document):
         return []
@@ -123,7 +121,7 @@ def notes(document: dict[str, Any]) -> list[str]:
     ]
 
 
-def other_lines(document: dict[str, Any]) -> list[str]:
+def other_lines(document: Mapping[str, Any]) -> list[str]:
     """Dead thrusters, integrator and pace, a line each."""
     lines = []
     for one in document["dead_thrusters"]:
@@ -172,7 +170,7 @@ def _pace(one: dict[str, Any]) -> str:
     )
 
 
-def conclusion(document: dict[str, Any]) -> str:
+def conclusion(document: Mapping[str, Any]) -> str:
     """One sentence on what was required and met."""
     unmet = [line["name"] for line in document["requirements"] if line["met"] is False]
     return (

@@ -17,6 +17,7 @@ TASKS = (
     "go_through_positions_3d",
     "go_through_poses_3d",
 )
+PARTS = ("tasks", "dead", "integrator", "throughput")
 CONTROLLERS = ("lqr", "pd", "policy")
 NOMINAL, RANDOMISED = "nominal", "randomised"
 SCENARIOS = (NOMINAL, RANDOMISED)

@@ -8,7 +8,8 @@ from typing import Any, cast
 import numpy as np
 
 from fulmar_benchmarks.rans3d.targets import NOMINAL, RANS_ATTITUDE_RAD, RANS_POSITION_M, RANS_STEPS
-from fulmar_benchmarks.unit import Extra, Unit
+from fulmar_benchmarks.tables import display_name
+from fulmar_benchmarks.unit import Extra, TrialCell
 from fulmar_core.simulation.episode import Episode
 from fulmar_core.simulation.metrics import Trajectories
 from fulmar_core.states.attitude import angle_between
@@ -47,7 +48,7 @@ def started_within(task: Task, farthest: float) -> Task:
 
 
 @dataclass(frozen=True)
-class SpaceUnit(Unit):
+class SpaceCell(TrialCell):
     """A trial of one controller in one scenario."""
 
     @property
@@ -55,6 +56,16 @@ class SpaceUnit(Unit):
         """File name without suffix."""
         plan = self.trial.plan
         return f"{plan.robot}_{plan.task}_{plan.controller}_{plan.scenario}"
+
+    @property
+    def title(self) -> str:
+        """Name for people."""
+        plan = self.trial.plan
+        return f"{display_name(plan.robot)}, {display_name(plan.task)}, {plan.controller}, {plan.scenario}"
+
+    def parts(self) -> dict[str, Any]:
+        """The start decides, too."""
+        return {**super().parts(), "farthest_m": cast(SpaceTrial, self.trial).farthest_m}
 
     def extra(self) -> Extra:
         """What RANS' own tolerance says, and which episodes can be held."""

@@ -2,129 +2,141 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Sequence
+import functools
+import itertools
+from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from fulmar_benchmarks.cells import heading_of, tally
-from fulmar_benchmarks.pairs import Pair, find_pair, units_of
-from fulmar_benchmarks.results import PairResult
+from fulmar_benchmarks.pairs import Pair, cells_of, find_pair
+from fulmar_benchmarks.results import Outcome, PairResult, outcome_of
+from fulmar_benchmarks.roboran.cells import conclusion, shown
 from fulmar_benchmarks.roboran.document import pair_entry
-from fulmar_benchmarks.unit import Unit
-from fulmar_benchmarks.workers import Outcome, evaluate_units
+from fulmar_benchmarks.shape import Benchmark, Cell, Check, Figures, Found, tally
+from fulmar_benchmarks.tables import Shown
+from fulmar_benchmarks.unit import TrialCell, said_of
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.simulation.counts import check_episodes
 from fulmar_core.tasks import load_task
+from fulmar_core.worlds.scenario import load_scenario
 from fulmar_evaluation.evaluation import BATCH_EPISODES
 from fulmar_evaluation.evaluation import EPISODES as MUJOCO_EPISODES
+
+if TYPE_CHECKING:
+    from fulmar_evaluation.report.page import Part
 
 EPISODES = {"batch": BATCH_EPISODES, "mujoco": MUJOCO_EPISODES, "ros": 16}
 
 
 @dataclass(frozen=True)
-class Request:
-    """What to evaluate."""
-
-    robots: Sequence[str]
-    tasks: Sequence[str]
-    kinds: Sequence[str]  # out of KINDS
-    episodes: dict[str, int]  # in each way
-    seed: int
-    scenario: str
-    folder: Path  # outcomes are kept below it
-    policies: Path | None = None  # folder of bundles; the shipped ones by default
-    jobs: int = 2
-    fresh: bool = False  # evaluate again what was evaluated before
-    command: str = ""  # for the record
-
-
-@dataclass(frozen=True)
-class CampaignResult:
+class Findings:
     """The document, and what plots are drawn from."""
 
-    document: dict[str, Any]
+    document: Mapping[str, Any]
     pairs: list[Pair]
-    outcomes: dict[Pair, dict[str, PairResult]]
+    outcomes: dict[Pair, dict[str, PairResult]]  # by way
 
 
-def run_benchmark(
-    request: Request,
-    *,
-    progress: Callable[[float, float], None],
-    on_done: Callable[[Unit, Outcome, bool], None],
-) -> CampaignResult:
-    """Evaluate every pair, but for what was evaluated before with the same code, configuration and controller.
+class Roboran(Benchmark):
+    """Every pair of a robot and a task."""
 
-    Arguments beside the request as in `evaluate_units`.
-    """
-    began = time.monotonic()
-    longest_s = max(load_task(task).episode_s for task in request.tasks)
-    at_once = min(request.jobs, len(request.tasks) * len(request.robots) * len(request.kinds))
-    for robot in map(load_robot, request.robots):
-        steps = round(longest_s * robot.timing.control_hz)
-        episodes = max(request.episodes.values())
-        check_episodes(robot, episodes=episodes, steps=steps, jobs=request.jobs, at_once=at_once)
-    pairs = [
-        find_pair(robot, task, kind, request.policies)
-        for task in request.tasks
-        for robot in request.robots
-        for kind in request.kinds
-    ]
-    units = {
-        pair: units_of(
-            pair,
-            request.episodes,
-            seed=request.seed,
-            scenario=request.scenario,
-            folder=request.folder / "outcomes",
-            worlds=max(request.episodes.get("batch", 1), 1),
+    name = "roboran"
+    title = "Fulmar beside RoboRAN"
+    width = 140
+
+    @property
+    def episodes(self) -> dict[str, int]:
+        """In each way."""
+        return {way: self.choice.episodes or EPISODES[way] for way in self.choice.through}
+
+    def check(self) -> None:
+        """Refuse an unknown scenario, and more episodes than the memory holds."""
+        asked = self.choice
+        load_scenario(asked.scenario)
+        longest_s = max(load_task(task).episode_s for task in asked.tasks)
+        at_once = min(asked.jobs, len(asked.tasks) * len(asked.robots) * len(asked.controllers))
+        for robot in map(load_robot, asked.robots):
+            steps = round(longest_s * robot.timing.control_hz)
+            episodes = max(self.episodes.values())
+            check_episodes(robot, episodes=episodes, steps=steps, jobs=asked.jobs, at_once=at_once)
+
+    @functools.cached_property
+    def pairs(self) -> list[Pair]:
+        """Every robot at every task, by every kind of controller."""
+        asked = self.choice
+        every = itertools.product(asked.tasks, asked.robots, asked.controllers)
+        return [find_pair(robot, task, kind, asked.policies) for task, robot, kind in every]
+
+    def _cells(self, pair: Pair) -> list[TrialCell]:
+        asked, episodes = self.choice, self.episodes
+        if pair.missing:
+            return []
+        return cells_of(
+            pair, episodes, seed=asked.seed, scenario=asked.scenario, bounds=asked.out / "outcomes",
+            worlds=max(episodes.get("batch", 1), 1),
+        )  # fmt: skip
+
+    def cells(self) -> list[TrialCell]:
+        """Every pair that somebody drives, in every way."""
+        return [cell for pair in self.pairs for cell in self._cells(pair)]
+
+    def _outcomes(self, found: Found, pair: Pair) -> dict[str, Outcome]:
+        return {cell.way: outcome_of(found[cell.name]) for cell in self._cells(pair)}
+
+    def document(self, found: Found) -> dict[str, Any]:
+        """docs/evaluation.md names its keys."""
+        entries = [pair_entry(pair, self._outcomes(found, pair)) for pair in self.pairs]
+        return document_of(
+            entries, episodes=self.episodes, seed=self.choice.seed, scenario=self.choice.scenario
         )
-        for pair in pairs
-        if not pair.missing
-    }
-    every = [unit for of_pair in units.values() for unit in of_pair]
-    outcomes = evaluate_units(
-        every, jobs=request.jobs, fresh=request.fresh, progress=progress, on_done=on_done
-    )
-    by_pair = {pair: {unit.trial.through: outcomes[unit] for unit in units.get(pair, [])} for pair in pairs}
-    entries = [pair_entry(pair, by_pair[pair]) for pair in pairs]
-    document = document_of(
-        entries,
-        episodes=request.episodes,
-        seed=request.seed,
-        scenario=request.scenario,
-        command=request.command,
-        wall_s=time.monotonic() - began,
-    )
-    evaluated = {
-        pair: {way: outcome for way, outcome in ways.items() if isinstance(outcome, PairResult)}
-        for pair, ways in by_pair.items()
-    }
-    return CampaignResult(document, pairs, evaluated)
+
+    def checks(self, document: Mapping[str, Any]) -> list[Check]:
+        """Every requirement on every pair."""
+        return [
+            Check(
+                f"{entry['robot']}, {entry['task']}: {one['name']}", one["measured"], one["limit"], one["met"]
+            )
+            for entry in document["pairs"]
+            for one in entry["verdicts"]
+        ]
+
+    def tables(self, document: Mapping[str, Any]) -> list[Shown]:
+        """One table a task, what the figures are, and the conclusion."""
+        return shown(document)
+
+    def conclusion(self, document: Mapping[str, Any]) -> str:
+        """One sentence on what was required and met."""
+        return conclusion(document)
+
+    def plots(self, document: Mapping[str, Any], found: Found) -> list[Part]:
+        """At a glance, and every task."""
+        from fulmar_benchmarks.roboran.report.sections import plots
+
+        evaluated = {
+            pair: {
+                way: one for way, one in self._outcomes(found, pair).items() if isinstance(one, PairResult)
+            }
+            for pair in self.pairs
+        }
+        return plots(Findings(document, self.pairs, evaluated))
+
+    def said(self, cell: Cell, figures: Figures) -> str:
+        """Its success."""
+        return said_of(cell, figures, f"success {figures['succeeded'].mean():.3f}")
 
 
 def document_of(
-    entries: list[dict[str, Any]],
-    *,
-    episodes: dict[str, int],
-    seed: int,
-    scenario: str,
-    command: str,
-    wall_s: float,
+    entries: list[dict[str, Any]], *, episodes: dict[str, int], seed: int, scenario: str
 ) -> dict[str, Any]:
-    """The whole document; docs/evaluation.md names its keys."""
+    """Its keys; `asked`, `met` and `open` count pairs that a policy drives."""
     met: dict[tuple[str, str], list[bool | None]] = {}
     for entry in entries:
         if entry["kind"] == "policy":
             met.setdefault((entry["robot"], entry["task"]), []).append(entry["met"])
     return {
-        **heading_of("roboran", command),
         "seed": seed,
         "scenario": scenario,
         "episodes": dict(episodes),
         "pairs": entries,
         **tally(True if True in each else None if None in each else False for each in met.values()),
-        "wall_s": round(wall_s, 1),
     }

@@ -2,25 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from rich.console import Console
-from rich.markup import escape
-from rich.table import Table
-
-from fulmar_benchmarks.cells import BAD, GOOD, NOTHING, Cell, display_name, number, tone_of, wide
+from fulmar_benchmarks.tables import NOTHING, Entry, Row, Shown, Table, display_name, number, tone_of
 
 LAWS = {"lqr": "LQR", "polar": "polar law", "line_of_sight": "line of sight", "pure_pursuit": "pure pursuit"}
 WAYS = {"batch": "batch", "mujoco": "MuJoCo", "ros": "ROS"}
-
-
-@dataclass(frozen=True)
-class Row:
-    """One quantity of several pairs."""
-
-    title: str
-    cells: tuple[Cell, ...]
 
 
 @dataclass(frozen=True)
@@ -90,23 +79,25 @@ def rows(task: str, entries: list[dict[str, Any]]) -> list[Row]:
     """Every quantity of a task, a cell for each pair; figures are means of its first way."""
     figure = "share of the bound" if task == "go_through_positions" else "success"
     ways = [way for way in WAYS if any(way in entry["ways"] for entry in entries)]
-    table = [
-        Row(f"{figure}, {WAYS[way]}", tuple(_evaluated(entry, way) for entry in entries)) for way in ways
-    ]
+    table = [_row(f"{figure}, {WAYS[way]}", (_evaluated(entry, way) for entry in entries)) for way in ways]
     table += [
-        Row("required", tuple(_required(entry) for entry in entries)),
-        Row("thesis: success", tuple(_thesis_success(entry) for entry in entries)),
-        Row("batch and MuJoCo apart by", tuple(_gap(entry) for entry in entries)),
-        Row(
+        _row("required", (_required(entry) for entry in entries)),
+        _row("thesis: success", (_thesis_success(entry) for entry in entries)),
+        _row("batch and MuJoCo apart by", (_gap(entry) for entry in entries)),
+        _row(
             "batch, of MuJoCo's episodes",
-            tuple(Cell(number(entry["judged_in_batch_on_mujocos_episodes"], 3)) for entry in entries),
+            (Entry(number(entry["judged_in_batch_on_mujocos_episodes"], 3)) for entry in entries),
         ),
-        Row("trained in, on two cores", tuple(_training(entry) for entry in entries)),
+        _row("trained in, on two cores", (_training(entry) for entry in entries)),
     ]
     for quantity in QUANTITIES.get(task, _COMMON):
         unit = f" [{quantity.unit}]" if quantity.unit else ""
-        table.append(Row(quantity.title + unit, tuple(_beside(entry, quantity) for entry in entries)))
-    return [row for row in table if any(cell.text not in ("", NOTHING) for cell in row.cells)]
+        table.append(_row(quantity.title + unit, (_beside(entry, quantity) for entry in entries)))
+    return [row for row in table if any(cell.text not in ("", NOTHING) for cell in row.entries[1:])]
+
+
+def _row(title: str, entries: Iterable[Entry]) -> Row:
+    return Row((Entry(title), *entries))
 
 
 def _checks(entry: dict[str, Any]) -> dict[str, dict[str, Any]]:
@@ -119,70 +110,63 @@ def _met(entry: dict[str, Any], name: str) -> bool | None:
     return met
 
 
-def _evaluated(entry: dict[str, Any], way: str) -> Cell:
-    return Cell(number(entry["judged"].get(way), 3), tone_of(_met(entry, way)))
+def _evaluated(entry: dict[str, Any], way: str) -> Entry:
+    return Entry(number(entry["judged"].get(way), 3), tone_of(_met(entry, way)))
 
 
-def _required(entry: dict[str, Any]) -> Cell:
+def _required(entry: dict[str, Any]) -> Entry:
     check = _checks(entry).get("batch")
-    return Cell("" if check is None else f"≥ {check['limit']:.2f}")
+    return Entry("" if check is None else f"≥ {check['limit']:.2f}")
 
 
-def _thesis_success(entry: dict[str, Any]) -> Cell:
+def _thesis_success(entry: dict[str, Any]) -> Entry:
     thesis = entry["thesis"]
-    return Cell("" if thesis["success"] is None else f"{thesis['success']:.2f} ± {thesis['success_std']:.2f}")
+    return Entry(
+        "" if thesis["success"] is None else f"{thesis['success']:.2f} ± {thesis['success_std']:.2f}"
+    )
 
 
-def _gap(entry: dict[str, Any]) -> Cell:
+def _gap(entry: dict[str, Any]) -> Entry:
     check = _checks(entry).get("batch_minus_mujoco")
     if check is None and {"batch", "mujoco"} <= set(entry["judged"]):
-        return Cell(number(abs(entry["judged"]["batch"] - entry["judged"]["mujoco"]), 3))
-    return Cell(
+        return Entry(number(abs(entry["judged"]["batch"] - entry["judged"]["mujoco"]), 3))
+    return Entry(
         number(None if check is None else check["measured"], 3), tone_of(_met(entry, "batch_minus_mujoco"))
     )
 
 
-def _training(entry: dict[str, Any]) -> Cell:
+def _training(entry: dict[str, Any]) -> Entry:
     ours, theirs = entry["training_s"], entry["thesis"]["training_min"]
     if ours is None:
-        return Cell(NOTHING)
+        return Entry(NOTHING)
     text = f"{ours:.0f} s" if theirs is None else f"{ours:.0f} s ({60.0 * theirs:.0f} s)"
-    return Cell(text, tone_of(_met(entry, "training_s")))
+    return Entry(text, tone_of(_met(entry, "training_s")))
 
 
-def _beside(entry: dict[str, Any], quantity: Quantity) -> Cell:
+def _beside(entry: dict[str, Any], quantity: Quantity) -> Entry:
     way: dict[str, Any] = next(iter(entry["ways"].values()), {})
     mean = way.get(quantity.figure, {}).get("mean")
     if mean is None:
-        return Cell(NOTHING)
+        return Entry(NOTHING)
     ours, theirs = number(quantity.factor * mean, quantity.digits), entry["thesis"].get(quantity.thesis)
-    return Cell(ours if theirs is None else f"{ours} ({theirs:.{min(quantity.digits, 2)}f})")
+    return Entry(ours if theirs is None else f"{ours} ({theirs:.{min(quantity.digits, 2)}f})")
 
 
-_MARKS = {GOOD: "[green]{} ✓[/]", BAD: "[bold red]{} ✗[/]", "": "{}"}
 _PLACES = {"batch": "the batch", "mujoco": "MuJoCo", "ros": "ROS"}
-_WIDTH = 140  # columns, where the output is not a terminal
 
 
-def print_tables(document: dict[str, Any], output: Console) -> None:
-    """Print one table a task, what the figures are, and the conclusion."""
-    console = wide(output, _WIDTH)
+def shown(document: Mapping[str, Any]) -> list[Shown]:
+    """One table a task, what the figures are, and the conclusion."""
+    found: list[Shown] = []
     for task in dict.fromkeys(entry["task"] for entry in document["pairs"]):
         entries = [entry for entry in document["pairs"] if entry["task"] == task]
-        shown = [entry for entry in entries if entry["ways"]]
-        if shown:
-            console.print(_table(task, shown))
-        for entry in entries:
-            if missing(entry):
-                console.print(
-                    f"{display_name(task)}, {missing(entry)}", markup=False, style="yellow", soft_wrap=True
-                )
-    for line in notes(document):
-        console.print(line, markup=False, soft_wrap=True)
-    console.print(conclusion(document), markup=False, soft_wrap=True)
+        some = [entry for entry in entries if entry["ways"]]
+        found += [Table(display_name(task), ("", *map(head, some)), rows(task, some))] if some else []
+        found += [f"{display_name(task)}, {missing(entry)}" for entry in entries if missing(entry)]
+    return [*found, *notes(document), conclusion(document)]
 
 
-def conclusion(document: dict[str, Any]) -> str:
+def conclusion(document: Mapping[str, Any]) -> str:
     """One sentence on what was required and met."""
     asked, met, open_ = document["asked"], document["met"], document["open"]
     return f"{met} of {asked} pairs meet every requirement" + (
@@ -190,7 +174,7 @@ def conclusion(document: dict[str, Any]) -> str:
     )
 
 
-def notes(document: dict[str, Any]) -> list[str]:
+def notes(document: Mapping[str, Any]) -> list[str]:
     """What one has to know to read the tables."""
     ways = ", ".join(
         f"{episodes:,} episodes in {_PLACES[way]}" for way, episodes in document["episodes"].items()
@@ -214,13 +198,3 @@ def notes(document: dict[str, Any]) -> list[str]:
             f"{same} of {len(compared)} pairs give the same numbers, bit for bit, in small batches as in large ones."
         )
     return lines
-
-
-def _table(task: str, entries: list[dict[str, Any]]) -> Table:
-    table = Table(title=display_name(task), title_justify="left")
-    table.add_column("")
-    for entry in entries:
-        table.add_column(head(entry), justify="right")
-    for row in rows(task, entries):
-        table.add_row(escape(row.title), *(_MARKS[cell.tone].format(cell.text) for cell in row.cells))
-    return table

@@ -15,6 +15,7 @@ from fulmar_core.simulation.metrics import summarise
 from fulmar_evaluation.evaluation import share_of_mean
 
 Z95 = 1.96
+VERDICT = ("name", "measured", "limit", "met")
 
 
 def pair_entry(pair: Pair, outcomes: dict[str, PairResult | str]) -> dict[str, Any]:
@@ -52,7 +53,7 @@ def pair_entry(pair: Pair, outcomes: dict[str, PairResult | str]) -> dict[str, A
         "ways": {way: _way(outcome) for way, outcome in evaluated.items()},
         "thesis": dataclasses.asdict(thesis_row(pair.robot, pair.task))
         | {"time_to_target_s": thesis_row(pair.robot, pair.task).time_to_target_s},
-        "verdicts": [dataclasses.asdict(check) for check in checks],
+        "verdicts": [{key: getattr(check, key) for key in VERDICT} for check in checks],
         "met": None if not met or None in met else all(met),
     }
 
@@ -77,7 +78,7 @@ def _way(outcome: PairResult) -> dict[str, Any]:
     return entry
 
 
-_OF_THE_PAIR = ("key", "robot", "task", "controller", "through", "same_at_64_worlds", "goals")
+_OF_THE_PAIR = ("robot", "task", "controller", "through", "same_at_64_worlds", "goals")
 
 
 def _value(outcome: PairResult, figure: str, episodes: int | None = None) -> float:

@@ -10,9 +10,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from fulmar_benchmarks.cells import Check
+from fulmar_benchmarks.shape import Check
 from fulmar_benchmarks.unit import CONTROL_HZ
 
+WAYS = ("batch", "mujoco", "ros")
 ROBOTS = ("floating_platform", "kingfisher", "turtlebot2")
 TASKS = (
     "go_to_position",
@@ -114,14 +115,11 @@ def checks_of(
     least = LEAST.get(task, {}).get(robot)
     if least is None:
         return []
-    found = [
-        Check(way, value, least, None if value is None else value >= least)
-        for way, value in ((way, evaluated.get(way)) for way in ("batch", "mujoco"))
-    ]
+    found = [Check.least(way, evaluated.get(way), least) for way in ("batch", "mujoco")]
     gap = abs(evaluated["batch"] - evaluated["mujoco"]) if {"batch", "mujoco"} <= set(evaluated) else None
-    found.append(Check("batch_minus_mujoco", gap, WAY_GAP, None if gap is None else gap <= WAY_GAP))
+    found.append(Check.most("batch_minus_mujoco", gap, WAY_GAP))
     found.append(Check("same_at_64_worlds", None if same is None else float(same), 1.0, same))
     if training_s is not None:
         limit = SHORTEST_TRAINING_S.get((robot, task), LONGEST_TRAINING_S)
-        found.append(Check("training_s", training_s, limit, training_s < limit))
+        found.append(Check("training_s", training_s, limit, training_s < limit, "less"))
     return found

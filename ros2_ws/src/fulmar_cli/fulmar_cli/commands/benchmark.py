@@ -9,9 +9,6 @@ from pathlib import Path
 import typer
 
 from fulmar_benchmarks.catalogue import rows
-from fulmar_cli.commands.benchmark_drift import drift
-from fulmar_cli.commands.benchmark_rans3d import rans3d
-from fulmar_cli.commands.benchmark_roboran import roboran
 from fulmar_cli.commands.benchmark_row import OneBenchmark, command_of
 from fulmar_core.config.errors import ConfigError
 
@@ -33,12 +30,6 @@ benchmark = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode=None,
 )
-for command in (
-    drift,
-    rans3d,
-    roboran,
-):
-    benchmark.command()(command)
 for row in rows().values():
     benchmark.command(row.name, cls=OneBenchmark)(command_of(row))
 

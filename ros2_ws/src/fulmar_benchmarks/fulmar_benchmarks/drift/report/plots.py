@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 
 from fulmar_benchmarks.drift.cells import display_name
 from fulmar_benchmarks.drift.document import Key
-from fulmar_benchmarks.results import CampaignResult, PairResult
+from fulmar_benchmarks.results import PairResult
 from fulmar_evaluation.report.drawing import (
     ANGLES,
     LENGTHS,
@@ -41,13 +41,11 @@ class View:
     @property
     def time_s(self) -> np.ndarray:
         """Ends of the control steps, shape (steps,) [s]."""
-        steps = self.outcome.paths.shape[1]
-        return float(self.outcome.about["control_dt"]) * np.arange(1, steps + 1)
+        return self.outcome.time_s
 
 
-def views(result: CampaignResult[Key], kind: str) -> dict[str, list[View]]:
+def views(document: Mapping[str, Any], outcomes: dict[Key, PairResult], kind: str) -> dict[str, list[View]]:
     """By row, every controller that has a result in it."""
-    document: dict[str, Any] = result.document
     colour = dict(zip(document["controllers"], colours(document["controllers"]), strict=True))
     found = {
         name: [
@@ -56,10 +54,10 @@ def views(result: CampaignResult[Key], kind: str) -> dict[str, list[View]]:
                 row["title"],
                 display_name(controller),
                 colour[controller],
-                result.outcomes[name, controller],
+                outcomes[name, controller],
             )
             for controller in document["controllers"]
-            if (name, controller) in result.outcomes
+            if (name, controller) in outcomes
         ]
         for name, row in document["rows"].items()
         if row["kind"] == kind
@@ -130,7 +128,7 @@ SHOWN = ("PT5", "PT2", "PT1", "OT5")
 _APART = 0.34  # between the controllers of one row, of the distance of two rows
 
 
-def draw_glance(document: dict[str, Any]) -> Figure | None:
+def draw_glance(document: Mapping[str, Any]) -> Figure | None:
     """One row a condition, one column a figure; None where no condition has a result."""
     rows = {
         name: row

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,11 +12,11 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
-from fulmar_benchmarks.cells import display_name
 from fulmar_benchmarks.rans3d.document import Key
 from fulmar_benchmarks.rans3d.tables import robots_of
 from fulmar_benchmarks.rans3d.targets import CONTROLLERS, NOMINAL, RANDOMISED
 from fulmar_benchmarks.results import PairResult
+from fulmar_benchmarks.tables import display_name
 from fulmar_core.tasks import load_task
 from fulmar_evaluation.report.drawing import (
     LENGTHS,
@@ -29,14 +29,38 @@ from fulmar_evaluation.report.drawing import (
     log_scale,
     share_axis,
 )
+from fulmar_evaluation.report.page import Plot
 from fulmar_evaluation.report.style import FAINT, INK, colours, quiet_grid
 
+_GLANCE = """
+The further right, the better. A filled dot is the success in nominal episodes, a diamond the success under every
+disturbance of `randomised`, among the episodes whose pose the linear programme can hold at all; the upright stroke is
+what is required."""
+_OVER_TIME = """
+The median of all nominal episodes, with the band of nine in ten; the dashed line is the tolerance, or how many targets
+make an episode a success. At track velocities the errors jump where a new target comes."""
 COLOURS = dict(zip(CONTROLLERS, colours(CONTROLLERS), strict=True))
 _ROW = 0.27  # height of a row [inch]
 _PANEL, COLUMNS = 2.4, 3  # same of a panel over time, and how many lie side by side
 
 
-def draw_glance(document: dict[str, Any]) -> Figure:
+def plots(document: Mapping[str, Any], outcomes: dict[Key, PairResult]) -> list[Plot]:
+    """What is drawn of a document and its outcomes."""
+    robots = robots_of(document)
+    drawn = [Plot("At a glance", _GLANCE, draw_glance(document), "at_a_glance")] if robots else []
+    return drawn + [
+        Plot(
+            f"{display_name(robot)} over time",
+            _OVER_TIME,
+            draw_over_time(robot, outcomes),
+            f"{robot}_over_time",
+        )
+        for robot in robots
+        if shown(robot, outcomes)
+    ]
+
+
+def draw_glance(document: Mapping[str, Any]) -> Figure:
     """One row for each controller at each task, one panel a robot."""
     robots = robots_of(document)
     rows = max(sum(1 + len(each) for each in tasks.values()) for tasks in robots.values())

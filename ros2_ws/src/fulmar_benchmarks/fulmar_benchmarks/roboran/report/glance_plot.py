@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
-from fulmar_benchmarks.cells import display_name
 from fulmar_benchmarks.roboran.cells import head
 from fulmar_benchmarks.roboran.report.view import ROBOT_COLOURS
+from fulmar_benchmarks.tables import display_name
 from fulmar_evaluation.report.drawing import WIDTH, key, ring, share_axis
 from fulmar_evaluation.report.style import ALARM, FAINT, INK, PAPER
 
 _ROW = 0.27  # height of a row [inch]
 
 
-def draw_glance(document: dict[str, Any]) -> Figure:
+def draw_glance(document: Mapping[str, Any]) -> Figure:
     """One row a pair, grouped by task."""
     groups = [
         (
@@ -55,7 +56,7 @@ def draw_glance(document: dict[str, Any]) -> Figure:
     return figure
 
 
-def _lowest(document: dict[str, Any]) -> float:
+def _lowest(document: Mapping[str, Any]) -> float:
     """Left end of the scale: a little below the lowest value, on a tenth."""
     values = [0.9]
     for entry in document["pairs"]:

@@ -1,17 +1,14 @@
-"""Report of the benchmark: its sections, tables and plots."""
+"""The plots of the benchmark, with what they say."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 from html import escape
-from pathlib import Path
 from typing import Any
 
 from matplotlib.figure import Figure
 
-from fulmar_benchmarks.cells import as_html, display_name
-from fulmar_benchmarks.roboran.campaign import CampaignResult
-from fulmar_benchmarks.roboran.cells import conclusion, head, missing, notes, rows
+from fulmar_benchmarks.roboran.campaign import Findings
 from fulmar_benchmarks.roboran.report.glance_plot import draw_glance
 from fulmar_benchmarks.roboran.report.path_plots import (
     draw_paths,
@@ -27,23 +24,17 @@ from fulmar_benchmarks.roboran.report.time_plots import (
     draw_velocities,
 )
 from fulmar_benchmarks.roboran.report.view import View, views
+from fulmar_benchmarks.tables import display_name
 from fulmar_core.simulation.metrics import counts_targets
 from fulmar_evaluation.figures import FIGURES, SUCCESS
-from fulmar_evaluation.report.page import Part, Plot, cells, faint, headline, origin, table
-from fulmar_evaluation.report.style import house_style
-from fulmar_evaluation.report.writer import write_benchmark
+from fulmar_evaluation.report.page import Part, Plot, faint
 
 Add = Callable[[str, str, str, Figure], None]  # name of the file, title, caption
 
 
-def write_report(result: CampaignResult, out: Path) -> Path:
-    """Write the page and its plots into a folder; returns the page."""
-    with house_style():
-        return write_benchmark(out, "Fulmar beside RoboRAN", _parts(result))
-
-
-def _parts(result: CampaignResult) -> list[Part]:
-    document = result.document
+def plots(findings: Findings) -> list[Part]:
+    """At a glance, every task, and what the figures mean."""
+    document = findings.document
     tasks = dict.fromkeys(entry["task"] for entry in document["pairs"])
     robots = ", ".join(display_name(robot) for robot in dict.fromkeys(e["robot"] for e in document["pairs"]))
     caption = """
@@ -55,37 +46,15 @@ def _parts(result: CampaignResult) -> list[Part]:
         *faint(
             f"{robots}: learned and classical controllers on the tasks of the El-Hariry thesis, chapter 4"
         ),
-        headline(conclusion(document)),
         "<nav>" + "".join(f'<a href="#{task}">{escape(display_name(task))}</a>' for task in tasks) + "</nav>",
         Plot("At a glance", caption, draw_glance(document), "at_a_glance"),
-        *faint(*notes(document)),
     ]
     for task in tasks:
-        parts.append(f'<h2 id="{task}">{escape(display_name(task))}</h2>')
-        parts += _table(task, [entry for entry in document["pairs"] if entry["task"] == task])
-        parts += _plots(result, task)
-    return [
-        *parts,
-        "<h2>What the figures mean</h2>",
-        f"<dl>{_meanings(document)}</dl>",
-        *origin(document, "roboran.json"),
-    ]
+        parts += [f'<h2 id="{task}">{escape(display_name(task))}</h2>', *_plots(findings, task)]
+    return [*parts, "<h2>What the figures mean</h2>", f"<dl>{_meanings(document)}</dl>"]
 
 
-def _table(task: str, entries: Sequence[dict[str, Any]]) -> list[str]:
-    shown = [entry for entry in entries if entry["ways"]]
-    lines = faint(*(missing(entry) for entry in entries if missing(entry)))
-    if not shown:
-        return lines
-    heads = cells(["", *map(head, shown)], "th")
-    body = (
-        f"<tr>{cells([row.title])}" + "".join(as_html(cell.text, cell.tone) for cell in row.cells) + "</tr>"
-        for row in rows(task, shown)
-    )
-    return [table([heads], body), *lines]
-
-
-def _meanings(document: dict[str, Any]) -> str:
+def _meanings(document: Mapping[str, Any]) -> str:
     """Of the figures that are in the document."""
     used = {name for entry in document["pairs"] for way in entry["ways"].values() for name in way}
     entries = [("success", SUCCESS)]
@@ -95,7 +64,7 @@ def _meanings(document: dict[str, Any]) -> str:
     )
 
 
-def _plots(result: CampaignResult, task: str) -> list[Plot]:
+def _plots(result: Findings, task: str) -> list[Plot]:
     runs = views(result, task)
     if not runs:
         return []

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fulmar_benchmarks.results import PairResult
-from fulmar_benchmarks.roboran.campaign import CampaignResult
+from fulmar_benchmarks.roboran.campaign import Findings
 from fulmar_benchmarks.roboran.cells import head
 from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.robot_file import load_robot
@@ -58,7 +58,7 @@ class View:
         return float(self.main.about["control_dt"])
 
 
-def views(findings: CampaignResult, task: str) -> list[View]:
+def views(findings: Findings, task: str) -> list[View]:
     """Pairs of one task that have figures: of each robot its policy, else its classical controller."""
     chosen: dict[str, View] = {}
     spare = iter(OTHER_COLOURS)
