@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fulmar_benchmarks.drift.bounds import approach_bound, can_hold_episodes
 from fulmar_core.config.errors import ConfigError
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.simulation.episode import draw_episodes
 from fulmar_core.tasks import load_task
 from fulmar_core.worlds.holdability import can_hold, hold_margin, uncontrollable_losses
 from fulmar_core.worlds.scenario import load_scenario
+from fulmar_evaluation.bounds.approach import approach_bound, can_hold_episodes
 
 PLATFORM, FLYER = load_robot("floating_platform"), load_robot("modular_freeflyer")
 TASK = load_task("drift_go_to_pose")

@@ -16,7 +16,6 @@ pytest.importorskip("mujoco")
 from fulmar_benchmarks.catalogue import choice
 from fulmar_benchmarks.outcomes import keys_of
 from fulmar_benchmarks.rans3d import pace
-from fulmar_benchmarks.rans3d.bound import most_targets
 from fulmar_benchmarks.rans3d.campaign import Rans3d, cell_of, pair_of
 from fulmar_benchmarks.rans3d.document import document_of, figures_of
 from fulmar_benchmarks.rans3d.tables import shown
@@ -31,6 +30,7 @@ from fulmar_core.simulation.episode import Episode, draw_episodes
 from fulmar_core.states.spatial import SpatialState
 from fulmar_core.tasks import load_task
 from fulmar_core.worlds.scenario import load_scenario
+from fulmar_evaluation.bounds.space_tour import most_targets
 
 FEW = "benchmark rans3d --episodes 2 --robots spacecraft_16 --tasks go_to_pose_3d --controllers lqr,policy"
 CELL = {"success_rate", "position_error_m", "attitude_error_deg", "episodes", "published"}

@@ -94,7 +94,7 @@ def test_a_key_knows_the_cell_and_the_code_of_its_class(tmp_path, monkeypatch):
     cell = asked(tmp_path).cells()[0]
     key = keys_of([cell])["cell_1"]
     assert keys_of([replace(cell, notes="elsewhere")])["cell_1"] == key, "not of where it runs"
-    assert keys_of([replace(cell, number=4)])["cell_4"] != key
+    assert keys_of([replace(cell, number=4)])["cell_1"] != key
     read = Path.read_bytes
     monkeypatch.setattr(
         Path, "read_bytes", lambda path: read(path) + (b"#" if path.name == "tiny.py" else b"")

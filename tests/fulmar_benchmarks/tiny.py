@@ -17,24 +17,12 @@ from fulmar_benchmarks.shape import ALONE, Benchmark, Cell, Check, Choice, known
 BLOCKED_S = 60.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class TinyCell(Cell):
     """A number and its square; it may raise, or note that it was measured."""
 
     number: int
     notes: str
-
-    @property
-    def name(self) -> str:
-        return f"cell_{self.number}"
-
-    @property
-    def cost(self) -> float:
-        return 10.0 - self.number
-
-    @property
-    def where(self) -> str:
-        return ALONE
 
     def parts(self) -> dict[str, Any]:
         return {"number": self.number}
@@ -58,7 +46,16 @@ class Tiny(Benchmark):
     name = "tiny"
 
     def cells(self) -> Sequence[Cell]:
-        return [TinyCell(number, str(self.choice.out / "notes")) for number in (1, 2, 3)]
+        return [
+            TinyCell(
+                name=f"cell_{number}",
+                cost=10.0 - number,
+                where=ALONE,
+                number=number,
+                notes=str(self.choice.out / "notes"),
+            )
+            for number in (1, 2, 3)
+        ]
 
     def document(self, found):
         figures = {cell.name: known(found, cell.name) for cell in self.cells()}

@@ -20,7 +20,7 @@ real_time = pytest.mark.real_time
 @pytest.mark.slow
 def test_a_cell_states_latency_errors_of_the_period_and_what_each_node_uses() -> None:
     """rclpy's own executor, whose figures nothing is asked of, at 100 Hz."""
-    cell = cells.LatencyCell(100.0, False, "default", 1.0)
+    cell = cells.latency_cell(100.0, False, "default", 1.0)
     row = cell.measure(lambda _done: None)
     assert row["failure"] is None
     assert row["answers"] > 100

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fulmar_benchmarks.falcon.cells import SCENARIOS, FalconCell, fly
+from fulmar_benchmarks.falcon.cells import SCENARIOS, falcon_cell, fly
 from fulmar_core.config.paths import config_names
 from fulmar_core.controllers.classical import gains_of
 from fulmar_core.controllers.flight_pid import DEPARTURES, FlightPid, cascade
@@ -100,7 +100,7 @@ def test_limits_of_nothing_are_refused(name):
 @pytest.mark.slow
 @pytest.mark.parametrize("task", ["a", "b", "c", "d", "e", "f"])
 def test_it_flies_every_reference_of_the_thesis(task):
-    found = fly(FalconCell("airship_v7", task, "pid", "exact", 1, 3))[0]
+    found = fly(falcon_cell("airship_v7", task, "pid", "exact", 1, 3))[0]
     assert found["survival"] == 1.0
     assert found["rmse_per_axis_m"] <= 0.15
 

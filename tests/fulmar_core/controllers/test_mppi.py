@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fulmar_benchmarks.falcon.cells import SCENARIOS, FalconCell, fly
+from fulmar_benchmarks.falcon.cells import SCENARIOS, falcon_cell, fly
 from fulmar_core.config.errors import ConfigError
 from fulmar_core.controllers.classical import load_classical
 from fulmar_core.controllers.controller import Inputs
@@ -159,7 +159,7 @@ def test_it_is_for_aircraft():
 @pytest.mark.timeout(600)  # five flights of a minute, of 25 plans a second
 @pytest.mark.parametrize("task", ["a", "d", "e"])
 def test_five_seeds_stay_within_three_centimetres_rms_for_a_minute(task):
-    found = fly(FalconCell("airship_v7", task, "mppi", "exact", 5, 3))[0]
+    found = fly(falcon_cell("airship_v7", task, "mppi", "exact", 5, 3))[0]
     assert found["survival"] == 1.0
     assert found["rmse_per_axis_worst_m"] <= 0.03
 

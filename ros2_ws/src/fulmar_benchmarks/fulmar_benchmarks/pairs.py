@@ -6,7 +6,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from fulmar_benchmarks.unit import TrialCell
+from fulmar_benchmarks.tables import display_name
+from fulmar_benchmarks.unit import TrialCell, costs, where_of
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_core.config.errors import BundleError, ConfigError
 from fulmar_core.loop.policy_bundle import read_passport
@@ -113,7 +114,14 @@ def cells_of(
     pair: Pair, ways: dict[str, int], *, seed: int, scenario: str, bounds: Path, worlds: int
 ) -> list[TrialCell]:
     """The work on one pair, so many episodes in each way."""
-    plan = plan_of(pair, scenario=scenario, seed=seed)
-    return [
-        TrialCell(Trial(plan, way, episodes, worlds), pair.sha256, bounds) for way, episodes in ways.items()
-    ]
+    plan, found = plan_of(pair, scenario=scenario, seed=seed), []
+    for way, episodes in ways.items():
+        trial = Trial(plan, way, episodes, worlds)
+        title = f"{display_name(pair.robot)}, {display_name(pair.task).lower()}, {pair.controller}, {way}"
+        found.append(
+            TrialCell(
+                name=f"{pair.robot}_{pair.task}_{pair.controller}_{way}", title=title, cost=costs(trial),
+                where=where_of(trial), way=way, trial=trial, defines=pair.sha256, bounds=bounds,
+            )
+        )  # fmt: skip
+    return found

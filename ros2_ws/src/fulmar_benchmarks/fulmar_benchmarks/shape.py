@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -21,48 +21,27 @@ Found = Mapping[str, Figures | str]  # by name of a cell; a sentence where it co
 Progress = Callable[[float], None]  # how much of the cost of a cell is done
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Cell:
-    """What is run at once and kept in one file. Subclasses have the fields that tell cells apart.
+    """What is run at once and kept in one file. Subclasses have the fields that tell cells apart."""
 
-    Attributes:
-        modules: Modules whose code its figures depend on, beside those of its class.
-    """
-
-    modules: ClassVar[tuple[str, ...]] = ()
-
-    @property
-    def where(self) -> str:
-        """`POOL`; `ALONE` for what needs the whole computer; `ROS` for what runs on deployed nodes."""
-        return POOL
-
-    @property
-    def way(self) -> str:
-        """Which packages its figures depend on, of `outcomes.PACKAGES`."""
-        return "batch"
-
-    @property
-    def name(self) -> str:
-        """Name of its file, without suffix; different for each cell of a benchmark."""
-        raise NotImplementedError
-
-    @property
-    def title(self) -> str:
-        """Its name for people."""
-        return self.name
-
-    @property
-    def cost(self) -> float:
-        """How long it takes, beside other cells."""
-        return 1.0
+    modules: ClassVar[tuple[str, ...]] = ()  # whose code its figures depend on, beside those of its class
+    name: str  # of its file, without suffix; different for each cell of a benchmark
+    title: str = ""  # for people; its name by default
+    cost: float = 1.0  # how long it takes, beside other cells
+    where: str = POOL  # ALONE for what needs the whole computer, ROS for what runs on deployed nodes
+    way: str = "batch"  # which packages its figures depend on, of `outcomes.PACKAGES`
 
     def parts(self) -> dict[str, Any]:
         """Everything that its figures depend on beside code, configuration and libraries."""
-        return asdict(self)
+        return {key: value for key, value in asdict(self).items() if key not in OF_EVERY_CELL}
 
     def measure(self, progress: Progress, pool: Any = None) -> Figures:
         """Measure it, in any process; a `ROS` cell gets the pool."""
         raise NotImplementedError
+
+
+OF_EVERY_CELL = tuple(each.name for each in fields(Cell))
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from fulmar_core.worlds.scenario import load_scenario
 DEVICES, LIBRARIES = ("cpu", "cuda"), ("compiled", "numpy", "torch")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class ThroughputCell(Cell):
     """One robot."""
 
@@ -33,26 +33,6 @@ class ThroughputCell(Cell):
     device: str
     cores: int
     seconds: float
-
-    @property
-    def name(self) -> str:
-        """File name without suffix."""
-        return f"{self.robot}_{self.library}"
-
-    @property
-    def where(self) -> str:
-        """It needs the whole computer."""
-        return ALONE
-
-    @property
-    def way(self) -> str:
-        """MuJoCo's model counts, too."""
-        return "mujoco"
-
-    @property
-    def cost(self) -> float:
-        """In rounds."""
-        return 5.0
 
     def measure(self, progress: Progress, pool: Any = None) -> Figures:
         """As in `throughput.measure`."""
@@ -93,7 +73,18 @@ class Throughput(Benchmark):
         asked, library = self.choice, library_of(self.choice)
         return [
             ThroughputCell(
-                robot, task, asked.scenario, asked.worlds, library, asked.device, asked.cores, asked.seconds
+                name=f"{robot}_{library}",
+                cost=5.0,
+                where=ALONE,
+                way="mujoco",
+                robot=robot,
+                task=task,
+                scenario=asked.scenario,
+                worlds=asked.worlds,
+                library=library,
+                device=asked.device,
+                cores=asked.cores,
+                seconds=asked.seconds,
             )
             for robot, task in self._tasks.items()
         ]

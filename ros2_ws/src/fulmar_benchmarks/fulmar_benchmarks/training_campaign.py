@@ -14,22 +14,12 @@ from training.jobs import Job, Outcome
 from training.progress import JobBars
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class TrainingCell(Cell):
     """Some runs side by side: those of one seed, or of as many as run at once."""
 
     jobs: tuple[Job, ...]
     at_once: int
-
-    @property
-    def name(self) -> str:
-        """File name without suffix."""
-        return "_".join(job.name.replace(" ", "_") for job in self.jobs)
-
-    @property
-    def where(self) -> str:
-        """Its processes are its own."""
-        return ALONE
 
     def parts(self) -> dict[str, Any]:
         """Not where the runs lie."""
@@ -66,10 +56,14 @@ class Training(Benchmark):
     def cells(self) -> list[TrainingCell]:
         """As many runs as are side by side; the two kinds of a seed stay together."""
         step = max(len(KINDS), self.choice.at_once)
+        groups = [tuple(self._jobs[first : first + step]) for first in range(0, len(self._jobs), step)]
         return [
-            TrainingCell(tuple(self._jobs[first : first + step]), self.choice.at_once)
-            for first in range(0, len(self._jobs), step)
-        ]
+            TrainingCell(
+                name="_".join(job.name.replace(" ", "_") for job in group), where=ALONE, jobs=group,
+                at_once=self.choice.at_once,
+            )
+            for group in groups
+        ]  # fmt: skip
 
     def document(self, found: Found) -> dict[str, Any]:
         """Figures by kind; see `training.benchmark.compare`."""

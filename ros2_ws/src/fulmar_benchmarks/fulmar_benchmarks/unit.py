@@ -11,7 +11,6 @@ import numpy as np
 
 from fulmar_benchmarks.results import QUANTILES, PairResult, cached_bound
 from fulmar_benchmarks.shape import POOL, ROS, Cell, Figures, Progress
-from fulmar_benchmarks.tables import display_name
 from fulmar_core.simulation.episode import Episode, episode_steps
 from fulmar_core.simulation.metrics import Trajectories, counts_targets, first_steps
 from fulmar_core.states.planar import wrapped
@@ -45,7 +44,7 @@ class Extra:
         return {}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class TrialCell(Cell):
     """A trial of a pair: run it in one way, evaluate it, keep what tables and plots need."""
 
@@ -53,34 +52,6 @@ class TrialCell(Cell):
     trial: Trial
     defines: str  # hash of the controller
     bounds: Path  # folder of bounds, which several cells share
-
-    @property
-    def where(self) -> str:
-        """Those through ros are on nodes that use all cores themselves."""
-        return ROS if self.trial.through == "ros" else POOL
-
-    @property
-    def way(self) -> str:
-        """As the trial is run."""
-        return self.trial.through
-
-    @property
-    def name(self) -> str:
-        """File name without suffix."""
-        plan = self.trial.plan
-        return f"{plan.robot}_{plan.task}_{plan.controller}_{self.trial.through}"
-
-    @property
-    def title(self) -> str:
-        """Name for people."""
-        plan = self.trial.plan
-        return f"{display_name(plan.robot)}, {display_name(plan.task).lower()}, {plan.controller}, {self.way}"
-
-    @property
-    def cost(self) -> float:
-        """In steps of a batch."""
-        steps = self.trial.episodes * episode_steps(_long(self.trial).task, _control_dt(self.trial))
-        return steps * STEP_COSTS[self.trial.through]
 
     def parts(self) -> dict[str, Any]:
         """Not where the policy lies, nor how many processes there are."""
@@ -139,6 +110,17 @@ class TrialCell(Cell):
             obstacles=np.asarray(sample.goal.obstacles)[..., :3],
             more=extra.arrays(),
         )
+
+
+def costs(trial: Trial) -> float:
+    """How long a trial takes, in steps of a batch."""
+    steps = trial.episodes * episode_steps(_long(trial).task, _control_dt(trial))
+    return steps * STEP_COSTS[trial.through]
+
+
+def where_of(trial: Trial) -> str:
+    """Trials through ros are on nodes that use all cores themselves."""
+    return ROS if trial.through == "ros" else POOL
 
 
 def said_of(cell: Cell, figures: Figures, main: str) -> str:

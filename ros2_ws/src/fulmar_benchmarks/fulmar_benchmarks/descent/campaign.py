@@ -16,7 +16,7 @@ from fulmar_benchmarks.tables import number
 BATCH, LOCKSTEP, REAL_TIME = WAYS = ("batch", "lockstep", "realtime")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class DescentCell(Cell):
     """Flights of one height in the batch, or one of them through ROS."""
 
@@ -24,24 +24,6 @@ class DescentCell(Cell):
     flights: Flights
     through: str  # one of WAYS
     number: int = -1  # of the flight; -1: all of them
-
-    @property
-    def name(self) -> str:
-        """File name without suffix."""
-        number = "" if self.number < 0 else f"_{self.number}"
-        return (
-            f"{self.flights.robot}_{self.flights.controller}_{self.flights.height:g}_m_{self.through}{number}"
-        )
-
-    @property
-    def where(self) -> str:
-        """Flights in real time need the whole computer."""
-        return ALONE if self.through == REAL_TIME else POOL
-
-    @property
-    def way(self) -> str:
-        """Through ROS all of Fulmar counts."""
-        return "batch" if self.through == BATCH else "ros"
 
     def parts(self) -> dict[str, Any]:
         """A bundle counts by what is in it; through ROS how many fly besides does not count."""
@@ -94,10 +76,16 @@ class Descents(Benchmark):
         ]
 
     def _of(self, flights: Flights, way: str) -> list[DescentCell]:
+        name = f"{flights.robot}_{flights.controller}_{flights.height:g}_m_{way}"
         if way == BATCH:
-            return [DescentCell(flights, way)]
-        count = self.choice.real_time if way == REAL_TIME else flights.count
-        return [DescentCell(flights, way, number) for number in range(count)]
+            return [DescentCell(name=name, flights=flights, through=way)]
+        count, where = (self.choice.real_time, ALONE) if way == REAL_TIME else (flights.count, POOL)
+        return [
+            DescentCell(
+                name=f"{name}_{number}", where=where, way="ros", flights=flights, through=way, number=number
+            )
+            for number in range(count)
+        ]
 
     def document(self, found: Found) -> dict[str, Any]:
         """Figures by height and way."""

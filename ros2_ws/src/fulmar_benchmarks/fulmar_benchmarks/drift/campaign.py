@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from fulmar_benchmarks.drift.bounds import physics_of
 from fulmar_benchmarks.drift.cells import STYLE, conclusion, shown
 from fulmar_benchmarks.drift.conditions import (
     CONDITIONS,
@@ -25,11 +24,12 @@ from fulmar_benchmarks.pairs import Pair, plan_of, with_law, with_policy
 from fulmar_benchmarks.results import Outcome, PairResult, outcome_of
 from fulmar_benchmarks.shape import Benchmark, Cell, Check, Figures, Found
 from fulmar_benchmarks.tables import Shown
-from fulmar_benchmarks.unit import said_of
+from fulmar_benchmarks.unit import costs, said_of, where_of
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.simulation.counts import check_episodes
 from fulmar_core.simulation.episode import episode_steps
 from fulmar_core.tasks import load_task
+from fulmar_evaluation.bounds.approach import physics_of
 from fulmar_evaluation.evaluation import Trial
 from policy_server.controllers import policies_directory
 
@@ -88,12 +88,19 @@ class Drift(Benchmark):
 
     def cells(self) -> list[DriftCell]:
         """Every pair that somebody drives."""
-        bounds = self.choice.out / "outcomes"
-        return [
-            DriftCell(self._trial(row, pair), pair.sha256, bounds, row=row, controller=name)
-            for (row, name), pair in self.pairs.items()
-            if not pair.missing
-        ]
+        found = []
+        for (row, name), pair in self.pairs.items():
+            if pair.missing:
+                continue
+            trial = self._trial(row, pair)
+            found.append(
+                DriftCell(
+                    name=f"{row}_{name}_{trial.through}", title=f"{row}, {name}", cost=costs(trial),
+                    where=where_of(trial), way=trial.through, trial=trial, defines=pair.sha256,
+                    bounds=self.choice.out / "outcomes", row=row, controller=name,
+                )
+            )  # fmt: skip
+        return found
 
     def outcomes(self, found: Found) -> dict[Key, Outcome]:
         """What came of each row and controller."""

@@ -15,23 +15,13 @@ from fulmar_core.tasks.path_task import FollowPath
 BANDS = ("distance_m", "heading_error_deg", "speed_m_s", "turn_rate_deg_s")  # kept as quantiles over time
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class DriftCell(TrialCell):
     """A trial of one row."""
 
     modules = (*TrialCell.modules, f"{__package__}.conditions")
     row: str = ""  # of conditions.ROWS
     controller: str = ""  # as it was asked for
-
-    @property
-    def name(self) -> str:
-        """File name without suffix."""
-        return f"{self.row}_{self.controller}_{self.trial.through}"
-
-    @property
-    def title(self) -> str:
-        """Name for people."""
-        return f"{self.row}, {self.controller}"
 
     def extra(self) -> Extra:
         """Bands over time of a pose row, errors over time of a path row."""

@@ -45,26 +45,15 @@ MOST_OFF = 0.15  # of the ratio of errors from what is expected of a field of vi
 MOST_SKY_S, MOST_POINTING_DEG = 1.0, 0.1
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class WindowCell(Cell):
     """Some random windows of one group."""
 
     modules = (f"{__package__}.random_windows",)
-    group: str  # part, and what is varied in it
     conditions: Conditions
     seed: int
     first: int  # number of the first window
     count: int
-
-    @property
-    def name(self) -> str:
-        """File name without suffix."""
-        return f"{self.group.replace(' ', '_').strip('_')}_{self.first}"
-
-    @property
-    def cost(self) -> float:
-        """In windows."""
-        return float(self.count)
 
     def measure(self, progress: Progress, pool: Any = None) -> Figures:
         """Every window, as in `measure_window`."""
@@ -72,7 +61,7 @@ class WindowCell(Cell):
         return {"windows": [measure_window(self.conditions, self.seed, number) for number in numbers]}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class PointingCell(Cell):
     """One episode of pointing."""
 
@@ -80,21 +69,6 @@ class PointingCell(Cell):
     seed: int
     seconds: float
     star_tracker: bool
-
-    @property
-    def name(self) -> str:
-        """File name without suffix."""
-        return f"pointing_{self.seed}{'' if self.star_tracker else '_without_star_tracker'}"
-
-    @property
-    def way(self) -> str:
-        """In MuJoCo."""
-        return "mujoco"
-
-    @property
-    def cost(self) -> float:
-        """In windows."""
-        return 2.0 * self.seconds
 
     def measure(self, progress: Progress, pool: Any = None) -> Figures:
         """As in `point_without_gyroscope`."""
@@ -139,7 +113,14 @@ class Events(Benchmark):
                 groups["slow_and_fast", f"{low:g} to {high:g}"] = changed, few
         return {
             key: [
-                WindowCell(f"{key[0]} {key[1]}", each, self.choice.seed, first, min(PER_CELL, count - first))
+                WindowCell(
+                    name="_".join((*str(key[1]).split(), key[0], str(first))),
+                    cost=float(PER_CELL),
+                    conditions=each,
+                    seed=self.choice.seed,
+                    first=first,
+                    count=min(PER_CELL, count - first),
+                )
                 for first in range(0, count, PER_CELL)
             ]
             for key, (each, count) in groups.items()
@@ -149,8 +130,14 @@ class Events(Benchmark):
         if "pointing" not in self.choice.parts:
             return []
         seed, seconds = self.choice.seed, self.choice.pointing_s
-        with_tracker = [PointingCell(seed + n, seconds, True) for n in range(self.choice.pointing_runs)]
-        return [*with_tracker, PointingCell(seed, seconds, False)]
+        every = [(seed + n, True) for n in range(self.choice.pointing_runs)] + [(seed, False)]
+        return [
+            PointingCell(
+                name=f"pointing_{one}{'' if tracker else '_without_star_tracker'}", cost=2.0 * seconds, way="mujoco",
+                seed=one, seconds=seconds, star_tracker=tracker,
+            )
+            for one, tracker in every
+        ]  # fmt: skip
 
     def document(self, found: Found) -> dict[str, Any]:
         """See `fulmar benchmark events --help`."""

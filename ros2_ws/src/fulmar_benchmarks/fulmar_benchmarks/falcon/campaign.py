@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fulmar_benchmarks.falcon.cells import RANDOM, SCENARIOS, FalconCell
+from fulmar_benchmarks.falcon.cells import RANDOM, SCENARIOS, FalconCell, falcon_cell
 from fulmar_benchmarks.shape import Benchmark, Cell, Check, Figures, Found
 from fulmar_benchmarks.tables import number
 from fulmar_core.config.errors import ConfigError
@@ -63,7 +63,7 @@ class Falcon(Benchmark):
         """What is flown, in its order; of policies only those that are shipped."""
         asked = self.choice
         return [
-            FalconCell(
+            falcon_cell(
                 asked.robot, task, by, scenario, self._episodes(task, by, scenario), asked.seed, self._policy
             )
             for task in asked.tasks

@@ -57,7 +57,7 @@ SCENARIOS = {
 }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class FalconCell(Cell):
     """What one cell flies."""
 
@@ -71,16 +71,6 @@ class FalconCell(Cell):
     seed: int
     policy: str = ""  # folder of a bundle; empty: the shipped one
 
-    @property
-    def name(self) -> str:
-        """File name without suffix."""
-        return f"{self.robot}_{self.task}_{self.controller}_{self.scenario}"
-
-    @property
-    def cost(self) -> float:
-        """In flights; each of MPPI has rollouts of its own."""
-        return float(self.episodes) * (20.0 if self.controller == "mppi" else 1.0)
-
     def parts(self) -> dict[str, Any]:
         """A bundle counts by what is in it, not by where it lies."""
         policy = policy_hash(self.robot, f"fly_{self.task}", self.controller, self.policy)
@@ -90,6 +80,16 @@ class FalconCell(Cell):
         """Figures, and the first flight as it is drawn."""
         found, flight = fly(self)
         return {"figures": found, "flight": flight}
+
+
+def falcon_cell(
+    robot: str, task: str, by: str, scenario: str, episodes: int, seed: int, policy: str = ""
+) -> FalconCell:
+    """A cell with its name; each flight of MPPI has rollouts of its own."""
+    return FalconCell(
+        name=f"{robot}_{task}_{by}_{scenario}", cost=episodes * (20.0 if by == "mppi" else 1.0), robot=robot,
+        task=task, controller=by, scenario=scenario, episodes=episodes, seed=seed, policy=policy,
+    )  # fmt: skip
 
 
 def controller_of(robot: Robot, cell: FalconCell) -> Controller:

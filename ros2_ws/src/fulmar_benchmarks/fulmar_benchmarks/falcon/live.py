@@ -45,36 +45,13 @@ PERIOD_MS = 3.0  # limit of the 99th percentile of the control period's error, i
 SHOWN = (ALTITUDE, "late_altitude_rmse_m", "rmse_per_axis_m", "peak_error_m", "survival")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class LiveCell(Cell):
     """The same flights in one way."""
 
     modules = (f"{__package__}.cells",)
     trial: Trial
     way_of_flying: str  # batch, lockstep, or realtime: one flight, with its twin in the batch
-
-    @property
-    def name(self) -> str:
-        """File name without suffix."""
-        plan = self.trial.plan
-        seed = f"_{plan.seed}" if self.way_of_flying == "realtime" else ""
-        return f"{plan.robot}_{plan.task}_{plan.controller}_{self.way_of_flying}{seed}"
-
-    @property
-    def where(self) -> str:
-        """Flights in real time need the whole computer."""
-        return {"batch": POOL, "lockstep": ROS, "realtime": ALONE}[self.way_of_flying]
-
-    @property
-    def way(self) -> str:
-        """Through ROS all of Fulmar counts."""
-        return "batch" if self.way_of_flying == "batch" else "ros"
-
-    @property
-    def cost(self) -> float:
-        """In control steps through ROS."""
-        steps = self.trial.episodes * round(self.trial.plan.duration_s * self.trial.plan.control_hz)
-        return steps * (0.01 if self.way_of_flying == "batch" else 1.0)
 
     def parts(self) -> dict[str, Any]:
         """A bundle counts by what is in it."""
@@ -116,10 +93,18 @@ class LiveFlights(Benchmark):
         """Batch, lock step, and each flight in real time."""
         plan, seeds = self._trial.plan, range(self.choice.seed, self.choice.seed + self.choice.real_time)
         ones = [replace(self._trial, episodes=1, plan=replace(plan, seed=seed)) for seed in seeds]
+        every = [(self._trial, "batch"), (self._trial, "lockstep"), *((one, "realtime") for one in ones)]
         return [
-            LiveCell(self._trial, "batch"),
-            LiveCell(self._trial, "lockstep"),
-            *(LiveCell(one, "realtime") for one in ones),
+            LiveCell(
+                name=f"{plan.robot}_{plan.task}_{plan.controller}_{way}"
+                + (f"_{trial.plan.seed}" if way == "realtime" else ""),
+                cost=trial.episodes * plan.duration_s * plan.control_hz * (0.01 if way == "batch" else 1.0),
+                where={"batch": POOL, "lockstep": ROS, "realtime": ALONE}[way],
+                way="batch" if way == "batch" else "ros",
+                trial=trial,
+                way_of_flying=way,
+            )
+            for trial, way in every
         ]
 
     def document(self, found: Found) -> dict[str, Any]:

@@ -43,7 +43,7 @@ FOUND, IN_S, KNOWN = (
 )  # a step is found to this share in this time; share that counts as observable
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class InertiaCell(Cell):
     """One satellite under every profile, with an inertia that changes in one way or does not."""
 
@@ -53,16 +53,6 @@ class InertiaCell(Cell):
     change: str  # of simulated_runs.GROWTHS
     draws: int  # of sensor noise, of `static`
     seed: int
-
-    @property
-    def name(self) -> str:
-        """File name without suffix."""
-        return f"{self.satellite}_{self.change}"
-
-    @property
-    def cost(self) -> float:
-        """In filters that run."""
-        return float(len(self.profiles) * (2 * self.draws if self.change == "static" else 1))
 
     def measure(self, progress: Progress, pool: Any = None) -> Figures:
         """Figures by profile; of `static` by level, with the excitation."""
@@ -91,7 +81,15 @@ class Inertia(Benchmark):
         """Every satellite, static and changing."""
         asked = self.choice
         return [
-            InertiaCell(satellite, asked.profiles, change, asked.draws, asked.seed)
+            InertiaCell(
+                name=f"{satellite}_{change}",
+                cost=2.0 * asked.draws if change == "static" else 1.0,
+                satellite=satellite,
+                profiles=asked.profiles,
+                change=change,
+                draws=asked.draws,
+                seed=asked.seed,
+            )
             for satellite in asked.satellites
             for change in ("static", *CHANGES)
         ]

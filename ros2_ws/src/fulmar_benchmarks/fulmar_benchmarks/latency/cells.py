@@ -10,7 +10,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +24,7 @@ EXECUTORS = ("events", "default")
 REQUIRED_HZ, REQUIRED_P99_MS = 50.0, 3.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class LatencyCell(Cell):
     """What is measured together."""
 
@@ -34,26 +34,19 @@ class LatencyCell(Cell):
     executor: str  # events, or default: that of rclpy
     seconds: float = 1.0  # after it has begun to act [s]
 
-    @property
-    def name(self) -> str:
-        """File name without suffix."""
-        return f"{self.executor}_{self.hz:g}_hz_{'loaded' if self.loaded else 'idle'}"
-
-    @property
-    def where(self) -> str:
-        """It needs the whole computer."""
-        return ALONE
-
-    @property
-    def way(self) -> str:
-        """Through ROS all of Fulmar counts."""
-        return "ros"
-
     def measure(self, progress: Progress, pool: Any = None) -> Figures:
         """Spreads of latency and periods, and what the nodes use; `failure` where a node ended."""
         with tempfile.TemporaryDirectory(prefix="fulmar_", ignore_cleanup_errors=True) as folder:
-            its = {key: value for key, value in asdict(self).items() if key != "seconds"}
+            its = {"hz": self.hz, "loaded": self.loaded, "executor": self.executor}
             return its | _row(self, self.seconds, Path(folder))
+
+
+def latency_cell(hz: float, loaded: bool, executor: str, seconds: float) -> LatencyCell:
+    """A cell with its name, which needs the whole computer."""
+    return LatencyCell(
+        name=f"{executor}_{hz:g}_hz_{'loaded' if loaded else 'idle'}", where=ALONE, way="ros", hz=hz, loaded=loaded,
+        executor=executor, seconds=seconds,
+    )  # fmt: skip
 
 
 class Latency(Benchmark):
@@ -66,7 +59,7 @@ class Latency(Benchmark):
     def cells(self) -> list[LatencyCell]:
         """Every combination, the idle ones first."""
         each = itertools.product((False, True), self.choice.executors, self.choice.rates)
-        return [LatencyCell(hz, loaded, executor, self.choice.seconds) for loaded, executor, hz in each]
+        return [latency_cell(hz, loaded, executor, self.choice.seconds) for loaded, executor, hz in each]
 
     def document(self, found: Found) -> dict[str, Any]:
         """Figures by cell."""

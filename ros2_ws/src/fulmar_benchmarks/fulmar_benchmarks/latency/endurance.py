@@ -20,7 +20,7 @@ WARM_UP_SHARE = 0.1  # of the time: pools fill and windows of statistics grow to
 LOOK_S = 5.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class EnduranceCell(Cell):
     """One long run."""
 
@@ -28,26 +28,6 @@ class EnduranceCell(Cell):
     simulated_s: float
     rate: float
     folder: Path  # of policy and bag
-
-    @property
-    def name(self) -> str:
-        """File name without suffix."""
-        return f"{self.simulated_s:g}_s_at_{self.rate:g}"
-
-    @property
-    def where(self) -> str:
-        """It needs the whole computer."""
-        return ALONE
-
-    @property
-    def way(self) -> str:
-        """Through ROS all of Fulmar counts."""
-        return "ros"
-
-    @property
-    def cost(self) -> float:
-        """In seconds of the robot's time."""
-        return self.simulated_s
 
     def parts(self) -> dict[str, Any]:
         """Not where the bag lies."""
@@ -73,7 +53,13 @@ class Endurance(Benchmark):
 
     def cells(self) -> list[EnduranceCell]:
         """The run."""
-        return [EnduranceCell(self.choice.simulated_s, self.choice.rate, self.choice.out)]
+        simulated_s, rate = self.choice.simulated_s, self.choice.rate
+        return [
+            EnduranceCell(
+                name=f"{simulated_s:g}_s_at_{rate:g}", cost=simulated_s, where=ALONE, way="ros",
+                simulated_s=simulated_s, rate=rate, folder=self.choice.out,
+            )
+        ]  # fmt: skip
 
     def document(self, found: Found) -> dict[str, Any]:
         """Its figures."""

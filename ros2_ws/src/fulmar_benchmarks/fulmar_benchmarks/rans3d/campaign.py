@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, cast
 
 from fulmar_benchmarks.pairs import Pair, plan_of, with_law, with_policy
-from fulmar_benchmarks.rans3d.bound import BoundCell
+from fulmar_benchmarks.rans3d.bound import BoundCell, bound_cell
 from fulmar_benchmarks.rans3d.document import Key, document_of
 from fulmar_benchmarks.rans3d.integrator import integrator_of, tumbles
-from fulmar_benchmarks.rans3d.pace import PaceCell
+from fulmar_benchmarks.rans3d.pace import pace_cell
 from fulmar_benchmarks.rans3d.tables import conclusion, shown
 from fulmar_benchmarks.rans3d.targets import (
     DEAD,
@@ -23,8 +23,8 @@ from fulmar_benchmarks.rans3d.targets import (
 from fulmar_benchmarks.rans3d.unit import SpaceCell, SpaceTrial
 from fulmar_benchmarks.results import Outcome, PairResult, outcome_of
 from fulmar_benchmarks.shape import Benchmark, Cell, Check, Choice, Figures, Found, known
-from fulmar_benchmarks.tables import Shown
-from fulmar_benchmarks.unit import said_of
+from fulmar_benchmarks.tables import Shown, display_name
+from fulmar_benchmarks.unit import costs, said_of
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.simulation.counts import check_episodes
 from fulmar_core.simulation.episode import episode_steps
@@ -78,7 +78,7 @@ class Rans3d(Benchmark):
     def _bounds(self) -> dict[tuple[str, str], BoundCell]:
         """Of robots and tasks that count targets."""
         return {
-            key[:2]: BoundCell(cast(SpaceTrial, cell.trial))
+            key[:2]: bound_cell(cast(SpaceTrial, cell.trial))
             for key, cell in self._trials.items()
             if cell.trial.task.required is not None
         }
@@ -90,7 +90,7 @@ class Rans3d(Benchmark):
             *self._trials.values(),
             *self._bounds.values(),
             *(tumbles(asked.robots, asked.tumble_s) if "integrator" in parts else []),
-            *([PaceCell(asked.worlds, asked.jobs, asked.seconds)] if "throughput" in parts else []),
+            *([pace_cell(asked.worlds, asked.jobs, asked.seconds)] if "throughput" in parts else []),
         ]
 
     def outcomes(self, found: Found) -> dict[Key, Outcome]:
@@ -178,4 +178,8 @@ def cell_of(asked: Choice, pair: Pair, scenario: str) -> SpaceCell:
     farthest, seconds = EPISODES.get(pair.robot, (0.0, None))
     plan = plan_of(pair, scenario=scenario, seed=asked.seed, duration_s=seconds)
     trial = SpaceTrial(plan, WAY, asked.episodes, asked.episodes, farthest_m=farthest)
-    return SpaceCell(trial, pair.sha256, asked.out / "outcomes")
+    place = pair.robot, pair.task, pair.controller, scenario
+    return SpaceCell(
+        name="_".join(place), title=", ".join(map(display_name, place)), cost=costs(trial), way=WAY, trial=trial,
+        defines=pair.sha256, bounds=asked.out / "outcomes",
+    )  # fmt: skip

@@ -19,7 +19,7 @@ COST = 1e4  # of a second of the tumble, in steps of a batch
 TYPES = {"float64": np.float64, "float32": np.float32}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class TumbleCell(Cell):
     """One tumble at the step of a robot, by our step in one precision, or by one of MuJoCo's methods."""
 
@@ -27,21 +27,6 @@ class TumbleCell(Cell):
     robot: str
     how: str  # of TYPES, or of MuJoCo's INTEGRATORS
     seconds: float
-
-    @property
-    def name(self) -> str:
-        """File name without suffix."""
-        return f"tumble_{self.robot}_{self.how}"
-
-    @property
-    def way(self) -> str:
-        """MuJoCo counts, too."""
-        return "mujoco"
-
-    @property
-    def cost(self) -> float:
-        """In steps of a batch."""
-        return COST * self.seconds
 
     def measure(self, progress: Progress, pool: Any = None) -> Figures:
         """Largest relative drifts."""
@@ -53,8 +38,18 @@ class TumbleCell(Cell):
 
 def tumbles(robots: Sequence[str], seconds: float) -> list[TumbleCell]:
     """Each robot in both precisions, and MuJoCo at the step of the first."""
-    ours = [TumbleCell(robot, how, seconds) for robot in robots for how in TYPES]
-    return ours + [TumbleCell(robots[0], how, seconds) for how in INTEGRATORS]
+    every = [(robot, how) for robot in robots for how in TYPES] + [(robots[0], how) for how in INTEGRATORS]
+    return [
+        TumbleCell(
+            name=f"tumble_{robot}_{how}",
+            cost=COST * seconds,
+            way="mujoco",
+            robot=robot,
+            how=how,
+            seconds=seconds,
+        )
+        for robot, how in every
+    ]
 
 
 def integrator_of(robots: Sequence[str], seconds: float, found: Found) -> dict[str, Any]:

@@ -18,7 +18,7 @@ TASK = "go_to_pose_3d"
 LIBRARIES = ("numpy", "compiled")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class PaceCell(Cell):
     """The pace of the batch with every library."""
 
@@ -26,21 +26,6 @@ class PaceCell(Cell):
     worlds: int
     cores: int
     seconds: float
-
-    @property
-    def name(self) -> str:
-        """File name without suffix."""
-        return "throughput"
-
-    @property
-    def where(self) -> str:
-        """Alone, and last."""
-        return ALONE
-
-    @property
-    def way(self) -> str:
-        """MuJoCo counts, too."""
-        return "mujoco"
 
     def measure(self, progress: Progress, pool: Any = None) -> Figures:
         """As in `measure_pace`."""
@@ -50,6 +35,11 @@ class PaceCell(Cell):
             seconds=self.seconds,
             progress=lambda done, of: progress(done / of),
         )
+
+
+def pace_cell(worlds: int, cores: int, seconds: float) -> PaceCell:
+    """A cell with its name; alone, and last."""
+    return PaceCell(name="throughput", where=ALONE, way="mujoco", worlds=worlds, cores=cores, seconds=seconds)
 
 
 def measure_pace(

@@ -8,7 +8,6 @@ from typing import Any, cast
 import numpy as np
 
 from fulmar_benchmarks.rans3d.targets import NOMINAL, RANS_ATTITUDE_RAD, RANS_POSITION_M, RANS_STEPS
-from fulmar_benchmarks.tables import display_name
 from fulmar_benchmarks.unit import Extra, TrialCell
 from fulmar_core.simulation.episode import Episode
 from fulmar_core.simulation.metrics import Trajectories
@@ -47,21 +46,9 @@ def started_within(task: Task, farthest: float) -> Task:
     return task
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class SpaceCell(TrialCell):
     """A trial of one controller in one scenario."""
-
-    @property
-    def name(self) -> str:
-        """File name without suffix."""
-        plan = self.trial.plan
-        return f"{plan.robot}_{plan.task}_{plan.controller}_{plan.scenario}"
-
-    @property
-    def title(self) -> str:
-        """Name for people."""
-        plan = self.trial.plan
-        return f"{display_name(plan.robot)}, {display_name(plan.task)}, {plan.controller}, {plan.scenario}"
 
     def parts(self) -> dict[str, Any]:
         """The start decides, too."""

@@ -109,6 +109,6 @@ def _saying(benchmark: Benchmark) -> Callable[[Cell, Figures | str, bool], None]
 
     def say(cell: Cell, figures: Figures | str, before: bool) -> None:
         text = f"failed: {figures}" if isinstance(figures, str) else benchmark.said(cell, figures)
-        log_line(f"{cell.title}: {text}{' (evaluated before)' if before else ''}")
+        log_line(f"{cell.title or cell.name}: {text}{' (evaluated before)' if before else ''}")
 
     return say
