@@ -150,7 +150,7 @@ def test_without_a_controller_the_watchdog_acts_at_the_tick_at_which_it_would_by
 
 
 def test_flights_that_were_flown_are_kept_and_a_benchmark_that_was_broken_off_goes_on(tmp_path, monkeypatch):
-    monkeypatch.setattr("fulmar_benchmarks.workers.POOL", ALONE)  # in this process
+    monkeypatch.setattr("fulmar_benchmarks.pool.POOL", ALONE)  # in this process
     monkeypatch.setattr(
         "fulmar_benchmarks.descent.live.fly_in_lockstep", lambda _, number: replace(GOOD, number=number)
     )

@@ -23,7 +23,7 @@ FIGURES = {
 def brief(monkeypatch):
     """Flights of a second in the place of a minute, in this process."""
     monkeypatch.setattr(cells, "load_task", lambda name: replace(load_task(name), episode_s=1.0))
-    monkeypatch.setattr("fulmar_benchmarks.workers.POOL", ALONE)
+    monkeypatch.setattr("fulmar_benchmarks.pool.POOL", ALONE)
 
 
 def test_a_flight_has_the_stated_keys(fulmar, brief, tmp_path):

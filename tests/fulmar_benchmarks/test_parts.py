@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from fulmar_benchmarks import outcomes as kept
-from fulmar_benchmarks import results, workers
+from fulmar_benchmarks import pool, results
 from fulmar_benchmarks import unit as units
 from fulmar_benchmarks.campaign import measured
 from fulmar_benchmarks.outcomes import code_hash, keys_of
@@ -125,7 +125,7 @@ def test_an_outcome_counts_only_for_what_it_was_made_of(tmp_path, monkeypatch):
 
 
 def test_what_was_evaluated_before_is_taken_from_its_file_unless_it_is_asked_anew(tmp_path, monkeypatch):
-    monkeypatch.setattr("fulmar_benchmarks.workers.POOL", "alone")
+    monkeypatch.setattr("fulmar_benchmarks.pool.POOL", "alone")
     told = []
     for fresh in (False, False, True):
         given = {"folder": tmp_path, "jobs": 1, "fresh": fresh}
@@ -215,7 +215,7 @@ def test_the_fault_of_one_cell_is_a_sentence_and_costs_no_other(tmp_path, monkey
     unit = unit_of(tmp_path, way="ros", episodes=1)
     monkeypatch.setattr(units.TrialCell, "measure", broken)
     seen = []
-    workers.measure_all(
+    pool.measure_all(
         [unit], jobs=1, progress=lambda done: None, on_done=lambda *reported: seen.append(reported)
     )
     assert seen == [(unit, "RuntimeError: it broke")]

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from fulmar_benchmarks.workers import ended_with_us, one_thread_each
+from fulmar_benchmarks.pool import ended_with_us, one_thread_each
 from fulmar_core.robots.actuators.differential_drive import DifferentialDrive
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_evaluation.driven_run import driven_run

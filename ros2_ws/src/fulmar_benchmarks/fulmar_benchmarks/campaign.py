@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from fulmar_benchmarks.outcomes import keep, keys_of, library_version, read
+from fulmar_benchmarks.pool import measure_all
 from fulmar_benchmarks.shape import AGAIN, Benchmark, Cell, Figures, Found, tally
-from fulmar_benchmarks.workers import measure_all
 from fulmar_core.config.atomic_write import whole_file
 from fulmar_core.config.provenance import fulmar_version, git_revision
 
@@ -73,7 +73,7 @@ def run(
         benchmark: Which.
         progress: Called with how much is done, and of how much.
         on_done: Called with each cell, its figures, or why there are none, and whether they were there before.
-        using: Measures cells, as `workers.measure_all` does in a pool.
+        using: Measures cells, as `pool.measure_all` does in a pool.
     """
     began, choice = time.monotonic(), benchmark.choice
     benchmark.check()
