@@ -3,91 +3,95 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import ray
-
-from fulmar_core.config.errors import FulmarError
-from training.executors import Watch
+from fulmar_core.config.pool import Pool, report
+from fulmar_core.config.process import environment
+from fulmar_core.robots.calibration import VARIABLE, calibration_path
+from training.executors import Executor, LocalExecutor, Watch
 from training.jobs import Job, Outcome, run_job
 from training.progress import ProgressNotes
+from training.run_folder import CALIBRATION_FILE
 
-POLL_S = 0.5
+Files = dict[str, bytes]  # content by path below a run folder
+BUNDLE = "bundle"
 
 
 class RayExecutor:
-    """A task of one core for each job; run folders come back to this machine."""
+    """A core for each job; run folders go there and come back."""
 
-    def __init__(self, address: str | None = None) -> None:
-        """Join a cluster, or begin one on this machine.
+    def __init__(self, address: str | None = None, pool: Pool | None = None) -> None:
+        """Join a cluster, or begin one on this machine, as `RayPool` does; or use another pool."""
+        if pool is None:
+            from fulmar_core.config.ray_pool import RayPool  # Ray is an extra
 
-        Args:
-            address: Of the cluster, as `ray.init` takes it; RAY_ADDRESS or a new local one by default.
-        """
-        if not ray.is_initialized():
-            ray.init(address=address, log_to_driver=False, logging_level="ERROR")
+            pool = RayPool(address)
+        self._pool = pool
 
     def run(self, jobs: Sequence[Job], watch: Watch) -> list[Outcome]:
         """See `Executor.run`."""
-        board = _Board.remote()
-        tasks = {_work.remote(number, job, board): number for number, job in enumerate(jobs)}
         outcomes: dict[int, Outcome] = {}
-        try:
-            while tasks:
-                done, _ = ray.wait(list(tasks), timeout=POLL_S)
-                for number, progress in ray.get(board.read.remote()).items():
-                    if number not in outcomes:
-                        watch(number, "running", progress)
-                for task in done:
-                    number = tasks.pop(task)
-                    outcomes[number] = _outcome(jobs[number], task)
-                    watch(number, "failed" if outcomes[number].record is None else "done", {})
-        finally:
-            for task in tasks:  # after an interrupt
-                ray.cancel(task)
+
+        def on_done(number: int, result: Any) -> None:
+            outcomes[number] = _outcome(jobs[number], result)
+            watch(number, "failed" if outcomes[number].record is None else "done", {})
+
+        def hear(said: Mapping[int, dict[str, Any]]) -> None:
+            for number, progress in said.items():
+                if number not in outcomes:
+                    watch(number, "running", progress)
+
+        given = calibration_path()
+        more = {CALIBRATION_FILE: given.read_bytes()} if given else {}
+        items = [(job, _files_of(job.out) | more) for job in jobs]
+        self._pool.run(_work, items, on_done=on_done, watch=hear)
         return [outcomes[number] for number in range(len(jobs))]
 
 
-def _outcome(job: Job, task: Any) -> Outcome:
-    try:
-        record, files = ray.get(task)
-    except ray.exceptions.RayError as error:
-        reason = getattr(error, "cause", None) or error
-        return Outcome(job, None, str(reason).strip().splitlines()[-1])
+def executor_at(ray: str | None, at_once: int | None = None) -> Executor:
+    """A Ray cluster, by its address; without one so many processes of this machine, one for each core by default."""
+    return LocalExecutor(at_once) if ray is None else RayExecutor(ray)
+
+
+def _files_of(folder: Path) -> Files:
+    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def _write(files: Files, folder: Path) -> None:
     for name, content in files.items():
-        path = job.out / name
+        path = folder / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(content)
+
+
+def _outcome(job: Job, result: Any) -> Outcome:
+    if isinstance(result, Exception):
+        return Outcome(job, None, str(result))
+    record, files, bundle = result
+    _write(files, job.out)
+    if job.bundle is not None:
+        _write(bundle, job.bundle)
     return Outcome(job, record)
 
 
-@ray.remote(num_cpus=0)
-class _Board:
-    """Progress of the jobs on all machines."""
+def _work(job: Job, files: Files) -> tuple[dict[str, Any], Files, Files]:
+    """Do a job on whichever machine this is.
 
-    def __init__(self) -> None:
-        self._progress: dict[int, dict[str, Any]] = {}
+    Args:
+        job: What to do; an interrupted run goes on.
+        files: Of its run folder.
 
-    def write(self, number: int, progress: dict[str, Any]) -> None:
-        self._progress[number] = progress
-
-    def read(self) -> dict[int, dict[str, Any]]:
-        return self._progress
-
-
-@ray.remote(max_retries=0)
-def _work(number: int, job: Job, board: Any) -> tuple[dict[str, Any], dict[str, bytes]]:
-    """Do a job on whichever machine this is; returns its record and every file of its folder."""
-    with tempfile.TemporaryDirectory() as folder:
-        here = Path(folder)
-        bundle = here / "bundle" if job.bundle is not None else None
-        notes = ProgressNotes(lambda progress: board.write.remote(number, progress), every_s=1.0)
-        try:
-            record = run_job(replace(job, out=here, bundle=bundle), notes)
-        except FulmarError as error:
-            raise RuntimeError(str(error)) from None
-        files = {str(path.relative_to(here)): path.read_bytes() for path in here.rglob("*") if path.is_file()}
-    return record, files
+    Returns:
+        Its record, and every file of its run folder and of its bundle.
+    """
+    with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryDirectory() as bundles:
+        here, bundle = Path(folder), Path(bundles) / BUNDLE
+        _write(files, here)
+        calibration = str(here / CALIBRATION_FILE) if CALIBRATION_FILE in files else ""
+        moved = replace(job, out=here, bundle=bundle if job.bundle is not None else None)
+        with environment({VARIABLE: calibration}):
+            record = run_job(moved, ProgressNotes(report, every_s=1.0))
+        return record, _files_of(here), _files_of(bundle)

@@ -14,6 +14,7 @@ from fulmar_core.simulation.counts import check_count, check_episodes
 from fulmar_core.tasks import load_task
 from training.executors import Executor, LocalExecutor
 from training.jobs import Job
+from training.ray_executor import RayExecutor
 from training.run_folder import CALIBRATION_FILE, SETTINGS_FILE, read_start, write_start
 from training.settings import StopAtSuccess, load_training_settings
 from training.train import check_seed
@@ -100,13 +101,9 @@ def _check_options(request: TrainingRequest) -> None:
         raise ConfigError(
             "--resume goes on with the calibration that the run began with; leave --calibration out."
         )
-    if r.calibration is not None and r.executor == "ray":
-        raise ConfigError(
-            "--calibration is a file of this machine; --executor ray does not carry it. Use local."
-        )
     if (r.executor == "ray" or r.address) and r.seeds == 1:
         raise ConfigError(
-            "--executor ray and --address are for campaigns: give --seeds N, or leave them out."
+            "--ray, --executor ray and --address are for campaigns: give --seeds N, or leave them out."
         )
 
 
@@ -136,8 +133,4 @@ def _resumed(run: Path) -> dict[str, Any]:
 
 def executor_of(request: TrainingRequest) -> Executor:
     """What runs the jobs of a campaign: processes of this machine, or a Ray cluster."""
-    if request.executor == "ray":
-        from training.ray_executor import RayExecutor
-
-        return RayExecutor(request.address)
-    return LocalExecutor()
+    return RayExecutor(request.address) if request.executor == "ray" else LocalExecutor()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import json
+import sys
 
 import pytest
 import typer
@@ -98,6 +99,7 @@ def test_a_seed_that_fails_is_reported_and_the_command_fails(asked, tmp_path):
         (("--resume", "/nowhere", "--out", "/elsewhere"), "leave ROBOT, TASK, --seed"),
         ((*PLATFORM, "--executor", "ray"), "are for campaigns: give --seeds N"),
         ((*PLATFORM, "--address", "nowhere:1"), "are for campaigns: give --seeds N"),
+        ((*PLATFORM, "--ray", "nowhere:1"), "are for campaigns: give --seeds N"),
         ((*PLATFORM, "--stop-at-success", 0), "must be greater than 0"),
         ((*PLATFORM, "--seeds", 3, "--seed", 2025), "seed 2026 must not be negative, nor"),
     ],
@@ -105,6 +107,20 @@ def test_a_seed_that_fails_is_reported_and_the_command_fails(asked, tmp_path):
 def test_what_cannot_be_trained_is_reported(words, reported):
     with pytest.raises(ConfigError, match=reported):
         call(train, *words)
+
+
+@pytest.mark.skipif(sys.version_info >= (3, 14), reason="Ray has no wheels for Python 3.14")
+@pytest.mark.parametrize("command", ["train", "policies", "benchmark training"])
+def test_a_cluster_that_does_not_answer_is_refused_before_anything_is_made(command, fulmar, tmp_path):
+    words = {
+        "train": [*PLATFORM, "--seeds", 2, "--out", tmp_path / "out"],
+        "policies": ["floating_platform_go_to_pose", "--out", tmp_path / "out"],
+        "benchmark training": [*PLATFORM, "--out", tmp_path / "out"],
+    }[command]
+    code, _, said = fulmar(*command.split(), *words, "--ray", "127.0.0.1:1")
+    assert code == 2
+    assert "Ray address 127.0.0.1:1 does not answer" in said.splitlines()[-1]
+    assert not (tmp_path / "out").exists()
 
 
 @pytest.fixture
@@ -249,8 +265,6 @@ def test_a_run_is_resumed_with_the_calibration_it_began_with_and_no_other(learne
     assert calibration_path() == kept
     with pytest.raises(ConfigError, match="leave --calibration out"):
         call(train, "--resume", tmp_path, "--calibration", kept)
-    with pytest.raises(ConfigError, match="--executor ray does not carry it"):
-        call(train, *PLATFORM, "--calibration", kept, "--executor", "ray")
 
 
 def test_a_run_cannot_be_resumed_as_a_campaign(tmp_path, learned):

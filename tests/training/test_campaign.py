@@ -11,11 +11,15 @@ from pathlib import Path
 
 import pytest
 
+from fulmar_core.config.errors import ConfigError
 from fulmar_core.config.seeds import EVALUATION_SEED
+from fulmar_core.robots.calibration import calibration_path
+from tests.ray_cluster import two_nodes
 from training.campaign import CAMPAIGN_FILE, run_campaign, summarised
 from training.executors import LocalExecutor
 from training.jobs import Job, Outcome, run_job
-from training.run_folder import read_run_record
+from training.ray_executor import RayExecutor
+from training.run_folder import NETWORK_FILE, read_run_record
 
 
 @pytest.fixture
@@ -148,29 +152,71 @@ def test_a_campaign_of_failures_has_no_best(job):
     assert (result["best_seed"], result["success_mean"], result["success_std"]) == (None, None, None)
 
 
+class Elsewhere:
+    """A pool that does its calls here, one after another."""
+
+    def run(self, function, items, *, on_done, watch):
+        for index, item in enumerate(items):
+            watch({index: {"share": 0.5}})
+            try:
+                on_done(index, function(*item))
+            except ConfigError as error:
+                on_done(index, error)
+
+
+def test_run_folder_bundle_and_calibration_go_to_another_machine_and_come_back(job, tmp_path, monkeypatch):
+    seen = []
+
+    def learned(moved, notes):
+        seen.append((moved.out, (moved.out / "checkpoint").read_text(), calibration_path().read_text()))
+        (moved.out / "deeper").mkdir()
+        (moved.out / "deeper" / "curve").write_text("1")
+        moved.bundle.mkdir()
+        (moved.bundle / "passport.json").write_text("{}")
+        return {"best": {"success_rate": 1.0}}
+
+    monkeypatch.setattr("training.ray_executor.run_job", learned)
+    calibration = tmp_path / "measured.yaml"
+    calibration.write_text("mass")
+    monkeypatch.setenv("FULMAR_CALIBRATION", str(calibration))
+    job = replace(job, bundle=tmp_path / "bundle")
+    job.out.mkdir()
+    (job.out / "checkpoint").write_text("half done")
+    watched = []
+    (outcome,) = RayExecutor(pool=Elsewhere()).run([job], lambda *each: watched.append(each))
+    (there, checkpoint, measured) = seen[0]
+    assert there != job.out and not there.exists()
+    assert (checkpoint, measured) == ("half done", "mass")
+    assert outcome.record == {"best": {"success_rate": 1.0}}
+    assert (job.out / "deeper" / "curve").read_text() == "1"
+    assert (job.bundle / "passport.json").is_file()
+    assert watched == [(0, "running", {"share": 0.5}), (0, "done", {})]
+    assert calibration_path() == calibration
+
+
+def test_a_job_that_fails_on_a_cluster_is_an_outcome_and_leaves_nothing(job):
+    reserved = with_seed(job, EVALUATION_SEED)
+    (outcome,) = RayExecutor(pool=Elsewhere()).run([reserved], lambda *_: None)
+    assert outcome.record is None
+    assert "are reserved for evaluation" in outcome.error
+    assert not reserved.out.exists()
+
+
 @pytest.mark.slow
 @pytest.mark.timeout(300)
-def test_the_same_campaign_runs_on_two_nodes_of_a_ray_cluster(job, tmp_path, monkeypatch):
-    pytest.importorskip("ray", reason="the extra 'cluster' is not installed")
-    import ray
-    from ray.cluster_utils import Cluster
-
-    from training import ray_executor
-
-    cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 1, "include_dashboard": False})
-    try:
-        cluster.add_node(num_cpus=2)
-        executor = ray_executor.RayExecutor(cluster.address)
-        assert sum(node["Alive"] for node in ray.nodes()) == 2
+@pytest.mark.skipif(sys.version_info >= (3, 14), reason="Ray has no wheels for Python 3.14")
+def test_a_campaign_on_two_nodes_of_a_ray_cluster_learns_the_same_weights(job, tmp_path):
+    with two_nodes() as address:
         watched = []
         jobs = [with_seed(job, seed) for seed in (1, 2, EVALUATION_SEED)]
-        result = run_campaign(jobs, executor, tmp_path, lambda *args: watched.append(args))
-        assert result["failed"] == 1
-        assert "are reserved for evaluation" in result["seeds"][2]["error"]
-        assert result["best_seed"] in (1, 2)
-        for one in jobs[:2]:
-            assert read_run_record(one.out)["updates"] == 2
-        assert {number: state for number, state, _ in watched} == {0: "done", 1: "done", 2: "failed"}
-    finally:
-        ray.shutdown()
-        cluster.shutdown()
+        result = run_campaign(jobs, RayExecutor(address), tmp_path, lambda *args: watched.append(args))
+    assert result["failed"] == 1
+    assert "are reserved for evaluation" in result["seeds"][2]["error"]
+    assert result["best_seed"] in (1, 2)
+    for one in jobs[:2]:
+        assert read_run_record(one.out)["updates"] == 2
+    assert {number: state for number, state, _ in watched} == {0: "done", 1: "done", 2: "failed"}
+    here = [replace(one, out=tmp_path / f"here {one.seed}") for one in jobs[:2]]
+    LocalExecutor(2).run(here, lambda *_: None)
+    for ours, theirs in zip(here, jobs, strict=False):
+        assert (ours.out / NETWORK_FILE).read_bytes() == (theirs.out / NETWORK_FILE).read_bytes()

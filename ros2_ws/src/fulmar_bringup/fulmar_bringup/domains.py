@@ -1,4 +1,4 @@
-"""ROS domains that no other process of this computer uses, and temporary environment variables."""
+"""ROS domains that no other process of this computer uses."""
 
 from __future__ import annotations
 
@@ -7,28 +7,13 @@ import fcntl
 import os
 import random
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TextIO
 
 from fulmar_core.config.errors import ConfigError
+from fulmar_core.config.process import environment
 from fulmar_ros.ros_check import domain_problem
-
-
-@contextlib.contextmanager
-def environment(values: Mapping[str, str]) -> Iterator[None]:
-    """Set variables of this process and the children that it starts, until the context ends."""
-    before = {name: os.environ.get(name) for name in values}
-    os.environ.update(values)
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
-
 
 DOMAINS = range(1, 102)  # up to 101 the ports of a domain lie below those that Linux hands out to others
 

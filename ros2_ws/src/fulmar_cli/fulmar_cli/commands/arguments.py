@@ -107,6 +107,12 @@ CORES = len(os.sched_getaffinity(0))
 JobsOption = Annotated[
     int, option("N", "Parallel processes; one for each core by default.", min=1, show_default=False)
 ]
+RayOption = Annotated[
+    str | None,
+    option(
+        "ADDRESS", "Compute on a Ray cluster: HOST:PORT as `ray start --head` prints it, or auto.", "--ray"
+    ),
+]
 BagArgument = Annotated[Path, argument("BAG", "A bag folder, or the .mcap or .db3 file in it.")]
 OdometryOption = Annotated[str | None, option("TOPIC", "The odometry to use, where a bag has several.")]
 JsonOption = Annotated[bool, json_flag("Print one JSON object and nothing else.")]

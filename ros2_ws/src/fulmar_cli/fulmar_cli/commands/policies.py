@@ -8,7 +8,8 @@ from typing import Annotated, Any
 import typer
 
 from fulmar_bringup.console import log_line, print_json, write_line
-from fulmar_cli.commands.arguments import JsonOption, argument, flag, invoked_command, option
+from fulmar_cli.commands.arguments import JsonOption, RayOption, argument, flag, invoked_command, option
+from fulmar_cli.installation.extras import require
 from fulmar_core.config.errors import FAILED, ConfigError, did_you_mean
 
 
@@ -19,6 +20,7 @@ def policies(
     out: Annotated[Path | None, option("DIR", "Folder of the bundles; the shipped ones by default.")] = None,
     runs: Annotated[Path, option("DIR", "Folder of the run folders.")] = Path("runs/policies"),
     anew: Annotated[bool, flag("--anew", "Make all anew; what exists is moved beside its run.")] = False,
+    ray: RayOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Make the shipped policies of configs/policies.yaml: train, evaluate in MuJoCo, export.
@@ -35,10 +37,12 @@ def policies(
     """
     from fulmar_core.config.provenance import git_revision
     from policy_server.controllers import policies_directory
-    from training.executors import LocalExecutor
     from training.policies import expected_s, is_made, load_policy_table, make_policies, policy_job, set_aside
     from training.progress import JobBars
+    from training.ray_executor import executor_at
 
+    if ray:
+        require("ray")
     table = load_policy_table()
     known = [policy.name for policy in table.policies]
     for name in names or []:
@@ -63,7 +67,7 @@ def policies(
             log_line(f"{job.name}: the old one is in {aside}")
     log_line(f"{len(missing)} of {len(jobs)} policies to make, about {minutes:.0f} min and the evaluation")
     with JobBars([job.name for job in missing]) as bars:
-        lines = make_policies(table, jobs, LocalExecutor(table.at_once), bars)
+        lines = make_policies(table, jobs, executor_at(ray, table.at_once), bars)
     if as_json:
         print_json({"policies": lines})
     else:

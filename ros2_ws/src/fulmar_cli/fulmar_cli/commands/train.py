@@ -12,6 +12,7 @@ from fulmar_bringup.console import log_line, print_json, print_result, write_lin
 from fulmar_cli.commands.arguments import (
     CalibrationOption,
     JsonOption,
+    RayOption,
     SeedOption,
     argument,
     flag,
@@ -54,6 +55,7 @@ def train(
     address: Annotated[
         str | None, option("A", "Address of the Ray cluster; RAY_ADDRESS or a new one by default.")
     ] = None,
+    ray: RayOption = None,
     wandb: Annotated[bool, flag("--wandb", "Send curves to Weights & Biases too, project 'fulmar'.")] = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -79,7 +81,7 @@ def train(
         require("wandb")
     request = TrainingRequest(
         robot, task, seed, seeds, time_limit, updates, stop_at_success, settings, control_hz, out, episodes,
-        calibration, resume, executor, address, wandb, invoked_command(),
+        calibration, resume, "ray" if ray else executor, ray or address, wandb, invoked_command(),
     )  # fmt: skip
     job = job_of(request)
     if seeds == 1:

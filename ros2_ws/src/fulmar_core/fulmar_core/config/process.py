@@ -1,4 +1,4 @@
-"""Process settings: thread priority, and ending with the parent process."""
+"""Process settings: thread priority, ending with the parent process, and temporary environment variables."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import ctypes
 import os
 import signal
 import sys
+from collections.abc import Iterator, Mapping
 
 # Above every ordinary thread. The plant before the controller: threads of one priority do not interrupt each
 # other, and a controller that spins for ever must not keep the watchdog from closing the valves.
@@ -78,3 +79,18 @@ def end_with(parent: int, ending: signal.Signals) -> None:
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, int(ending))
     if os.getppid() != parent:
         os.kill(os.getpid(), ending)
+
+
+@contextlib.contextmanager
+def environment(values: Mapping[str, str]) -> Iterator[None]:
+    """Set variables of this process and the children that it starts, until the context ends."""
+    before = {name: os.environ.get(name) for name in values}
+    os.environ.update(values)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value

@@ -11,10 +11,10 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from fulmar_bringup.domains import environment, reserved_domains
+from fulmar_bringup.domains import reserved_domains
 from fulmar_bringup.system import default_hardware, modules_of
 from fulmar_core.config.errors import ConfigError, FulmarError, UnknownNameError
-from fulmar_core.config.process import end_with
+from fulmar_core.config.process import end_with, environment
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_evaluation.faults.actuator_faults import ACTUATOR_FAULTS
 from fulmar_evaluation.faults.command_faults import CABLE_FAULTS, COMMAND_FAULTS

@@ -11,9 +11,9 @@ from typing import Any
 
 from fulmar_bags.contents import Bag, open_bag
 from fulmar_bringup.bag_origin import CALIBRATION
-from fulmar_bringup.domains import environment
 from fulmar_core.config.errors import ConfigError
 from fulmar_core.config.paths import OWN_FOLDERS, config_names
+from fulmar_core.config.process import environment
 from fulmar_core.controllers.classical import entry_of
 from fulmar_core.robots.calibration import VARIABLE
 from fulmar_core.robots.robot_file import load_robot
