@@ -39,15 +39,15 @@ class RayExecutor:
             outcomes[number] = _outcome(jobs[number], result)
             watch(number, "failed" if outcomes[number].record is None else "done", {})
 
-        def hear(said: Mapping[int, dict[str, Any]]) -> None:
-            for number, progress in said.items():
+        def receive(reported: Mapping[int, dict[str, Any]]) -> None:
+            for number, progress in reported.items():
                 if number not in outcomes:
                     watch(number, "running", progress)
 
         given = calibration_path()
         more = {CALIBRATION_FILE: given.read_bytes()} if given else {}
         items = [(job, _files_of(job.out) | more) for job in jobs]
-        self._pool.run(_work, items, on_done=on_done, watch=hear)
+        self._pool.run(_work, items, on_done=on_done, watch=receive)
         return [outcomes[number] for number in range(len(jobs))]
 
 

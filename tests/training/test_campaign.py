@@ -206,10 +206,12 @@ def test_a_job_that_fails_on_a_cluster_is_an_outcome_and_leaves_nothing(job):
 @pytest.mark.timeout(300)
 @pytest.mark.skipif(sys.version_info >= (3, 14), reason="Ray has no wheels for Python 3.14")
 def test_a_campaign_on_two_nodes_of_a_ray_cluster_learns_the_same_weights(job, tmp_path):
-    with two_nodes() as address:
+    with two_nodes() as cluster:
         watched = []
         jobs = [with_seed(job, seed) for seed in (1, 2, EVALUATION_SEED)]
-        result = run_campaign(jobs, RayExecutor(address), tmp_path, lambda *args: watched.append(args))
+        result = run_campaign(
+            jobs, RayExecutor(cluster.address), tmp_path, lambda *args: watched.append(args)
+        )
     assert result["failed"] == 1
     assert "are reserved for evaluation" in result["seeds"][2]["error"]
     assert result["best_seed"] in (1, 2)
