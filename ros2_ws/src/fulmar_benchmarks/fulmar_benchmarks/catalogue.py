@@ -114,7 +114,7 @@ class Row:
     help: str
     selectors: Sequence[Selector]
     needs: Callable[[Choice], Sequence[str]] = lambda choice: ()  # modules of extras
-    shared: Sequence[str] = ("seed", "jobs", "resume", "report", "check")  # of SHARED, beside out
+    shared: Sequence[str] = ("seed", "jobs", "ray", "resume", "report", "check")  # of SHARED, beside out
     always_checked: bool = False  # it ends with code 1 even without `--check`
     timed: bool = False  # its figures are times: they are measured again unless one says `--resume`
     dated: bool = False  # its folder is a new one each time: runs/benchmark/TIME_NAME
@@ -132,6 +132,9 @@ SHARED = {
     "seed": Selector("seed", "N", "Seed of everything random.", EVALUATION_SEED, int, 0, 2**63 - 1),
     "jobs": Selector(
         "jobs", "N", "Parallel processes; one for each core by default.", len(os.sched_getaffinity(0)), int, 1
+    ),
+    "ray": Selector(
+        "ray", "ADDRESS", "Compute on a Ray cluster: HOST:PORT as `ray start --head` prints it, or auto."
     ),
     "resume": Selector(
         "resume", "", "Take what was measured before and did not change, or measure it again.", True, bool,

@@ -1,27 +1,48 @@
-"""Pool of worker processes: progress, failures of single cells, an end with the parent."""
+"""Cells in a pool of worker processes, of this machine or of a Ray cluster: progress, and failures of single cells."""
 
 from __future__ import annotations
 
 import contextlib
-import multiprocessing
-import os
-import signal
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 from fulmar_benchmarks.shape import POOL, ROS, Cell, Figures, Progress
-from fulmar_bringup.domains import environment
-from fulmar_core.config.errors import RunFailed
-from fulmar_core.config.process import end_with
+from fulmar_core.config.pool import Pool, ProcessPool, report
 
-_ONE_THREAD = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
 Note = Callable[[Cell, Figures | str], None]
+_cluster: list[Pool] = []  # what is used in place of this machine's processes
+
+
+@contextlib.contextmanager
+def on_cluster(address: str | None) -> Iterator[None]:
+    """Have cells measured on a Ray cluster until the context ends; without an address on this machine.
+
+    Raises:
+        ConfigError: Nothing answers at the address.
+    """
+    if address is None:
+        yield
+        return
+    from fulmar_core.config.ray_pool import RayPool
+
+    pool = RayPool(address)
+    _cluster.append(pool)
+    try:
+        yield
+    finally:
+        _cluster.remove(pool)
+        pool.close()
+
+
+def pool_of(jobs: int) -> Pool:
+    """So many processes of this machine; on a cluster as many as it has cores."""
+    return _cluster[-1] if _cluster else ProcessPool(jobs)
 
 
 def measure_all(cells: Sequence[Cell], *, jobs: int, progress: Progress, on_done: Note) -> None:
     """Measure cells, the costliest first; then one after another those that use all cores themselves.
+
+    On a cluster cells of `ROS` have a core each, and each of `ALONE` has whichever machine to itself.
 
     Args:
         cells: Which.
@@ -33,18 +54,21 @@ def measure_all(cells: Sequence[Cell], *, jobs: int, progress: Progress, on_done
         RunFailed: A process was ended from outside.
     """
     ordered = sorted(cells, key=lambda cell: -cell.cost)
-    pooled = [cell for cell in ordered if cell.where == POOL]
-    if pooled:
-        in_a_pool(pooled, min(jobs, len(pooled)), progress, on_done)
+    pooled = [cell for cell in ordered if cell.where == POOL or (_cluster and cell.where == ROS)]
+    rest = [cell for cell in ordered if cell not in pooled]
+    in_a_pool(pooled, jobs, progress, on_done)
     done = sum(cell.cost for cell in pooled)
     with contextlib.ExitStack() as ending:
         pool = None
-        for cell in (cell for cell in ordered if cell.where != POOL):
+        for cell in rest:
             if cell.where == ROS and pool is None:
                 from fulmar_evaluation.ros_evaluation import ros_pool
 
                 pool = ending.enter_context(ros_pool(jobs))  # the deployed nodes, started once for all
-            on_done(cell, figures_of(cell, _beyond(done, progress), pool))
+            if _cluster:
+                in_a_pool([cell], jobs, _beyond(done, progress), on_done)
+            else:
+                on_done(cell, figures_of(cell, _beyond(done, progress), pool))
             done += cell.cost
             progress(done)
 
@@ -62,56 +86,24 @@ def _beyond(done: float, progress: Progress) -> Progress:
     return lambda more: progress(done + more)
 
 
-@contextlib.contextmanager
-def _ended_with_us(pool: ProcessPoolExecutor) -> Iterator[ProcessPoolExecutor]:
-    """Wait for the workers; after an error or Ctrl-C, end them."""
-    try:
-        yield pool
-    except BaseException:
-        for worker in multiprocessing.active_children():
-            worker.terminate()
-        raise
-    finally:
-        pool.shutdown(cancel_futures=True)
-
-
-_counts: Any = None
-
-
-def _begin_worker(counts: Any, parent: int) -> None:
-    """Begin a process of a pool; without its parent it ends, as nobody would take what it does."""
-    global _counts
-    _counts = counts
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the parent, which ends its children
-    end_with(parent, signal.SIGTERM)
-
-
 def in_a_pool(cells: Sequence[Cell], jobs: int, progress: Progress, on_done: Note) -> None:
-    """Measure cells in so many processes of one thread each."""
-    spawn = multiprocessing.get_context("spawn")
-    counts = spawn.Array("d", len(cells), lock=False)
-    with (
-        environment(_ONE_THREAD),
-        _ended_with_us(ProcessPoolExecutor(jobs, spawn, _begin_worker, (counts, os.getpid()))) as pool,
-    ):
-        futures: dict[Future[Figures | str], Cell] = {
-            pool.submit(_work, cell, index): cell for index, cell in enumerate(cells)
-        }
-        pending = set(futures)
-        while pending:
-            done, pending = wait(pending, timeout=0.2, return_when=FIRST_COMPLETED)
-            progress(float(sum(counts)))
-            for future in done:
-                try:
-                    on_done(futures[future], future.result())
-                except BrokenProcessPool as error:
-                    raise RunFailed("a process of the benchmark was ended from outside") from error
+    """Measure cells in so many processes of one thread each, or on the cluster."""
+    done: dict[int, float] = {}
+
+    def note(index: int, figures: Figures | str | Exception) -> None:
+        done[index] = cells[index].cost
+        on_done(cells[index], str(figures) if isinstance(figures, Exception) else figures)
+
+    def watch(reported: Mapping[int, float]) -> None:
+        progress(sum((dict(reported) | done).values()))
+
+    pool_of(jobs).run(_work, [(cell,) for cell in cells], on_done=note, watch=watch)
 
 
-def _work(cell: Cell, index: int) -> Figures | str:
-    def progress(done: float) -> None:
-        _counts[index] = done
+def _work(cell: Cell) -> Figures | str:
+    if cell.where != ROS:
+        return figures_of(cell, report)
+    from fulmar_evaluation.ros_evaluation import ros_pool
 
-    figures = figures_of(cell, progress)
-    progress(cell.cost)
-    return figures
+    with ros_pool(1) as pool:
+        return figures_of(cell, report, pool)

@@ -86,12 +86,15 @@ def run_row(row: Row, given: dict[str, Any], *, as_json: bool) -> None:
     require(*row.needs(asked))
     if asked.report:
         require("matplotlib")
+    if asked.ray:
+        require("ray")
     from fulmar_benchmarks.campaign import run, write
+    from fulmar_benchmarks.pool import on_cluster
     from fulmar_benchmarks.tables import print_shown
 
     benchmark = row.load()(asked)
     bar = work_bar(row.measures) if row.measures else contextlib.nullcontext(lambda done, total: None)
-    with bar as progress:
+    with on_cluster(asked.ray), bar as progress:
         result = run(benchmark, progress=progress, on_done=_saying(benchmark))
     path, document = write(result, report=asked.report), result.document
 
