@@ -299,7 +299,7 @@ LATENCY = Row(
                  family="executor", known="fulmar_benchmarks.latency.cells:EXECUTORS", as_given=True),
     ),
     needs=lambda choice: DEPLOYED,
-    shared=("resume", "check"),
+    shared=("ray", "resume", "check"),
     always_checked=True,
     timed=True,
 )  # fmt: skip
@@ -321,7 +321,7 @@ ENDURANCE = Row(
         Selector("rate", "F", "Simulated seconds per second of wall-clock time.", 1.0, float, 0.1, 10.0),
     ),
     needs=lambda choice: DEPLOYED,
-    shared=("resume", "check"),
+    shared=("ray", "resume", "check"),
     always_checked=True,
     timed=True,
     dated=True,
@@ -359,7 +359,7 @@ THROUGHPUT = Row(
         Selector("seconds", "S", "Time of each of the measurements [s].", 1.0, float, 0.05),
     ),
     needs=lambda choice: _modules("throughput_campaign", choice),
-    shared=("resume", "check"),
+    shared=("ray", "resume", "check"),
     timed=True,
 )  # fmt: skip
 
@@ -379,7 +379,7 @@ TRAINING = Row(
         Selector("at_once", "N", "Runs side by side.", 2, int, 1),
     ),
     needs=lambda choice: ("torch", "stable_baselines3"),
-    shared=("resume", "check"),
+    shared=("ray", "resume", "check"),
     always_checked=True,
     timed=True,
     dated=True,
@@ -393,7 +393,29 @@ def _modules(campaign: str, choice: Choice) -> Sequence[str]:
     return needs(choice)
 
 
+EVERY = Row(
+    "all",
+    "fulmar_benchmarks.every.campaign:Every",
+    """Run every benchmark at a chosen size, and write one page: published figure, ours, met or not, and the command.
+
+    `smoke` takes minutes and shows that everything runs; `quick` takes an hour or two; `full` is what
+    docs/benchmarks.md has. DIR keeps the document of each benchmark for the same command and code, so an interrupted
+    run continues where it stopped. DIR/all.json has all figures, DIR/page.md is the page.
+
+    Try:
+
+    fulmar benchmark all --size smoke --only inertia,drift
+    """,
+    (
+        Selector("size", "S", "smoke, quick or full.", "quick"),
+        Selector("only", "NAME,...", "Names of benchmarks, or all.", "all",
+                 family="benchmark", known="fulmar_benchmarks.every.sizes:NAMES"),
+    ),
+    measures="benchmarks",
+)  # fmt: skip
+
 ROWS = (
+    EVERY,
     DESCENT,
     DRIFT,
     ENDURANCE,

@@ -6,7 +6,7 @@ import contextlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
-from fulmar_benchmarks.shape import POOL, ROS, Cell, Figures, Progress
+from fulmar_benchmarks.shape import HERE, POOL, ROS, Cell, Figures, Progress
 from fulmar_core.config.pool import Pool, ProcessPool, report
 
 Note = Callable[[Cell, Figures | str], None]
@@ -65,7 +65,7 @@ def measure_all(cells: Sequence[Cell], *, jobs: int, progress: Progress, on_done
                 from fulmar_evaluation.ros_evaluation import ros_pool
 
                 pool = ending.enter_context(ros_pool(jobs))  # the deployed nodes, started once for all
-            if _cluster:
+            if _cluster and cell.where != HERE:
                 in_a_pool([cell], jobs, _beyond(done, progress), on_done)
             else:
                 on_done(cell, figures_of(cell, _beyond(done, progress), pool))

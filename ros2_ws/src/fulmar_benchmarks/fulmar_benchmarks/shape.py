@@ -13,7 +13,8 @@ from fulmar_core.config.errors import RunFailed
 if TYPE_CHECKING:
     from fulmar_evaluation.report.page import Part
 
-POOL, ALONE, ROS = "pool", "alone", "ros"  # where a cell is measured; `ros`: on the workers of `ros_pool`
+# Where a cell is measured; `ros`: on the workers of `ros_pool`; `here`: in this process, also where there is a cluster.
+POOL, ALONE, ROS, HERE = "pool", "alone", "ros", "here"
 Choice = SimpleNamespace  # what one run is asked for, by the names of `catalogue.Row.selectors` and `catalogue.SHARED`
 Figures = dict[str, Any]  # JSON-ready, but that values may be arrays
 AGAIN = "again"  # key of figures that are not kept, as one of the runs in them failed

@@ -1,0 +1,142 @@
+"""Every benchmark as a cell: its command in a process of its own, whose document is kept; one page of all figures."""
+
+from __future__ import annotations
+
+import json
+import os
+import shlex
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from fulmar_benchmarks.catalogue import rows
+from fulmar_benchmarks.every.figures import rows_of
+from fulmar_benchmarks.every.page import page_of, write_text
+from fulmar_benchmarks.every.sizes import OPTIONS, SIZES, options
+from fulmar_benchmarks.outcomes import hash_of
+from fulmar_benchmarks.shape import HERE, Benchmark, Cell, Check, Figures, Found, Progress
+from fulmar_core.config.errors import RunFailed, UnknownNameError
+from fulmar_core.config.process import end_with
+from fulmar_core.config.provenance import git_revision
+
+PACKAGE = Path(__file__).parents[1]
+TEXT = (
+    "Each row names the command that repeats it, the day and the revision. "
+    "Met: ours is at least as good as what is published or required."
+)
+
+
+@dataclass(frozen=True)
+class CommandCell(Cell):
+    """One benchmark at one size."""
+
+    benchmark: str
+    size: str
+    words: tuple[str, ...]  # of its command, as they are shown
+    more: tuple[str, ...]  # that figures do not depend on
+
+    @property
+    def where(self) -> str:
+        """In this process: the command has its own, or the cluster."""
+        return HERE
+
+    @property
+    def way(self) -> str:
+        """What most of them depend on."""
+        return "mujoco"
+
+    @property
+    def name(self) -> str:
+        """Of its file."""
+        return f"{self.benchmark}_{self.size}"
+
+    def parts(self) -> dict[str, Any]:
+        """Its command, and the code of all benchmarks."""
+        files = [path for path in sorted(PACKAGE.rglob("*.py")) if "every" not in path.parts]
+        return {"words": self.words, "code": hash_of(*(path.read_text(encoding="utf-8") for path in files))}
+
+    def measure(self, progress: Progress, pool: Any = None) -> Figures:
+        """The document that the command prints, whatever its requirements.
+
+        Raises:
+            RunFailed: It prints none; with its last words.
+        """
+        ends = partial(end_with, os.getpid(), signal.SIGTERM)
+        call = [sys.executable, "-m", "fulmar_cli.main", *self.words[1:], *self.more, "--json"]
+        done = subprocess.run(
+            call, capture_output=True, text=True, errors="replace", check=False, preexec_fn=ends
+        )
+        try:
+            document = json.loads(done.stdout)
+        except ValueError:
+            last = done.stderr.strip().splitlines()[-1:]
+            raise RunFailed(last[0] if last else f"ended with code {done.returncode}") from None
+        return {"document": document, "made": f"{time.strftime('%Y-%m-%d')} {git_revision()}".strip()}
+
+
+class Every(Benchmark):
+    """All of them."""
+
+    name, title = "all", "Every benchmark"
+
+    def check(self) -> None:
+        """Refuse a size that is not there."""
+        if self.choice.size not in SIZES:
+            raise UnknownNameError("size", self.choice.size, SIZES)
+
+    def cells(self) -> list[CommandCell]:
+        """Those that are asked for and installed."""
+        return [self._cell(name) for name in self.choice.only]
+
+    def _cell(self, name: str) -> CommandCell:
+        choice, row = self.choice, rows().get(name)
+        takes = {*OPTIONS[name][2].split(), *((*row.shared, "out") if row else ())}
+        seed = ["--seed", str(choice.seed)] if "seed" in takes else []
+        given: dict[str, Any] = {
+            "jobs": choice.jobs,
+            "ray": choice.ray,
+            "out": (choice.out / name).absolute(),
+        }
+        more = [
+            word for key in given if key in takes and given[key] for word in (f"--{key}", str(given[key]))
+        ]
+        more += ["--fresh"] if choice.fresh and takes & {"fresh", "resume"} else []
+        words = ("fulmar", "benchmark", name, *options(name, choice.size), *seed)
+        return CommandCell(name, choice.size, words, tuple(more))
+
+    def document(self, found: Found) -> dict[str, Any]:
+        """A document as `page_of` takes it: a section for each benchmark."""
+        return {
+            "title": f"{self.title}, size {self.choice.size}",
+            "text": TEXT,
+            "sections": [self._section(cell, found[cell.name]) for cell in self.cells()],
+        }
+
+    @staticmethod
+    def _section(cell: CommandCell, found: Figures | str) -> dict[str, Any]:
+        if isinstance(found, str):
+            return {"title": cell.benchmark, "text": f"Failed: {found}", "rows": []}
+        made = {"command": shlex.join(cell.words), "made": found["made"]}
+        figures = [row | made for row in rows_of({"benchmark": cell.benchmark} | found["document"])]
+        met = [row["met"] for row in figures if row["met"] is not None]
+        return {"title": cell.benchmark, "text": f"{sum(met)} of {len(met)} met.", "rows": figures}
+
+    def checks(self, document: Mapping[str, Any]) -> list[Check]:
+        """Every figure that can be met, and that every benchmark ran."""
+        ran = [
+            Check.least(f"{one['title']}: ran", float(bool(one["rows"])), 1.0) for one in document["sections"]
+        ]
+        every = [row for section in document["sections"] for row in section["rows"] if row["met"] is not None]
+        return ran + [Check.least(row["figure"], float(row["met"]), 1.0) for row in every]
+
+    def tables(self, document: Mapping[str, Any]) -> list[str]:
+        """A line for each benchmark, and the page beside the document."""
+        page = self.choice.out / "page.md"
+        write_text(page, page_of(document))
+        return [*(f"{one['title']:12}{one['text']}" for one in document["sections"]), f"page: {page}"]

@@ -1,0 +1,38 @@
+"""What each benchmark measures at each size, as options of its command."""
+
+from __future__ import annotations
+
+# `smoke` shows in minutes that everything runs; `quick` has figures worth reading; `full` is what is published.
+SIZES = ("smoke", "quick", "full")
+_LIVE = "--flights 2 --heights 1 --through batch,lockstep"
+_RANS = "--parts tasks,dead,integrator --episodes 64 --tumble-s 600"
+_FALCON = "--tasks hold,a,d --controllers lqi,lqr --scenarios exact,calm --episodes 2 --no-report"
+OPTIONS = {  # smoke, quick, and what is passed on of `--seed`, `--jobs`, `--ray` and `--fresh`; full: no options
+    "descent": (_LIVE, "--flights 16 --real-time 1", "seed jobs"),
+    "drift": ("--through batch --episodes 16 --no-report", "--through batch", "seed jobs fresh out"),
+    "endurance": ("--seconds 20 --rate 5", "--seconds 600 --rate 10", ""),
+    "estimator": ("--drives 1 --seconds 10", "--drives 1", "seed"),
+    "events": ("--runs 4 --parts table --no-report", "--runs 20 --parts table,fields,sensitivity", ""),
+    "falcon": (_FALCON, "--controllers lqi,lqr,policy --episodes 16", ""),
+    "flights": ("--episodes 2 --real-time 0 --episode-s 10", "--episodes 16 --real-time 1", "seed jobs"),
+    "hardware": ("--hardware zero_g_lab --episodes 1 --seconds 10", "--episodes 4", "jobs out"),
+    "identify": ("--platforms 1 --robots turtlebot2 --duration 30", "--platforms 4", "seed jobs"),
+    "inertia": ("--satellites microsat --draws 1 --no-report", "--draws 1", ""),
+    "latency": ("--rates 50 --seconds 2 --executors events", "--rates 50", ""),
+    "network": ("--episodes 1 --seconds 10", "--episodes 8 --seconds 18", "jobs out"),
+    "rans3d": (
+        "--parts tasks,integrator --episodes 4 --tumble-s 60 --no-report",
+        _RANS,
+        "seed jobs fresh out",
+    ),
+    "recorder": ("--parts lockstep,kills --kills 2 --lockstep-s 20", "--loss-s 60 --kills 10", ""),
+    "roboran": ("--through batch --episodes 64 --no-report", "--episodes 256", "seed jobs fresh out"),
+    "throughput": ("--robots turtlebot2,spacecraft_16 --worlds 256 --seconds 0.2", "--worlds 1024", ""),
+    "training": ("--seeds 1 --seconds 8", "--seeds 2", "ray"),
+}
+NAMES = tuple(OPTIONS)
+
+
+def options(name: str, size: str) -> list[str]:
+    """Options of a benchmark's command at a size."""
+    return (*OPTIONS[name][:2], "")[SIZES.index(size)].split()
