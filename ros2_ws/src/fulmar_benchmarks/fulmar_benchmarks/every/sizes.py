@@ -6,6 +6,9 @@ from __future__ import annotations
 SIZES = ("smoke", "quick", "full")
 _LIVE = "--flights 2 --heights 1 --through batch,lockstep"
 _RANS = "--parts tasks,dead,integrator --episodes 64 --tumble-s 600"
+_RANS_FEW = (
+    "--robots spacecraft_16 --tasks go_to_pose_3d --controllers lqr --parts tasks --episodes 4 --no-report"
+)
 _FALCON = "--tasks hold,a,d --controllers lqi,lqr --scenarios exact,calm --episodes 2 --no-report"
 OPTIONS = {  # smoke, quick, and what is passed on of `--seed`, `--jobs`, `--ray` and `--fresh`; full: no options
     "descent": (_LIVE, "--flights 16 --real-time 1", "seed jobs"),
@@ -21,7 +24,7 @@ OPTIONS = {  # smoke, quick, and what is passed on of `--seed`, `--jobs`, `--ray
     "latency": ("--rates 50 --seconds 2 --executors events", "--rates 50", ""),
     "network": ("--episodes 1 --seconds 10", "--episodes 8 --seconds 18", "jobs out"),
     "rans3d": (
-        "--parts tasks,integrator --episodes 4 --tumble-s 60 --no-report",
+        _RANS_FEW,
         _RANS,
         "seed jobs fresh out",
     ),
