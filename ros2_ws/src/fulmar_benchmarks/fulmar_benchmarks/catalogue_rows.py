@@ -328,6 +328,31 @@ ENDURANCE = Row(
     measures="running",
 )  # fmt: skip
 
+PACE = Row(
+    "pace",
+    "fulmar_benchmarks.pace.systems:Pace",
+    """Measure steps a second in lock step, beside the same messages between two nodes that compute nothing.
+
+    Each system runs as `fulmar run --lockstep` has it, with its recorder; its pace is read from its bag. Then two bare
+    processes publish the messages of one of its steps and wait for each other: once as messages of rclpy, once as raw
+    CDR. An estimator counts to the plant there. An LQR at 50 Hz in real time follows: latency from state to command,
+    and errors of the period. Nothing else should run meanwhile.
+
+    Try:
+
+    fulmar benchmark pace --systems floating_platform_lqr,floating_platform_policy --json
+    """,
+    (
+        Selector("systems", "S,...", "Robots with their controller and estimator; all by default.", "all",
+                 family="system", known="fulmar_benchmarks.pace.systems:SYSTEMS"),
+        Selector("steps", "N", "Steps of each system and of each bare pair.", 3000, int, 100),
+        Selector("seconds", "S", "Length of the run in real time; 0: none [s].", 20.0, float, 0.0),
+    ),
+    needs=lambda choice: DEPLOYED,
+    shared=("resume", "check"),
+    timed=True,
+)  # fmt: skip
+
 THROUGHPUT = Row(
     "throughput",
     "fulmar_benchmarks.throughput_campaign:Throughput",
@@ -424,6 +449,7 @@ ROWS = (
     FLIGHTS,
     INERTIA,
     LATENCY,
+    PACE,
     RANS3D,
     ROBORAN,
     THROUGHPUT,

@@ -1,0 +1,1 @@
+"""Pace of lock step, beside a pair of nodes that compute nothing."""
