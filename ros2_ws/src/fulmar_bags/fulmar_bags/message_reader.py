@@ -17,6 +17,7 @@ from fulmar_core.config.errors import shortened
 from fulmar_core.robots.sensors.imu import UNKNOWN
 from fulmar_core.robots.sensors.kind import SensorKind
 from fulmar_core.safety.input_gate import Measurement
+from fulmar_core.states.rotation import turned
 from fulmar_core.states.state import RigidBodyState
 from fulmar_core.wires.reading import Reading
 from fulmar_core.wires.robot_name import PLAIN, Frames
@@ -36,14 +37,6 @@ ADD = 0  # action of a marker that is there
 def stamp_ns(stamp: Any) -> int:
     """Nanoseconds since the epoch of a ROS time."""
     return int(stamp.sec * NS + stamp.nanosec)
-
-
-def turned(quat_xyzw: Sequence[float], vector: Sequence[float]) -> tuple[float, float, float]:
-    """`rotation.rotate` of one vector in plain numbers, to the last bit: arrays of three cost five times it."""
-    x, y, z, w = quat_xyzw
-    a, b, c = vector
-    tx, ty, tz = 2.0 * (y * c - z * b), 2.0 * (z * a - x * c), 2.0 * (x * b - y * a)
-    return a + w * tx + y * tz - z * ty, b + w * ty + z * tx - x * tz, c + w * tz + x * ty - y * tx
 
 
 def measurement_of(message: Any, frames: Frames = PLAIN) -> Measurement:

@@ -17,7 +17,6 @@ from fulmar_core.config.errors import FAILED, FulmarError, TaskError
 from fulmar_core.controllers.controller import Controller, Inputs
 from fulmar_core.estimators.actuator_health.applied import AppliedHistory
 from fulmar_core.estimators.actuator_health.beliefs import DEAD, Beliefs
-from fulmar_core.loop.control_loop import Step
 from fulmar_core.loop.controller_settings import POLICY, ControllerSettings
 from fulmar_core.loop.fallback import Standby
 from fulmar_core.loop.guarded_loop import GuardedLoop
@@ -79,7 +78,7 @@ class ControllerNode(LifecycleNode):
             propose=lambda candidate: self._guarded.switch.propose(candidate),
             warn=self.get_logger().warning,
         )
-        self._names = self.robot.actuators.names
+        self._names, self._safe = self.robot.actuators.names, self.robot.actuators.safe_command
         frames = own_frames(self, self.robot)
         self._mission_inputs = MissionInputs(
             frames, self.get_logger().warning, refuses_old_goals=self.settings.unattended
@@ -300,9 +299,10 @@ class ControllerNode(LifecycleNode):
         guard, answered_ns = self._guarded, self._guarded.loop.answered_ns
         if guard.mission.lacks_something_of(stamp) or not guard.bearing_known:
             return True
-        if answered_ns < 0 and self._readings.lacks_the_first(again=again):
+        reads = bool(self._readings.subscribed)
+        if reads and answered_ns < 0 and self._readings.lacks_the_first(again=again):
             return True
-        if not again and self._readings.lacks_something_of(stamp):
+        if reads and not again and self._readings.lacks_something_of(stamp):
             return True
         if again or guard.loop.controller.estimator is None or not 0 < stamp - answered_ns <= self._pause_ns:
             return False
@@ -323,13 +323,15 @@ class ControllerNode(LifecycleNode):
             self._swap.took_over()
             self._announce()
         stamp = measurement.stamp_ns if measurement else 0
-        guard.readings = self._readings.newest.at(stamp)
-        command, step = self.robot.actuators.safe_command, None
+        if self._readings.subscribed:
+            guard.readings = self._readings.newest.at(stamp)
+        command, step, took_ns = self._safe, None, 0
         try:
             decision, inputs = guard.begin_step(measurement, time.monotonic_ns())
             if inputs is not None:
-                step = self._act(guard, inputs)
-                command = step.command[0]
+                began_ns = time.perf_counter_ns()
+                step = guard.act(inputs)
+                took_ns, command = time.perf_counter_ns() - began_ns, step.command[0]
         except TaskError as error:
             self._give_up(str(error), stamp)
             return
@@ -342,6 +344,7 @@ class ControllerNode(LifecycleNode):
             return
         self._status.steps += 1
         if inputs is not None and step is not None:
+            self._status.inference_ms.add(took_ns / 1e6)
             try:
                 guard.watch(inputs, step)
             except TaskError as error:
@@ -354,12 +357,6 @@ class ControllerNode(LifecycleNode):
         if step is not None and guard.note(step.refusal):
             self._announce()
         self._publish_status(decision)
-
-    def _act(self, guard: GuardedLoop, inputs: Inputs) -> Step:
-        began = time.perf_counter_ns()
-        step = guard.act(inputs)
-        self._status.inference_ms.add((time.perf_counter_ns() - began) / 1e6)
-        return step
 
     def _send(self, publish: Callable[[], None]) -> bool:
         """Publish a command, and say so, if commands may still go out.

@@ -17,9 +17,11 @@ from nav_msgs.msg import Odometry
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 
-from fulmar_bags.message_reader import BODY_FRAME, FRAME, NS, lacks_of, measurement_of, stamp_ns, turned
+from fulmar_bags.message_reader import BODY_FRAME, FIRST, FRAME, LAST, NS, lacks_of, measurement_of, stamp_ns
+from fulmar_core.robots.sensors.imu import UNKNOWN
 from fulmar_core.robots.sensors.odometer import OdometrySpec
 from fulmar_core.safety.input_gate import Measurement
+from fulmar_core.states.rotation import turned
 from fulmar_core.states.state import RigidBodyState
 from fulmar_core.wires.robot_name import PLAIN, Frames
 from fulmar_ros.wire_image import LATEST_NS, WireImage, layout_of, marks
@@ -196,7 +198,9 @@ class OdometryReader:
         state = RigidBodyState(
             np.array(pose[:3]), np.array(quat), np.array(turned(quat, twist[:3])), np.array(twist[3:6])
         )
-        return Measurement(stamp, FRAME, BODY_FRAME, state, lacks_of(pose[7:], twist[6:]))
+        pose, twist = pose[7:], twist[6:]
+        unknown = UNKNOWN in (pose[FIRST], pose[LAST], twist[FIRST], twist[LAST])
+        return Measurement(stamp, FRAME, BODY_FRAME, state, lacks_of(pose, twist) if unknown else ())
 
 
 @dataclass(frozen=True, slots=True)

@@ -232,7 +232,9 @@ class Pace(Benchmark):
             for name, row in document["systems"].items()
         ]  # fmt: skip
         heads = ("system", "steps/s", "bare pair, rclpy", "bare pair, raw CDR", "messages a step")
-        lines = [Table(f"lock step, {document['steps']} steps each", heads, rows)] if rows else []
+        lines: list[Shown] = (
+            [Table(f"lock step, {document['steps']} steps each", heads, rows)] if rows else []
+        )
         real = document["real_time"]
         if real is not None:
             p50, p99 = (number(real["latency_ms"][key], 2) for key in ("p50", "p99"))

@@ -11,18 +11,18 @@ from fulmar_core.controllers.law import Law
 
 
 class PlanarLaw(Law):
-    """A law for robots that move in the plane."""
+    """A law for robots that move in the plane.
+
+    Attributes:
+        share_of_speed: How much of the cruising speed may be used [-].
+    """
 
     def bind(self) -> None:
         """See `Law.bind`."""
         self.frame = BodyFrame(self.robot, self.task)
         if self.frame.crosses_obstacles and not self.gains.speed_around:
             raise ValueError("'speed_around' is missing, which says how fast to go among obstacles.")
-
-    @property
-    def share_of_speed(self) -> float:
-        """How much of the cruising speed may be used [-]."""
-        return float(self.gains.speed_around) if self.frame.crosses_obstacles else 1.0
+        self.share_of_speed = float(self.gains.speed_around) if self.frame.crosses_obstacles else 1.0
 
     @property
     def near(self) -> float:

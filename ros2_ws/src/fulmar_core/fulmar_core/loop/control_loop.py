@@ -118,7 +118,9 @@ class ControlLoop:
         if stamp_ns - self.answered_ns > self._pause_ns:
             self._chosen = False
             self.reset()
-        state = measured.in_float64()
+        first = measured.columns()[0]
+        is_plain = isinstance(first, np.ndarray) and first.dtype == float
+        state = measured if is_plain else measured.in_float64()
         if not self._chosen:
             self.previous = begin_of(self.robot).command(self.robot, state)
         goal = self._advanced(state, stamp_ns)
@@ -148,7 +150,8 @@ class ControlLoop:
     def take(self, inputs: Inputs, chosen: np.ndarray) -> Step:
         """Limit and gate an action (see `Controller.act`) that was chosen from these inputs."""
         action = np.asarray(chosen, dtype=float)
-        refusal = command_problem(action, self._safe.shape) or ""
+        fine = action.shape == self._safe.shape and np.isfinite(action).all()
+        refusal = "" if fine else command_problem(action, self._safe.shape) or ""
         command = self._safe
         if not refusal:
             command = slewed(self.robot.actuators.limited(action), inputs.previous, self.robot, self.dt)

@@ -73,6 +73,7 @@ class ControllerSwitch(Generic[T]):
     Attributes:
         current: The controller that acts.
         fell_back: Why the fallback acts; empty if it does not.
+        proposed: What takes over at the next `apply`; None: nothing does.
     """
 
     def __init__(
@@ -100,7 +101,7 @@ class ControllerSwitch(Generic[T]):
         self._rejections = Rejections(to_latch)
         self._past_rejections = 0
         self._lock = threading.Lock()
-        self._next: T | None = None
+        self.proposed: T | None = None
 
     @property
     def known(self) -> tuple[T, ...]:
@@ -115,14 +116,14 @@ class ControllerSwitch(Generic[T]):
     def propose(self, candidate: T) -> None:
         """Let a controller take over at the next `apply`."""
         with self._lock:
-            self._next = candidate
+            self.proposed = candidate
 
     def apply(self) -> bool:
         """Between two steps: let the candidate take over, if there is one; whether `current` is another now."""
-        if self._next is None:
+        if self.proposed is None:
             return False
         with self._lock:
-            candidate, self._next = self._next, None
+            candidate, self.proposed = self.proposed, None
         assert candidate is not None
         self._change(candidate, "")
         return True

@@ -19,9 +19,16 @@ from fulmar_core.loop.mission import STREAM_NS, Mission
 from fulmar_core.robots.robot import Robot
 from fulmar_core.safety.arbiter import BEYOND_GEOFENCE, Decision, Flags, arbitrate
 from fulmar_core.safety.convergence import ConvergenceWatch
-from fulmar_core.safety.geofence import OUT_OF_BOUNDS, check_area_of, farthest_goal, outside, unreachable
+from fulmar_core.safety.geofence import (
+    NO_AREA,
+    OUT_OF_BOUNDS,
+    check_area_of,
+    farthest_goal,
+    outside,
+    unreachable,
+)
 from fulmar_core.safety.input_gate import InputGate, Measurement
-from fulmar_core.states.state import State
+from fulmar_core.states.state import RigidBodyState, State
 from fulmar_core.tasks import Task
 from fulmar_core.tasks.goal import Goal
 
@@ -107,6 +114,7 @@ class GuardedLoop:
         self.refusal = self.too_far = Refusal()
         self._followed = 0  # the number of the newest goal on which the controller acted
         self._settings, self._estop = settings, estop
+        self._bounded = tuple(settings.area) != NO_AREA
         self._control_ns = round(1e9 / settings.control_rate(robot))
         self._flags = replace(settings.flags(robot), configured=True)
         self._bearing: bool | None = None if settings.has_bearing(robot) else True  # None: not received yet
@@ -247,7 +255,7 @@ class GuardedLoop:
 
     def switch_controller(self) -> bool:
         """Let a proposed controller take over, between two control steps; whether one has."""
-        if not self.switch.apply():
+        if self.switch.proposed is None or not self.switch.apply():
             return False
         self.loop.use(self.switch.current.controller)
         self._convergence.reset()
@@ -339,7 +347,14 @@ class GuardedLoop:
 
     def _state_of(self, measurement: Measurement) -> State:
         """What the task takes of a measurement, shapes (1,)."""
-        return self.loop.task.state_type.from_rigid(measurement.state)[None]
+        it = measurement.state
+        rigid = RigidBodyState(
+            it.position_in_world[None],
+            it.quat_xyzw[None],
+            it.velocity_in_world[None],
+            it.angular_velocity_in_body[None],
+        )
+        return self.loop.task.state_type.from_rigid(rigid)
 
     def _follow_switch(self, before: Standby) -> bool:
         changed = self.switch.current is not before
@@ -382,7 +397,7 @@ class GuardedLoop:
 
     def _outside(self) -> str:
         """How the robot is outside its area right now; empty if it is not, or if its place is unknown."""
-        if self.newest is None:
+        if self.newest is None or not self._bounded:
             return ""
         return outside(self.newest.state.position_in_world.tolist(), self._settings.area)
 

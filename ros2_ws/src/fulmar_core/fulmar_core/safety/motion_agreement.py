@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from fulmar_core.robots.sensors.odometer import Channel, OdometrySpec
-from fulmar_core.states.attitude import Quaternion, conjugate, minus, plus, product
+from fulmar_core.states.rotation import turn_between
 from fulmar_core.states.state import RigidBodyState
 
 WINDOW_NS = 20_000_000_000  # how far back is compared
@@ -29,7 +30,7 @@ JUMPS = 3  # corrections in the window: more are a motion in steps
 PROOF = 0.3  # way or turn by the twist in the window with which a pose that agrees does not stand [m, rad]
 
 
-Three = tuple[float, float, float]
+Three = Sequence[float]
 
 
 @dataclass(slots=True)
@@ -60,14 +61,14 @@ class Part:
         """Sums with one more measurement: how the pose moved, and the rates before and now."""
         half = 0.5 * seconds
         by_rate = half * (before[0] + now[0]), half * (before[1] + now[1]), half * (before[2] + now[2])
-        off, jumps = minus(moved, by_rate), sums.jumps
+        off, jumps = _minus(moved, by_rate), sums.jumps
         size = math.hypot(*by_rate)
         most = max(math.hypot(*before), math.hypot(*now))
         if math.hypot(*off) > self._jump + LATE_S * most + self._share * size:
             off, jumps = (0.0, 0.0, 0.0), jumps + 1
-        change = math.hypot(*minus(now, before))
+        change = math.hypot(*_minus(now, before))
         return Sums(
-            plus(sums.off, off),
+            (sums.off[0] + off[0], sums.off[1] + off[1], sums.off[2] + off[2]),
             sums.way + size,
             sums.squares + (change * seconds) ** 2,
             sums.count + 1,
@@ -80,7 +81,7 @@ class Part:
             return True
         white = WHITE_SIGMAS * math.sqrt(0.5 * max(now.squares - then.squares, 0.0))
         allowed = self._least + self._drift * seconds + self._share * (now.way - then.way)
-        off = math.hypot(*minus(now.off, then.off))
+        off = math.hypot(*_minus(now.off, then.off))
         return off <= allowed + white + LATE_S * change and now.jumps - then.jumps <= JUMPS
 
 
@@ -90,7 +91,7 @@ class Past:
 
     stamp_ns: int
     position: Three  # numbers of the state, which cost less than arrays of three
-    attitude: Quaternion
+    attitude: Sequence[float]
     velocity: Three
     turning: Three
     place: Sums
@@ -142,21 +143,25 @@ class MotionAgreement:
 
     def _add(self, last: Past, now: Past) -> None:
         seconds = (now.stamp_ns - last.stamp_ns) / 1e9
-        way, turn = minus(now.position, last.position), _turn(last.attitude, now.attitude)
+        way, turn = _minus(now.position, last.position), _turn(last.attitude, now.attitude)
         now.place = self._place.add(last.place, way, last.velocity, now.velocity, seconds)
         now.turn = self._turn.add(last.turn, turn, last.turning, now.turning, seconds)
 
     def _agree(self, then: Past, now: Past) -> bool:
         seconds = (now.stamp_ns - then.stamp_ns) / 1e9
-        change = math.hypot(*minus(now.velocity, then.velocity))
-        turning = math.hypot(*minus(now.turning, then.turning))
+        change = math.hypot(*_minus(now.velocity, then.velocity))
+        turning = math.hypot(*_minus(now.turning, then.turning))
         return self._place.agrees(then.place, now.place, seconds, change) and self._turn.agrees(
             then.turn, now.turn, seconds, turning
         )
 
 
-def _turn(a: Quaternion, b: Quaternion) -> Three:
+def _turn(a: Sequence[float], b: Sequence[float]) -> Three:
     """Small rotation from one attitude to another, about the body's axes [rad]."""
-    x, y, z, w = product(conjugate(a), b)
+    x, y, z, w = turn_between(a, b)
     sign = math.copysign(1.0, w)
     return 2.0 * (sign * x), 2.0 * (sign * y), 2.0 * (sign * z)
+
+
+def _minus(a: Three, b: Three) -> Three:
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]

@@ -50,7 +50,7 @@ class PlanarState(State):
         return cls(
             position[..., 0],
             position[..., 1],
-            state.yaw,
+            yaw_of(state.quat_xyzw),
             velocity[..., 0],
             velocity[..., 1],
             state.angular_velocity_in_body[..., 2],

@@ -42,8 +42,9 @@ class Observer:
         if is_number(terms[0]):  # of one robot
             own = shares(previous_command, self._scale)[0].tolist() if self._remembers else ()
             return np.array([[*terms, *own]])
-        xp = array_namespace(state.like)
-        shape, place = state.like.shape, device(state.like)
+        like = state.columns()[0]
+        xp = array_namespace(like)
+        shape, place = like.shape, device(like)
         columns = [
             term
             if getattr(term, "shape", None) == shape

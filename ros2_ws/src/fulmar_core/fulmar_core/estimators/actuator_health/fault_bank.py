@@ -236,7 +236,7 @@ class FaultBank:
 
     def _by_axis(self, values: np.ndarray) -> np.ndarray:
         """Numbers of both groups, shape (hypotheses, 2), for every axis."""
-        return values.take(self._group, axis=1)
+        return np.asarray(values.take(self._group, axis=1))
 
     def _by_group(self, values: np.ndarray) -> np.ndarray:
         """Sums of two squares over the axes of both groups, shape (2, hypotheses, axes) to (hypotheses, 2)."""
