@@ -47,5 +47,5 @@ class FreeFlyer(FreeBody, Floater):
     ) -> None:
         """Set thrusts and the push of the surroundings; see `RobotModel.drive`."""
         torque = self._torque + outside[3:] if len(outside) > 3 else self._torque
-        data.ctrl[:] = *(self._actuators.thrusts(applied) * gain), *torque
+        data.ctrl[:-3], data.ctrl[-3:] = self._actuators.thrusts(applied) * gain, torque
         data.xfrc_applied[self._body, :3] = outside[:3]

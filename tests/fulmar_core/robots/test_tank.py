@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -147,3 +148,21 @@ def test_a_device_without_a_gauge_is_not_one_whose_gauge_fell_silent():
 def test_a_tank_that_cannot_be_is_refused(changed, said):
     with pytest.raises(ValueError, match=said):
         Tank(**{"volume": 1e-3, "pressure": 3e7, "regulated": 8e5, "specific_impulse": 50.0} | changed)
+
+
+def test_a_pressure_is_judged_once_and_its_warning_stays_until_the_next():
+    asked: list[float] = []
+
+    def warning(pressure):
+        asked.append(pressure)
+        return f"at {pressure:g} Pa"
+
+    actuators = SimpleNamespace(tank=TANK, supply_warning=warning)
+    check = SupplyCheck(PLATFORM)
+    check._robot = SimpleNamespace(sensors=PLATFORM.sensors, actuators=actuators)
+    warnings = []
+    for readings in ({"supply": Reading(2e5)}, {}, {}, {"supply": Reading(1e5)}, {}):
+        check.see(0.1, readings)
+        warnings.append(check.warning)
+    assert warnings == [*["at 200000 Pa"] * 3, *["at 100000 Pa"] * 2]
+    assert asked == [2e5, 1e5]

@@ -31,7 +31,7 @@ class SupplyCheck:
     def reset(self) -> None:
         """Begin anew, with an episode."""
         self._silent_s, self._refusal = 0.0, ""
-        self.warning = ""
+        self.warning = self._low = ""
         self.pressure: float | None = None
 
     def see(self, seconds: float, readings: Mapping[str, Reading]) -> None:
@@ -45,6 +45,7 @@ class SupplyCheck:
             self._refusal = refusal or self._refusal
         else:
             self._silent_s, self._refusal, self.pressure = 0.0, "", float(reading.value)
+            self._low = self._robot.actuators.supply_warning(self.pressure)
         self.warning = self._words()
 
     def _words(self) -> str:
@@ -53,4 +54,4 @@ class SupplyCheck:
         if self._silent_s > self._silent_after_s:
             why = f": {self._refusal}" if self._refusal else ""
             return f"no supply pressure for {self._silent_s:.0f} s{why}. Is the gauge connected?"
-        return self._robot.actuators.supply_warning(self.pressure)
+        return self._low
