@@ -75,6 +75,9 @@ class AirProbes:
             for part in ("std", "bias_std", "scale_std", "limit", "quantum")
         )
         self._most = largest_reading(limit, self._quantum)
+        self._step = np.where(self._quantum > 0.0, self._quantum, 1.0)
+        self._steps = bool((self._quantum > 0.0).any())
+        self._spread = np.diag(self._std**2 + self._quantum**2 / 12.0)
 
     def reset(self, seed: int, number: int) -> None:
         """Begin an episode; see `SimulatedSensor`."""
@@ -89,15 +92,15 @@ class AirProbes:
         if air is None:
             return None
         if self._sampling.is_due(time_s):
-            every = dict(zip(air.names, air.values, strict=True))
+            every = dict(zip(air.names, air.values.tolist(), strict=True))
             values = np.array([every[name] for name in self._spec.names])
             if self._noisy:
                 noise = self._std * self._rng.standard_normal(len(values))
-                values = np.clip(values * self._scale + self._bias + noise, -self._most, self._most)
-                step = np.where(self._quantum > 0.0, self._quantum, 1.0)
-                values = np.where(self._quantum > 0.0, np.round(values / step) * step, values)
-            spread = np.diag(self._std**2 + self._quantum**2 / 12.0)
-            self._sampling.put(Reading(AirData(self._spec.names, values), covariance=spread), time_s)
+                values = (values * self._scale + self._bias + noise).clip(-self._most, self._most)
+                if self._steps:
+                    whole = np.round(values / self._step) * self._step
+                    values = np.where(self._quantum > 0.0, whole, values)
+            self._sampling.put(Reading(AirData(self._spec.names, values), covariance=self._spread), time_s)
         return self._sampling.take(time_s)
 
 
