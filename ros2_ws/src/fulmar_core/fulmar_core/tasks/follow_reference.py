@@ -12,7 +12,7 @@ import numpy as np
 from fulmar_core.dynamics.flight_trim import nominal_flight
 from fulmar_core.robots.kinds.aircraft import AIRCRAFT
 from fulmar_core.robots.robot import Robot
-from fulmar_core.states.arrays import array_namespace, clip, is_single
+from fulmar_core.states.arrays import array_namespace, clip, is_number, is_single
 from fulmar_core.states.attitude import euler_of, exponential, length, product, scaled, uniform_direction
 from fulmar_core.states.counter_rng import Draws
 from fulmar_core.states.rotation import Array
@@ -87,6 +87,7 @@ class FollowReference(FileTask[SpatialState]):
     goal_topic: ClassVar[str] = "goal_path"
     state_type = SpatialState
     kinds = (AIRCRAFT,)
+    observes_numbers = True
     observation_names: ClassVar[tuple[str, ...]] = TERMS
 
     def __post_init__(self) -> None:
@@ -225,12 +226,12 @@ class FollowReference(FileTask[SpatialState]):
     def observe(self, state: SpatialState, goal: Goal) -> tuple[Array, ...]:
         """What every controller of this task sees, all of it near 1; see `Task.observe`.
 
-        Angles of attack and sideslip are against still air.
+        Angles of attack and sideslip are against still air. Of one craft the state may be in plain numbers.
         """
         now, wanted = reference_of(goal), self.speed_of(goal)
         _, _, y, z, _, rate_y, rate_z = (now[..., i] for i in range(7))
-        if is_single(state.x):
-            state, wanted = state.in_numbers(), float(wanted[0])
+        if is_number(state.x):
+            wanted = float(wanted[0])
             _, _, y, z, _, rate_y, rate_z = now[0].tolist()
         side, above = y - state.y, z - state.z
         climb, drift = rate_z - state.vz, rate_y - state.vy

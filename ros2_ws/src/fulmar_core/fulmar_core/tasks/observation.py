@@ -6,7 +6,7 @@ import numpy as np
 from array_api_compat import device
 
 from fulmar_core.robots.robot import Robot
-from fulmar_core.states.arrays import array_namespace, clip, is_number, is_numpy
+from fulmar_core.states.arrays import array_namespace, clip, is_numpy, is_single
 from fulmar_core.states.rotation import Array
 from fulmar_core.states.state import State
 from fulmar_core.tasks import Task
@@ -38,10 +38,10 @@ class Observer:
         Returns:
             Terms in the order of `names`, shape (..., n).
         """
-        terms = self._task.observe(state, goal)
-        if is_number(terms[0]):  # of one robot
+        if self._task.observes_numbers and is_single(state.like):
             own = shares(previous_command, self._scale)[0].tolist() if self._remembers else ()
-            return np.array([[*terms, *own]])
+            return np.array([[*self._task.observe(state.in_numbers(), goal), *own]])
+        terms = self._task.observe(state, goal)
         like = state.columns()[0]
         xp = array_namespace(like)
         shape, place = like.shape, device(like)

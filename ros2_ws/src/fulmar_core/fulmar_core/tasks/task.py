@@ -34,6 +34,7 @@ class Task(ABC, Generic[S]):
         tolerance: What counts as success.
         required: Targets that make an episode a success; None where a closing window does.
         state_type: Form of the states that its methods take.
+        observes_numbers: Whether `observe` answers the state of one robot in plain numbers by plain numbers.
     """
 
     kind: str
@@ -43,6 +44,7 @@ class Task(ABC, Generic[S]):
     tolerance: Tolerance
     required: int | None = None
     state_type: type[State] = PlanarState
+    observes_numbers: bool = False
 
     # A class, a property or a field has these two: dataclasses would take a property of this class for a default.
     if TYPE_CHECKING:
