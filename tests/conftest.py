@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import gc
 import os
 import shutil
@@ -17,6 +18,7 @@ from types import SimpleNamespace
 os.environ.update(dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1"))
 
 import pytest
+import typer.testing
 
 from fulmar_bringup.domains import reserved_domains
 from fulmar_cli import main as command_line
@@ -113,6 +115,16 @@ def interruptible() -> None:
     """Let children receive SIGINT also in the background of a shell, and SIGHUP also below nohup; both ignore them."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
     signal.signal(signal.SIGHUP, signal.SIG_DFL)
+
+
+@pytest.fixture(autouse=True, scope="session")
+def one_command_line() -> Iterator[None]:
+    """Build the commands once: in each call of a command line they would take most of its time."""
+    built = functools.cache(typer.main.get_command)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("typer.main.get_command", built)
+        patch.setattr("typer.testing._get_command", built)
+        yield
 
 
 @pytest.fixture(autouse=True, scope="session")

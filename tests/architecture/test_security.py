@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import functools
 import os
 import pickle
 import shutil
@@ -41,14 +42,17 @@ UNSAFE_CALLS = {"eval", "exec", "unsafe_load", "full_load", "load_all", "unsafe_
 SHIPPED = policies_directory() / "floating_platform_go_to_pose"
 
 
+@functools.cache
 def sources(repository):
-    return [path for folder in ON_THE_ROBOT for path in sorted((repository / folder).rglob("*.py"))]
+    """Files and their syntax trees."""
+    paths = [path for folder in ON_THE_ROBOT for path in sorted((repository / folder).rglob("*.py"))]
+    return [(path, list(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))) for path in paths]
 
 
 def test_no_module_of_the_robot_imports_what_can_unpickle(repository):
     found = []
-    for path in sources(repository):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for path, nodes in sources(repository):
+        for node in nodes:
             names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
             names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
             found += [f"{path}: {name}" for name in names if name.split(".")[0] in UNPICKLERS]
@@ -57,8 +61,8 @@ def test_no_module_of_the_robot_imports_what_can_unpickle(repository):
 
 def test_no_module_of_the_robot_evaluates_text_or_reads_unsafe_yaml(repository):
     found = []
-    for path in sources(repository):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for path, nodes in sources(repository):
+        for node in nodes:
             if not isinstance(node, ast.Call):
                 continue
             called = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import replace
 
 import numpy as np
@@ -59,12 +60,21 @@ PAIRS = [
 ]
 
 
+@functools.cache
+def aloft(robot):
+    """Numbers of level flight: an aircraft cannot stand."""
+    return [float(part) for part in flying_at(robot, ALOFT).columns()]
+
+
+@functools.cache
+def world_of(robot, scenario):
+    return draw_episode(robot, task_for(robot, "go_to_pose"), load_scenario(scenario), seed=0, number=0).world
+
+
 def episode_of(robot, scenario="nominal", start=None, **world):
-    if robot.flies:  # which cannot stand
-        start = start or [float(part) for part in flying_at(robot, ALOFT).columns()]
-    drawn = draw_episode(
-        robot, task_for(robot, "go_to_pose"), load_scenario(scenario), seed=0, number=0
-    ).world
+    drawn = world_of(robot, scenario)
+    if robot.flies:
+        start = start or aloft(robot)
     kind = robot.state_type
     return Episode(
         kind(*(np.asarray(value) for value in start or AT_REST[kind])),

@@ -106,13 +106,6 @@ def test_aircraft_are_evaluated_in_jsbsim_which_prints_nothing_of_its_own(pair, 
     assert capfd.readouterr().out == ""
 
 
-def test_a_short_flight_in_jsbsim_prints_nothing_of_its_own_either(capfd):
-    words = "evaluate navion fly_attitude --controller lqi --through jsbsim:L17 --scenario ideal --episodes 1"
-    found = evaluate(f"{words} --episode-s 1")
-    assert (found["through"], found["episodes"]) == ("jsbsim:L17", 1)
-    assert capfd.readouterr().out == ""
-
-
 def test_a_way_or_a_model_that_is_none_is_one_line_with_the_nearest():
     for way, nearest in (("jsbsm", "jsbsim"), ("jsbsim:L71", "L17")):
         words = f"evaluate navion fly_attitude --controller lqi --through {way}"

@@ -41,17 +41,26 @@ from tests.ros.neighbour import NAMESPACE, Neighbour, until
     ("module", "parameter", "words"),
     [
         ("sim_nodes.sim_node", "robot:='floating_plaform'", "Did you mean 'floating_platform'?"),
-        ("policy_server.controller_node", "policy:='nowhere'", "policy 'nowhere': the folder does not exist"),
         ("policy_server.controller_node", "control_hz:=10.0", "was trained at 5 Hz, but would run at 10 Hz"),
-        ("hardware_drivers.driver_node", "hardware:='zero_g_lap'", "Did you mean 'zero_g_lab'?"),
-        ("hardware_drivers.driver_node", "rate:=2.0", "a real device runs in real time"),
-        (
-            "hardware_drivers.adapter_node",
-            "hardware:='turtlebot2'",
-            "'kobuki' is no message of another stack",
+        *(
+            pytest.param(*case, marks=pytest.mark.slow)
+            for case in (
+                (
+                    "policy_server.controller_node",
+                    "policy:='nowhere'",
+                    "policy 'nowhere': the folder does not exist",
+                ),
+                ("policy_server.controller_node", "rate:=-1.0", "must be a finite number, at least 0"),
+                ("hardware_drivers.driver_node", "hardware:='zero_g_lap'", "Did you mean 'zero_g_lab'?"),
+                ("hardware_drivers.driver_node", "rate:=2.0", "a real device runs in real time"),
+                (
+                    "hardware_drivers.adapter_node",
+                    "hardware:='turtlebot2'",
+                    "'kobuki' is no message of another stack",
+                ),
+                ("sim_nodes.emulator_node", "device:='kobuky'", "Did you mean 'kobuki'?"),
+            )
         ),
-        ("sim_nodes.emulator_node", "device:='kobuky'", "Did you mean 'kobuki'?"),
-        ("policy_server.controller_node", "rate:=-1.0", "must be a finite number, at least 0"),
     ],
 )
 def test_a_wrong_parameter_ends_a_node_with_one_line_and_exit_code_two(

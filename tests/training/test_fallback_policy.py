@@ -160,9 +160,8 @@ class Impatient:
     def end(self): ...
 
 
-@pytest.mark.parametrize(
-    "part", [1, pytest.param(2, marks=pytest.mark.slow)], ids=["the fallback", "the other"]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("part", [1, 2], ids=["the fallback", "the other"])
 def test_a_run_that_was_broken_off_ends_with_the_very_networks_of_one_that_was_not(
     tmp_path, settings, quick, run, part
 ):

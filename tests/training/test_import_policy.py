@@ -310,6 +310,6 @@ def test_imported_policy_drives_the_base_to_its_goals_in_mujoco(tmp_path):
     policy = Policy(tmp_path / "out", robot, task)
     world = load_scenario("nominal")
     trajectories = roll_out_in_backends(
-        policy, lambda: MujocoBackend.of(robot, task, world), task, world, episodes=4, seed=EVALUATION_SEED
+        policy, lambda: MujocoBackend.of(robot, task, world), task, world, episodes=2, seed=EVALUATION_SEED
     )
     assert summary(trajectories, task)["success_rate"] == 1.0

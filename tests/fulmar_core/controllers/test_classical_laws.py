@@ -69,11 +69,10 @@ def test_it_does_its_task_in_nine_of_ten_episodes(robot, task):
     assert successes(run, task).mean() >= 0.9
 
 
-def test_an_aircraft_holds_its_height_and_its_side():
-    robot, task = (
-        ROBOTS["airship_v7"],
-        replace(TASKS["fly_hold"], episode_s=8.0, start=FlightStart()),
-    )  # on its height
+@pytest.mark.parametrize("seconds", [1.0, pytest.param(8.0, marks=pytest.mark.slow)])
+def test_an_aircraft_holds_its_height_and_its_side(seconds):
+    start = FlightStart()  # on its height
+    robot, task = ROBOTS["airship_v7"], replace(TASKS["fly_hold"], episode_s=seconds, start=start)
     run = roll_out_in_batch(
         load_classical(robot, task), robot, task, load_scenario("nominal"), episodes=8, seed=7
     )

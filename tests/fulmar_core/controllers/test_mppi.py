@@ -46,29 +46,34 @@ def inputs_of_trim(law):
     return Inputs(start, goal, np.zeros((1, 0)), command[None], None, 0, 0.01)
 
 
-def test_it_stays_within_three_centimetres_over_the_water():
-    run = flown(SETTINGS, seconds=1.0)
+LONG = pytest.mark.parametrize("seconds", [0.1, pytest.param(1.0, marks=pytest.mark.slow)])
+
+
+@LONG
+def test_it_stays_within_three_centimetres_over_the_water(seconds):
+    run = flown(SETTINGS, seconds=seconds)
     assert not run.touching.any()
     assert np.max(run.position_error) <= 0.03
 
 
-def test_without_the_law_it_flies_by_its_plans_alone():
+@LONG
+def test_without_the_law_it_flies_by_its_plans_alone(seconds):
     open_loop = replace(SETTINGS, feedback=0.0, noise=(0.05, 0.05, 0.05, 0.1, 0.1), temperature=3.0)
-    run = flown(open_loop, seconds=1.0)
+    run = flown(open_loop, seconds=seconds)
     assert not run.touching.any()
     assert np.max(run.position_error) <= 0.15
 
 
 def test_a_seed_repeats_a_flight_and_another_seed_does_not():
-    first, again, other = (flown(FEW, seconds=0.2, seeds=(seed,)) for seed in (3, 3, 4))
+    first, again, other = (flown(FEW, seconds=0.1, seeds=(seed,)) for seed in (3, 3, 4))
     np.testing.assert_array_equal(first.shares, again.shares)
     assert np.abs(np.asarray(first.shares) - np.asarray(other.shares)).max() > 1e-3
 
 
 def test_craft_side_by_side_fly_as_each_would_alone_with_its_seed():
-    both = flown(FEW, seconds=0.2, seeds=(3, 4))
+    both = flown(FEW, seconds=0.1, seeds=(3, 4))
     for row, seed in enumerate((3, 4)):
-        alone = flown(FEW, seconds=0.2, seeds=(seed,))
+        alone = flown(FEW, seconds=0.1, seeds=(seed,))
         np.testing.assert_allclose(both.shares[row], alone.shares[0], atol=1e-6)
 
 
