@@ -36,7 +36,18 @@ def commands_of(name, *, seconds=90.0, worlds=4):
     return robot, np.array(commands), far
 
 
-@pytest.mark.parametrize("name", [name for name in config_names("robots") if not load_robot(name).flies])
+# Both are pushed in space; what turns one, turns the other.
+ALIKE = {"int_ball2"}
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=pytest.mark.slow if name in ALIKE else ())
+        for name in config_names("robots")
+        if not load_robot(name).flies
+    ],
+)
 def test_a_robot_stays_inside_its_geofence_and_uses_all_of_its_actuators(name):
     robot, commands, far = commands_of(name)
     assert far < robot.limits.geofence
@@ -64,14 +75,14 @@ def test_a_spacecraft_turns_about_every_axis_by_less_than_a_quarter_turn_a_step_
     robot, task = load_robot("spacecraft_16"), load_task("go_to_pose_3d")
     simulation = BatchSimulation(robot, task, load_scenario("nominal"), worlds=4, seed=3, training=True)
     controller, rates, far = exciting(robot)(robot, task), [], []
-    for _ in range(round(180.0 * controller.control_hz)):
+    for _ in range(round(90.0 * controller.control_hz)):
         simulation.step(controller.act(inputs_of(simulation)))
         rates.append(np.stack(simulation.truth.rate, axis=-1))
         far.append(simulation.truth.distance_to(simulation.goal.current))
     rates = np.array(rates)
     assert (np.sqrt(np.mean(rates**2, axis=(0, 1))) > 0.08).all()
     assert np.linalg.norm(rates, axis=-1).max() < 1.5
-    assert np.max(far[round(120.0 * controller.control_hz) :]) < 0.5 * robot.limits.geofence
+    assert np.max(far[round(60.0 * controller.control_hz) :]) < 0.5 * robot.limits.geofence
 
 
 def test_a_row_in_space_does_not_depend_on_its_neighbours():
