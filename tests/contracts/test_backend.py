@@ -17,6 +17,7 @@ from fulmar_core.states.spatial import SpatialState
 from fulmar_core.tasks.goal import goal_at
 from fulmar_core.worlds.scenario import load_scenario
 from sim_nodes.mock_backend import MockBackend
+from tests.conftest import ALIKE
 from tests.new_robots import robots_of_every_family
 from tests.spaces import SPACECRAFT, task_for
 
@@ -53,7 +54,9 @@ def build_jsbsim(robot):
 OF_ANY_ROBOT = {"mock": MockBackend, "mujoco": build_mujoco}
 BUILDERS = {**OF_ANY_ROBOT, "jsbsim": build_jsbsim}
 PAIRS = [
-    (kind, name)
+    pytest.param(
+        (kind, name), id=f"{kind}-{name}", marks=pytest.mark.slow if ALIKE.get(name) in ROBOTS else ()
+    )
     for kind in sorted(BUILDERS)
     for name in sorted(ROBOTS)
     if kind in OF_ANY_ROBOT or ROBOTS[name].flies
@@ -92,7 +95,7 @@ def build(request):
     return OF_ANY_ROBOT[request.param]
 
 
-@pytest.fixture(params=PAIRS, ids="-".join)
+@pytest.fixture(params=PAIRS)
 def backend(request):
     kind, name = request.param
     backend = BUILDERS[kind](ROBOTS[name])

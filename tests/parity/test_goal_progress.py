@@ -34,7 +34,7 @@ from tests.spaces import robot_for
 from tests.states import received_targets
 
 BASE, SCENARIO = load_robot("turtlebot2"), load_scenario("nominal")
-SEED, EPISODES, STEPS, STRIDE = 3, 3, 120, 0.12  # m a step
+SEED, EPISODES, STEPS, STRIDE = 3, 2, 120, 0.12  # m a step
 S = 1_000_000_000
 
 
@@ -57,7 +57,12 @@ TASKS = {name: short(load_task(name)) for name in config_names("tasks")}
 TASKS = {name: task for name, task in TASKS.items() if drawn(task).goal.targets.shape[1] > 1}
 
 
-@pytest.fixture(params=TASKS.values(), ids=TASKS)
+@pytest.fixture(
+    params=[
+        pytest.param(task, id=name, marks=pytest.mark.slow if name == "fly_path" else ())  # as fly_a
+        for name, task in TASKS.items()
+    ]
+)
 def task(request):
     return request.param
 

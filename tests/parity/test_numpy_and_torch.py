@@ -21,7 +21,7 @@ torch = pytest.importorskip("torch")
 
 ROBOTS, TASKS = config_names("robots"), config_names("tasks")
 RANDOMISED = load_scenario("randomised")
-WORLDS, STEPS = 32, 60
+WORLDS, STEPS = 32, 30
 # Rounding of some thousand operations on numbers of up to ten; a thruster robot that nobody steers spins fast.
 CLOSE = {"float64": 1e-11, "float32": 2e-4}
 CASES = list(itertools.product(ROBOTS, CLOSE))

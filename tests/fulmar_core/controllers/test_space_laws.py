@@ -48,7 +48,8 @@ def goal_of(rng, count, targets=1):
     return Goal(poses, np.zeros(count), np.zeros((count, 0, 3)))
 
 
-@LAWS
+# The LQR, which stands for `classical`, has its turn at every task in test_classical_laws.py.
+@pytest.mark.parametrize("law", [pytest.param("lqr", marks=pytest.mark.slow), "pd"])
 @pytest.mark.parametrize("task", TASKS, ids=[task.name for task in TASKS])
 def test_a_spacecraft_does_every_task_in_space(law, task):
     controller = load_classical(ROBOT, task, law=law)
@@ -56,7 +57,7 @@ def test_a_spacecraft_does_every_task_in_space(law, task):
     assert successes(run, task).mean() >= 0.95
 
 
-@LAWS
+@pytest.mark.parametrize("law", ["lqr", pytest.param("pd", marks=pytest.mark.slow)])
 def test_modulation_halves_the_error_at_the_goal(law):
     modulated = load_classical(ROBOT, POSE, law=law)
     gains = replace(modulated.gains, carried_force=0.0, carried_torque=0.0)

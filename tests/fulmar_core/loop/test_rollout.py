@@ -20,6 +20,7 @@ from fulmar_core.tasks import load_task
 from fulmar_core.tasks.observation import Observer
 from fulmar_core.worlds.scenario import load_scenario
 from sim_nodes.mock_backend import MockBackend
+from tests.pairs import covering
 from tests.spaces import shared_space
 
 ROBOT, TASK = load_robot("floating_platform"), load_task("go_to_pose")
@@ -174,9 +175,15 @@ def test_an_episode_shorter_than_a_control_step_is_refused_by_name():
 ALIKE = {name: load_robot(name) for name in ("turtlebot2", "modular_freeflyer", "spacecraft_16", "int_ball2")}
 
 
+ALIKE_PAIRS = shared_space(ALIKE, {name: load_task(name) for name in config_names("tasks")})
+
+
 @pytest.mark.parametrize(
     ("robot", "name"),
-    shared_space(ALIKE, {name: load_task(name) for name in config_names("tasks")}),
+    [
+        pytest.param(*pair, marks=() if pair in covering(ALIKE_PAIRS) else pytest.mark.slow)
+        for pair in ALIKE_PAIRS
+    ],
 )
 def test_episodes_go_alike_in_the_batch_and_one_by_one(robot, name):
     robot, task = ALIKE[robot], replace(load_task(name), episode_s=8.0)

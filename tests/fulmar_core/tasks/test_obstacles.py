@@ -21,7 +21,7 @@ RULE = TASK.obstacles
 ROBOTS = {name: load_robot(name) for name in config_names("robots")}
 MOVED = {name: robot for name, robot in ROBOTS.items() if not robot.flies}
 EACH_ROBOT = pytest.mark.parametrize("robot", MOVED.values(), ids=MOVED)
-MANY = 500
+MANY = 200
 
 
 def draw(robot, *, training=False):
