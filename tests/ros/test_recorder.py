@@ -32,7 +32,6 @@ from tests.ros.recorder import ROBOT, odometry, publish, wait_for
 real_time = pytest.mark.real_time
 
 
-@real_time
 def test_a_stopped_recorder_has_kept_every_message_and_said_so_each_second_and_leaves_no_process(
     record, node, healths
 ):
@@ -75,7 +74,6 @@ def test_a_stopped_recorder_has_kept_every_message_and_said_so_each_second_and_l
     assert not [thread for thread in threading.enumerate() if thread.name == "bag"]
 
 
-@real_time
 def test_a_paused_recorder_says_when_a_message_was_sent_and_received_and_sigterm_closes_its_bag(record, node):
     early = node.create_publisher(PoseStamped, GOAL_POSE.name, publisher_qos(GOAL_POSE))
     latched = [time.time_ns(), early.publish(PoseStamped()), time.time_ns()]
@@ -115,7 +113,6 @@ def check_provenance(file):
     assert set(reported) == {"fulmar_version", "git_revision", "python", "platform", "packages"}
 
 
-@real_time
 def test_a_recorder_that_is_started_again_goes_on_in_the_bag_of_the_one_that_died(record, node):
     (recorder := record()).wait_until_recording()
     publisher = odometry(node, lockstep=True)  # keeps what a busy machine holds the second one up for
@@ -181,7 +178,6 @@ def test_in_lock_step_a_paused_recorder_is_waited_for_and_lacks_nothing(record, 
     assert recorder.stamps_by_rosbags() == list(range(6000))
 
 
-@real_time
 def test_in_lock_step_a_recorder_that_hangs_ends_the_waiting_with_a_reason(record, node, monkeypatch):
     monkeypatch.setattr("fulmar_ros.qos.PATIENCE_S", 0.3)
     recorder = record()
@@ -267,7 +263,6 @@ def values(status: DiagnosticStatus) -> dict[str, str]:
     return {pair.key: pair.value for pair in status.values}
 
 
-@real_time
 def test_a_full_disk_ends_in_exit_code_1_with_all_before_it_kept(record, node, healths):
     recorder = record()
     recorder.wait_until_recording()
