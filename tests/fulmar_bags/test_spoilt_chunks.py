@@ -46,3 +46,16 @@ def test_a_chunk_that_unpacks_to_far_more_than_it_is_is_left_out(tmp_path, monke
     found, damage = messages(path)
     assert found == [b"first", b"third"]
     assert len(damage) == 1 and "is damaged and was left out" in damage[0]
+
+
+def test_a_bag_is_read_up_to_wherever_it_is_cut(tmp_path):
+    contents = [b"first", b"second", b"third"]
+    path = written(tmp_path / "bag.mcap", CompressionType.ZSTD, *contents)
+    whole, cut = path.read_bytes(), tmp_path / "cut.mcap"
+    counts = []
+    for length in range(8, len(whole), 7):
+        cut.write_bytes(whole[:length])
+        found, _ = messages(cut)
+        assert found == contents[: len(found)]
+        counts.append(len(found))
+    assert counts == sorted(counts) and {*counts} == {0, 1, 2, 3}

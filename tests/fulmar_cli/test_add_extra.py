@@ -5,6 +5,7 @@ from __future__ import annotations
 import tomllib
 from importlib.metadata import PackageNotFoundError
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from packaging.requirements import Requirement
@@ -59,6 +60,22 @@ def test_an_extra_comes_with_what_it_needs_in_the_versions_of_the_lock(pip):
     assert all("--hash=sha256:" in pin for call in calls for pin in call)
     assert add(["gliders"], pins_of(LOCK)) == []
     assert len(calls) == 3
+
+
+def test_pip_installs_what_has_the_hashes_of_the_lock_and_nothing_else(monkeypatch):
+    asked = []
+
+    def run(command, check):
+        lock = Path(command[command.index("-r") + 1]).read_text(encoding="utf-8")
+        asked.append((command, lock))
+        return SimpleNamespace(returncode=0)
+
+    monkeypatch.setattr(add_extra.subprocess, "run", run)
+    pin = pins_of(LOCK)["glider"]
+    add_extra._install([pin])
+    ((command, lock),) = asked
+    assert {"--require-hashes", "--no-deps"} <= {*command}
+    assert lock == f"{pin}\n"
 
 
 def test_another_version_than_that_of_the_lock_is_replaced(pip):

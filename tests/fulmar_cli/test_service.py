@@ -105,6 +105,14 @@ def test_words_of_the_command_survive_systemd_s_quoting(word):
     assert system_of_unit(text) == "a_system"
 
 
+def test_what_systemd_would_replace_is_doubled_in_a_unit():
+    text = unit_text(
+        Service("a", "a_system", ("/bin/fulmar", "100%", "$HOME"), USER), {"FULMAR_CONFIGS": "/50%"}
+    )
+    assert "ExecStart=/bin/fulmar 100%% $$HOME\n" in text
+    assert "Environment=FULMAR_CONFIGS=/50%%\n" in text
+
+
 @pytest.mark.parametrize(
     ("arguments", "code", "words"),
     [

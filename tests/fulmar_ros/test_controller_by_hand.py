@@ -9,7 +9,8 @@ from std_msgs.msg import Bool
 from fulmar_core.config.errors import BundleError, FulmarError
 from fulmar_core.controllers.lqr import Lqr
 from fulmar_core.safety.arbiter import Mode
-from tests.fulmar_ros.by_hand import DrivenController, ros
+from fulmar_ros.controller_node import ControllerNode
+from tests.fulmar_ros.by_hand import DrivenController, arguments, ros
 from tests.ros.controllers import make_lqr
 
 ROUND = 1_000_000_000
@@ -104,6 +105,8 @@ def test_a_controller_that_is_refused_is_not_configured():
 
     with pytest.raises(FulmarError, match="the bundle is damaged"):
         DrivenController(refuse)
+    node = ControllerNode(refuse, lambda _code: None, cli_args=arguments("autostart:=false"))
+    assert node.trigger_configure() == TransitionCallbackReturn.FAILURE
 
 
 def test_a_controller_that_hangs_is_not_activated_again():

@@ -150,6 +150,18 @@ def test_a_message_that_cannot_be_read_is_refused_and_breaks_nothing(wired):
     assert made.at() == {}
 
 
+@pytest.mark.parametrize("error", [ValueError, TypeError, KeyError, ZeroDivisionError])
+def test_a_reading_whose_reader_stumbles_is_refused_with_the_error(wired, monkeypatch, error):
+    def stumble(_message, _frames):
+        raise error("of no length")
+
+    monkeypatch.setattr(reading_inputs, "reader_of", lambda _kind: stumble)
+    made = wired("wheels")
+    made.send("wheels/state", speeds(100.0))
+    assert made.inputs.newest.refusal.startswith(f"wheels cannot be read: {error.__name__}: ")
+    assert (made.at(), made.inputs.newest.refused) == ({}, 1)
+
+
 @pytest.mark.parametrize("lockstep", [False, True])
 def test_in_lock_step_a_best_effort_publisher_of_a_sensor_is_refused_and_so_reported(wired, lockstep):
     refused = wired("wheels", lockstep=lockstep).inputs.subscribed

@@ -9,9 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from fulmar_core.config.errors import DeviceError
 from fulmar_core.states.rotation import rotate, yaw_of
 from hardware_drivers.earth_frame import LocalFrame, attitude
-from hardware_drivers.feedback import DeviceTime
+from hardware_drivers.feedback import DeviceTime, Feedback, Report
 from hardware_drivers.valves import ValveTiming, from_message, to_message
 from hardware_drivers.wheel_odometry import WheelOdometry
 from sim_nodes.emulators import kingfisher
@@ -44,6 +45,20 @@ def test_no_stamp_lies_ahead_of_its_arrival():
     device = DeviceTime()
     for at in (0, 20, 40, 61, 80):
         assert device.stamp_ns(float(at), 10**18 + at * MS) <= 10**18 + at * MS
+
+
+def test_a_device_that_has_failed_is_an_error_at_once_though_its_last_report_is_young():
+    feedback = Feedback("base", 60.0)
+    feedback.put(Report(None, None, 1))
+    assert feedback.read().stamp_ns == 1
+    feedback.fail("the other side closed the connection")
+    with pytest.raises(DeviceError, match="base: the other side closed the connection"):
+        feedback.read()
+
+
+@pytest.mark.parametrize("data", [[2, *[0] * 8], [*[0] * 8, 255], [0] * 8, [0] * 10, [-1, *[0] * 8]])
+def test_a_message_of_other_values_than_open_and_shut_is_refused(data):
+    assert from_message(data, ORDER) is None
 
 
 def test_a_square_of_straight_lines_and_turns_ends_where_it_began():

@@ -27,6 +27,7 @@ from policy_server.controllers import Choice, load_controller
 from sim_nodes.jsbsim_backend import JsbsimBackend
 from sim_nodes.mock_backend import MockBackend
 from sim_nodes.mujoco_backend import MujocoBackend
+from sim_nodes.one_world import OneWorld
 
 ROBOT = load_robot("airship_v7")
 TASK = load_task("fly_hold").fitted(ROBOT)
@@ -121,6 +122,16 @@ def test_what_is_dead_does_nothing_from_the_start():
     batch = BatchSimulation(ROBOT, TASK, lost, worlds=4, seed=3)
     assert (batch._actuation.applied[batch.world.alive == 0.0] == 0.0).all()
     assert (batch.world.alive == 0.0).any()
+
+
+def test_what_is_dead_in_one_simulated_world_does_nothing_from_the_start():
+    lost = replace(WINDY, actuation=replace(WINDY.actuation, failures=1, failure_chance=1.0))
+    world, episode = OneWorld(ROBOT, noisy=False), draw_episode(ROBOT, TASK, lost, seed=3, number=0)
+    episode = replace(episode, command=np.ones(len(ROBOT.actuators.names)))
+    world.begin_episode(episode)
+    alive = world.world.alive[:, 0]
+    assert sorted(alive.tolist()) == [0.0, *(len(alive) - 1) * [1.0]]
+    assert world.actuation.applied[:, 0].tolist() == alive.tolist()
 
 
 @pytest.mark.parametrize("start", [(0.0, 0.0, 5.0), (3.0, 1.0, 4.0, 0.0, 0.0, 90.0)])

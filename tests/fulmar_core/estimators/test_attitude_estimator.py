@@ -96,6 +96,16 @@ def test_without_the_star_tracker_its_uncertainty_grows_until_it_says_so():
     assert "no star tracker for" in estimator.problem or "turn rate is known" in estimator.problem
 
 
+def test_an_attitude_that_is_not_known_well_enough_is_withheld_though_the_turn_rate_is():
+    estimator = make_estimator("attitude", CUBESAT)
+    estimator._settings = replace(estimator._settings, attitude_limit_deg=0.005)
+    fed(estimator, 10.0)
+    assert estimator.estimate() is not None
+    fed(estimator, 60.0, tracker=False, begin_s=10.0)
+    assert estimator.estimate() is None
+    assert estimator.problem == "the attitude is known to 0.01° only: no star tracker for 61 s"
+
+
 def test_what_the_wheels_take_the_body_loses():
     estimator = make_estimator("attitude", CUBESAT)
     fed(estimator, 5.0)

@@ -224,6 +224,18 @@ def test_a_bias_that_no_sound_sensor_has_is_named_though_it_is_followed():
 
 
 @pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(("number", "name"), enumerate(("accelerometer", "gyroscope")))
+def test_a_bias_beyond_what_a_sound_sensor_has_leaves_no_estimate(kind, number, name, monkeypatch):
+    body = Body(kind)
+    body.run(3.0)
+    settings, biases = body.estimator._settings, [0.0, 0.0]
+    biases[number] = 1.01 * (settings.accelerometer_bias, settings.gyroscope_bias)[number]
+    monkeypatch.setattr(type(body.estimator._filter), "biases", lambda _self: tuple(biases))
+    assert body.estimate is None
+    assert any(words.startswith(f"the bias of the {name} is beyond") for words in body.estimator.warnings())
+
+
+@pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize(
     ("part", "words"),
     [

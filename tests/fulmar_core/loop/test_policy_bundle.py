@@ -242,6 +242,8 @@ def test_a_passport_that_fits_is_accepted():
         ({"observation_names": TASK.observation_names[:-1]}, "has 9 observation names, 10 are needed"),
         ({"observation_names": TASK.observation_names[::-1]}, "observation 1 is 'goal_distance', it must be"),
         ({"actuator_names": ROBOT.actuators.names[:-1]}, "has 7 actuator names, 8 are needed"),
+        ({"action": "continuous"}, "gives continuous commands, 'floating_platform' takes on_off"),
+        ({"command_scale": (2.0,) * 8}, "was trained for full commands of [2.0, 2.0"),
         ({"actuator_names": ("a", *ROBOT.actuators.names[1:])}, "actuator 1 is 'a', it must be 'thruster_1'"),
     ],
 )
