@@ -180,6 +180,10 @@ test: dev ## Run the tests, without those that take more than ten seconds
 test-all: dev peers ## Run every test
 	@$(call run_tests,)
 
+.PHONY: mutants
+mutants: dev ## Take each guard away in turn, and run the test that must fail then (MUTANTS="--only estop-latches")
+	@$(BIN)/python -m tests.mutants $(MUTANTS)
+
 .PHONY: profile-step
 profile-step: dev ## Profile a control step and its lock step (AGAINST=DIR: compare with another checkout)
 	@$(BIN)/python tests/benchmarks/profile_step.py $(if $(AGAINST),--against $(AGAINST))

@@ -24,6 +24,7 @@ TARGETS = {
     "profile-step",
     "test",
     "test-all",
+    "mutants",
     "check",
     "format",
     "images",

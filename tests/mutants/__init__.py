@@ -1,0 +1,1 @@
+"""Guards of the product, each with the test that fails without it."""
