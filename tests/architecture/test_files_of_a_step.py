@@ -20,6 +20,7 @@ from fulmar_core.tasks import load_task
 from policy_server.controllers import Choice, load_controller
 
 SOURCES = str(Path(__file__).resolve().parents[2])
+LIBRARIES = "site-packages"  # whose environment may lie beside the sources
 HZ, STEPS, MOST = 50.0, 60, 26
 GOAL = np.array([[2.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0]])
 
@@ -45,8 +46,9 @@ def files_of_steps(robot_name: str, task_name: str, controller_name: str) -> lis
         measurement, entered = Measurement(now_ns, "odom", "base_link", seen), set[str]()
 
         def note(frame, event, _argument, entered=entered):
-            if event == "call" and frame.f_code.co_filename.startswith(SOURCES):
-                entered.add(frame.f_code.co_filename.removeprefix(SOURCES))
+            file = frame.f_code.co_filename
+            if event == "call" and file.startswith(SOURCES) and LIBRARIES not in file:
+                entered.add(file.removeprefix(SOURCES))
 
         sys.setprofile(note)
         try:
