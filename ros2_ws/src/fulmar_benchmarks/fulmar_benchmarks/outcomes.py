@@ -74,8 +74,9 @@ def keep(path: Path, key: str, figures: Figures) -> Figures:
     value = _without_arrays(figures, arrays)
     path.parent.mkdir(parents=True, exist_ok=True)
     with whole_file(path) as file:
-        named = {f"{ARRAY}{number}": array for number, array in enumerate(arrays)}
-        np.savez_compressed(file, **{KEY: np.array(key), VALUE: np.array(json.dumps(value))}, **named)
+        named: dict[str, Any] = {KEY: np.array(key), VALUE: np.array(json.dumps(value))}
+        named |= {f"{ARRAY}{number}": array for number, array in enumerate(arrays)}
+        np.savez_compressed(file, **named)
     return read(path, key) or {}
 
 

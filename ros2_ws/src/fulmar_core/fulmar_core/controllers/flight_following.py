@@ -62,4 +62,4 @@ class FlightFollowing(FlightLaw):
         turned = rotation_error(aimed, state.quat)
         velocity = state.vx - speed, state.vy - drift, state.vz - climb
         rates = state.wx, state.wy + up / speed, state.wz - aside / speed
-        return side_by_side(*turned, *velocity, *rates).reshape(len(aim.rate), -1)
+        return np.asarray(side_by_side(*turned, *velocity, *rates).reshape(len(aim.rate), -1))

@@ -83,6 +83,7 @@ class FlightObserver:
     def reset(self) -> None:
         """Forget the past."""
         self._state: SpatialState | None = None  # of one craft in plain numbers
+        self._count = 0
 
     def update(self, measured: SpatialState, previous: np.ndarray) -> SpatialState:
         """See `StateObserver.update`."""

@@ -67,7 +67,8 @@ class TargetMotion:
         before, self._before, self._stamp_ns = self._before, np.array(target, dtype=float), stamp_ns
         if before is None or before.shape != target.shape:
             self._differences = None
-            return Moved(*np.zeros((2, len(target), 6)), step_s=elapsed)
+            unknown = np.zeros((len(target), 6))
+            return Moved(unknown, unknown, elapsed)
         velocity = (target[:, :3] - before[:, :3]) / elapsed
         turned = product(conjugate(quat_of(before)), quat_of(target))
         still = np.all(before[:, 3:] == target[:, 3:], axis=-1)

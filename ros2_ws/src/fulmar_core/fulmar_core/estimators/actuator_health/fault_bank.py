@@ -290,7 +290,7 @@ def _moved(state: np.ndarray, dt: float, half: float) -> np.ndarray:
 
 def _white(gains: Gains, off: np.ndarray) -> np.ndarray:
     """White numbers of innovations of pose and velocity, shapes (2, 2, ...)."""
-    white = gains.white[:2] * off[:, :1]
+    white: np.ndarray = gains.white[:2] * off[:, :1]
     white[:, 1] += gains.white[2] * off[:, 1]
     return white
 
