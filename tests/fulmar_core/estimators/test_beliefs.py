@@ -74,3 +74,11 @@ def test_a_valve_that_is_stuck_open_explains_what_the_estimator_believes():
     words = ("valve thruster_3 is stuck open",)
     monitored = Beliefs((), words, ("thruster_3",), words)
     assert joined(ESTIMATED, monitored, suspects=()) == monitored
+
+
+def test_a_small_push_is_not_looked_at_closer_and_never_one_that_counts(monkeypatch):
+    rng, closer = np.random.default_rng(2), BeliefReader(ROBOT)
+    monkeypatch.setattr(closer._reach, "at_least", -np.inf)  # what is never small
+    for _ in range(300):
+        seen = health(push=rng.normal(0.0, 0.4, 3) * (1.0, 1.0, 0.4), yaw=rng.uniform(-3.0, 3.0))
+        assert READER.read(seen) == closer.read(seen)

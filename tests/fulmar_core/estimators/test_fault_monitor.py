@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fulmar_core.estimators.actuator_health import fault_monitor
 from fulmar_core.estimators.actuator_health.applied import AppliedHistory
 from fulmar_core.estimators.actuator_health.beliefs import NO_EFFECT
 from fulmar_core.estimators.actuator_health.fault_monitor import FaultMonitor
@@ -95,6 +96,35 @@ def test_what_was_believed_before_time_jumped_back_is_forgotten():
     standing.now_ns = 0
     standing.go(0.2)
     assert standing.monitor.beliefs.words == ()
+
+
+@pytest.mark.parametrize("sticks", [None, 3], ids=["sound", "one sticks"])
+def test_what_is_skipped_while_nothing_is_wrong_changes_nothing(sticks, monkeypatch):
+    found = {}
+    for skips in (True, False):
+        if not skips:
+            monkeypatch.setattr(fault_monitor, "SOUND", np.inf)
+        robot = load_robot("floating_platform")
+        applied = AppliedHistory(hold_ns=400_000_000)
+        monitor = FaultMonitor(robot, applied, control_hz=5.0, lockstep=True)
+        wrench = robot.actuators.wrench_per_newton
+        rng, motion, said = np.random.default_rng(1), np.zeros(6), []
+        for number in range(60):
+            command = np.eye(8)[rng.integers(8)]
+            doing = command.copy()
+            if sticks is not None and number > 10:
+                doing[sticks] = 0.0
+            force = np.concatenate((doing @ wrench[:, :2], [0.0]))
+            place, speed = motion[:3], motion[3:]
+            motion = np.concatenate((place + 0.2 * speed, speed + 0.2 * force / robot.body.mass))
+            state = RigidBodyState(
+                np.append(place[:2], 0.0), from_yaw(np.array(0.0)), np.append(speed[:2], 0.0), np.zeros(3)
+            )
+            monitor.take(state, 200_000_000 * number)
+            applied.add(200_000_000 * number, command)
+            said.append((monitor.beliefs, monitor.suspects))
+        found[skips] = said
+    assert found[True] == found[False]
 
 
 def test_a_push_as_large_as_a_valves_thrust_is_no_valve():

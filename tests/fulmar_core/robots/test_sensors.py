@@ -225,3 +225,13 @@ def test_channels_and_rates_without_meaning_are_refused():
         Channel(quantum=-1.0)
     with pytest.raises(ValueError, match="must not be negative"):
         OdometrySpec(delay_s=-0.1)
+
+
+def test_one_world_has_the_noise_that_it_has_beside_others():
+    alone, beside = Bench(alike(std=0.1), 1), Bench(alike(std=0.1), 2)
+    for _ in range(150):
+        np.testing.assert_array_equal(alone.measure()[:, 0], beside.measure()[:, 0])
+    for bench in (alone, beside):
+        bench.measure(only=np.array([0]))
+    for _ in range(3):
+        np.testing.assert_array_equal(alone.measure()[:, 0], beside.measure()[:, 0])
