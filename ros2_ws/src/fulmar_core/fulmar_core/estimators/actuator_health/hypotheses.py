@@ -13,6 +13,7 @@ from fulmar_core.robots.robot import Robot
 
 HALF_OPEN, OPEN = 0.5, 1.0  # levels at which actuators that open by degrees are taken for stuck [-]
 MOST_PAIRS = 28  # of dead actuators; robots with more than eight are searched for single ones alone
+REMEMBERED = 256  # sequences of commands whose wrenches are not computed again
 # Chances before anything is seen, and of what comes next when something changes. A push is no fault of an actuator.
 PUSHED, POWERLESS, DEAD, STUCK_OPEN, DEAD_PAIR = 0.04, 0.005, 0.04, 0.02, 0.004
 
@@ -81,6 +82,7 @@ class Hypotheses:
             priors += [chance / len(group)] * len(group)
         priors[0] -= sum(priors[1:])
         self.prior = np.array(priors)
+        self._known: dict[bytes, np.ndarray] = {}
         self._obeys = np.ones((len(self.all), count))
         self._stuck = np.zeros((len(self.all), count))
         for row, each in enumerate(self.all):
@@ -100,5 +102,11 @@ class Hypotheses:
         Returns:
             Under each hypothesis, shape (k, hypotheses, 6) [N, N·m].
         """
-        applied = commands[:, None, :] * self._obeys + self._stuck
-        return np.asarray(self._actuators.thrusts(applied) @ self._wrench)
+        key = commands.tobytes()
+        found = self._known.get(key)
+        if found is None:
+            if len(self._known) >= REMEMBERED:
+                self._known.clear()
+            applied = commands[:, None, :] * self._obeys + self._stuck
+            found = self._known[key] = np.asarray(self._actuators.thrusts(applied) @ self._wrench)
+        return found

@@ -25,6 +25,7 @@ from fulmar_core.states.arrays import side_by_side
 from fulmar_core.states.planar import PlanarState
 
 MOST_LOST = 2
+REMEMBERED = 256  # commands whose wrenches are not computed again
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +73,7 @@ class ThrusterHealth:
         chances = [failure ** len(each) * (1.0 - failure) ** (count - len(each)) for each in lost]
         self._prior = np.array(chances) / sum(chances)
         self._filters: dict[int, PushFilter] = {}
+        self._known: dict[bytes, np.ndarray] = {}
         self.reset()
 
     def reset(self) -> None:
@@ -176,7 +178,7 @@ class ThrusterHealth:
         if not isinstance(applied, Applied):
             return np.asarray(self._wrenches(np.asarray(applied, dtype=float)) @ turned)
         if len(applied.seconds) == 1:
-            return np.asarray(self._wrenches(applied.commands[0]) @ turned)
+            return np.asarray(self._wrenches_of_one(applied.commands[0]) @ turned)
         seconds, tick = applied.seconds, self._robot.timing.physics_dt
         whole = float(seconds.sum())
         # An early push moves the body farther than a late one: it has the rest of the interval to do so.
@@ -187,6 +189,16 @@ class ThrusterHealth:
         driven = np.tensordot(speed, wrenches, 1) @ turned
         driven[..., :3] = np.tensordot(place, wrenches, 1) @ turned[..., :3]
         return np.asarray(driven)
+
+    def _wrenches_of_one(self, command: np.ndarray) -> np.ndarray:
+        """`_wrenches` of one robot's command; the newest are remembered, as valves know few of them."""
+        key = command.tobytes()
+        found = self._known.get(key)
+        if found is None:
+            if len(self._known) >= REMEMBERED:
+                self._known.clear()
+            found = self._known[key] = self._wrenches(command)
+        return found
 
     def _wrenches(self, command: np.ndarray) -> np.ndarray:
         """Force ahead, to the left and yaw moment of the valves under each hypothesis, shape (..., hypotheses, 3)."""
