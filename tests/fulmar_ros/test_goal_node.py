@@ -21,6 +21,7 @@ from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.tasks.goal_files import GoalFile, single_goal
 from fulmar_ros.convert import OdometryWriter
 from fulmar_ros.goal_node import GoalNode
+from fulmar_ros.qos import publish_patiently
 from tests.conftest import RosDomain
 from tests.states import planar_state
 
@@ -58,16 +59,22 @@ class Bench:
         arguments += [word for key, value in parameters.items() for word in ("-p", f"{key}:={value}")]
         self.codes: list[int] = []
         self.sent: list[Any] = []
-        self.heard = {"goal_pose", "goal_point", "goal_path", "goal_velocity"}  # topics with a controller
+        self.listened_to = {
+            "goal_pose",
+            "goal_point",
+            "goal_path",
+            "goal_velocity",
+        }  # topics with a controller
         self.stamp_ns = 1_000 * MS
         self._clock, self._writer = clock, OdometryWriter(load_robot(robot).sensors.odometry)
         self.node: Any = GoalNode(self.codes.append, goals=goals, cli_args=arguments)
+        self.publish = self.node._publish
         self.node._publish = lambda _publisher, message: self.sent.append(message)
         self.node.get_subscriptions_info_by_topic = self._subscribers
 
     def _subscribers(self, topic: str) -> list[SimpleNamespace]:
         """A recorder subscribes everything."""
-        controllers = [topic.rsplit("/", 1)[-1]] if topic.rsplit("/", 1)[-1] in self.heard else []
+        controllers = [topic.rsplit("/", 1)[-1]] if topic.rsplit("/", 1)[-1] in self.listened_to else []
         return [SimpleNamespace(node_name=name) for name in ("recorder", *controllers)]
 
     def watch(self, seconds: float) -> None:
@@ -231,10 +238,10 @@ def test_without_a_robot_or_a_controller_the_node_ends_if_it_shall_not_wait(make
         bench.watch(0.6)
     assert (impatient.codes, patient.codes) == ([FAILED], [])
     assert "nothing comes on /floating_platform/odom (after 0.5 s)" in error_line(capfd)
-    unheard = make(POSITIONS, give_up_s=0.5)
-    unheard.heard = set()
-    unheard.see(40)
-    assert unheard.codes == [FAILED]
+    alone = make(POSITIONS, give_up_s=0.5)
+    alone.listened_to = set()
+    alone.see(40)
+    assert alone.codes == [FAILED]
     assert "no controller subscribes /floating_platform/goal_point" in error_line(capfd)
 
 
@@ -246,7 +253,7 @@ def test_goals_end_with_one_line_when_their_robot_or_its_controller_went_silent(
     bench.see(100)
     assert bench.codes == []
     if gone == "controller":
-        bench.heard = set()
+        bench.listened_to = set()
         bench.see(40)
     else:
         bench.watch(0.7)
@@ -290,7 +297,7 @@ def test_a_place_for_a_controller_of_other_goals_is_neither_published_nor_reache
 ) -> None:
     """Also where the robot is at the place already."""
     bench = make(place, robot=robot, give_up_s=1.0)
-    bench.heard = {taken}
+    bench.listened_to = {taken}
     bench.see(60)
     assert bench.sent == []
     assert bench.codes == [FAILED]
@@ -304,11 +311,23 @@ def test_a_place_for_a_controller_of_other_goals_is_neither_published_nor_reache
 def test_goals_wait_for_a_controller_that_starts_after_them(make) -> None:
     """Their time begins then; a recorder does not count as a subscriber."""
     bench = make(VELOCITIES)
-    bench.heard = set()
+    bench.listened_to = set()
     bench.see(100)
     assert (bench.sent, bench.codes) == ([], [])
-    bench.heard = {"goal_velocity"}
+    bench.listened_to = {"goal_velocity"}
     bench.see(60)
     first, second, _ = (stamp_ns(message.header.stamp) for message in bench.sent)
     assert second - first == 400 * MS
     assert bench.codes == [DONE]
+
+
+def test_in_lock_step_a_goal_comes_with_each_odometry_and_none_is_overwritten(make) -> None:
+    """Also with odometry that is refused: others wait for its stamp."""
+    bench = make(VELOCITIES, lockstep="true")
+    bench.see(3)
+    bench.see(1, x=float("nan"))
+    assert [stamp_ns(message.header.stamp) for message in bench.sent] == [
+        (1_000 + 20 * n) * MS for n in range(1, 5)
+    ]
+    assert bench.moves == [(0.3, 0.0, 0.0)] * 4
+    assert bench.publish is publish_patiently
