@@ -27,6 +27,7 @@ from policy_server.controllers import policies_directory
 from policy_server.policy import Policy
 from tests.ros.controllers import copy_of
 from tests.ros.neighbour import NAMESPACE, ROBOT, Neighbour, Stream, asked_by_neighbour, until
+from tests.ros.recorder import Recorder
 
 real_time = pytest.mark.real_time
 
@@ -213,7 +214,7 @@ def test_where_signatures_are_asked_for_only_a_signed_policy_takes_over(
 
 @real_time
 def test_the_swap_command_waits_for_the_controller_beside_a_recorder_and_asks_again(
-    neighbour: Neighbour, start: Start, record: Callable[..., object], tmp_path: Path, monkeypatch
+    neighbour: Neighbour, start: Start, record: Callable[..., Recorder], tmp_path: Path, monkeypatch
 ) -> None:
     """A recorder subscribes to requests too, and the controller's first look at one may come before it is matched.
 
@@ -232,7 +233,7 @@ def test_the_swap_command_waits_for_the_controller_beside_a_recorder_and_asks_ag
 
     monkeypatch.setattr(ControllerNode, "_on_swap", lossy)
     monkeypatch.setattr(ControllerNode, "_load", counted)
-    record()  # it is there before any controller is
+    record().wait_until_recording()  # it is there before any controller is
     until(lambda: neighbour.node.count_subscribers(f"{NAMESPACE}/{SWAP.name}") > 0)
     person = Operator(neighbour.node)
     with pytest.raises(RunFailed, match="no controller of 'floating_platform'"):
