@@ -16,6 +16,7 @@ from fulmar_benchmarks.every.figures import rows_of
 from fulmar_benchmarks.every.page import page_of
 from fulmar_benchmarks.every.sizes import NAMES, SIZES, options
 from fulmar_benchmarks.pool import measure_all
+from fulmar_benchmarks.shape import HERE
 from fulmar_cli.commands.benchmark import benchmark
 from tests.fulmar_benchmarks.test_cluster import needs_ray
 from tests.fulmar_benchmarks.test_shape import without_moment
@@ -25,7 +26,7 @@ COMMANDS = get_command(benchmark).commands
 
 
 def asked(out, **more):
-    given = {"out": out, "size": "smoke", "only": "inertia,drift,latency", "jobs": 3, "report": False}
+    given = {"out": out, "size": "smoke", "only": "inertia,drift,recorder", "jobs": 3, "report": False}
     return rows()["all"].load()(choice("all", **given | more))
 
 
@@ -66,9 +67,9 @@ def test_the_page_of_measured_figures_is_made_from_its_document():
 def test_each_command_has_the_options_of_its_size_and_what_it_takes_of_ours(ran, tmp_path):
     run(asked(tmp_path, seed=7, ray="10.0.0.1:6379"))
     assert ran.words[0] == "fulmar benchmark drift --through batch --episodes 16 --no-report --seed 7"
-    assert ran.words[2] == "fulmar benchmark latency --rates 50 --seconds 2 --executors events"
+    assert ran.words[2] == "fulmar benchmark recorder --parts lockstep,kills --kills 2 --lockstep-s 20"
     assert ran.more[1] == f"--jobs 3 --ray 10.0.0.1:6379 --out {tmp_path}/inertia"
-    assert ran.more[2] == "", "latency takes none of them"
+    assert ran.more[2] == "", "it takes none of them"
     run(asked(tmp_path, only="inertia", resume=False))
     assert ran.more[-1].endswith("--fresh")
 
@@ -78,7 +79,7 @@ def test_a_benchmark_that_fails_costs_no_other_its_figures_and_is_alone_tried_ag
     broken = run(asked(tmp_path)).document
     texts = {section["title"]: section["text"] for section in broken["sections"]}
     assert texts == {
-        "drift": "1 of 1 met.", "inertia": "Failed: RuntimeError: no memory left", "latency": "1 of 1 met.",
+        "drift": "1 of 1 met.", "inertia": "Failed: RuntimeError: no memory left", "recorder": "1 of 1 met.",
     }  # fmt: skip
     assert (broken["met"], broken["asked"]) == (4, 5), "that it ran is required, too"
     ran.broken, ran.words = {}, []
@@ -94,22 +95,24 @@ def test_one_that_was_interrupted_goes_on_and_gives_an_equal_document(ran, tmp_p
     ran.broken, ran.words = {}, []
     again = run(asked(tmp_path / "broken"))
     assert without_moment(again.document) == without_moment(whole.document)
-    assert [words.split()[2] for words in ran.words] == ["inertia", "latency"]
+    assert [words.split()[2] for words in ran.words] == ["inertia", "recorder"]
 
 
 def test_the_page_has_a_row_for_each_figure_with_its_command(ran, tmp_path):
-    benchmark = asked(tmp_path, only="latency")
+    benchmark = asked(tmp_path, only="recorder")
     assert benchmark.tables(run(benchmark).document) == [
-        "latency     1 of 1 met.",
+        "recorder    1 of 1 met.",
         f"page: {tmp_path}/page.md",
     ]
-    command = "`fulmar benchmark latency --rates 50 --seconds 2 --executors events`"
+    command = "`fulmar benchmark recorder --parts lockstep,kills --kills 2 --lockstep-s 20`"
     row = f"| error | 0.5 | ≤ 1 (required) | yes | {command} | 2026-01-02 abc |"
     assert row in (tmp_path / "page.md").read_text().splitlines()
 
 
 def test_a_command_that_prints_no_document_fails_with_its_last_words(tmp_path):
-    cell = CommandCell("nothing", "smoke", ("fulmar", "benchmark", "nothing"), ())
+    cell = CommandCell(
+        name="nothing", benchmark="nothing", words=("fulmar", "benchmark", "nothing"), where=HERE
+    )
     found = []
     measure_all([cell], jobs=1, progress=lambda done: None, on_done=lambda _, figures: found.append(figures))
     assert "nothing" in found[0]

@@ -18,7 +18,7 @@ from typing import Any
 from fulmar_benchmarks.catalogue import rows
 from fulmar_benchmarks.every.figures import rows_of
 from fulmar_benchmarks.every.page import page_of, write_text
-from fulmar_benchmarks.every.sizes import OPTIONS, SIZES, options
+from fulmar_benchmarks.every.sizes import SIZES, TAKES, options
 from fulmar_benchmarks.outcomes import hash_of
 from fulmar_benchmarks.shape import HERE, Benchmark, Cell, Check, Figures, Found, Progress
 from fulmar_core.config.errors import RunFailed, UnknownNameError
@@ -32,29 +32,13 @@ TEXT = (
 )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class CommandCell(Cell):
     """One benchmark at one size."""
 
     benchmark: str
-    size: str
     words: tuple[str, ...]  # of its command, as they are shown
-    more: tuple[str, ...]  # that figures do not depend on
-
-    @property
-    def where(self) -> str:
-        """In this process: the command has its own, or the cluster."""
-        return HERE
-
-    @property
-    def way(self) -> str:
-        """What most of them depend on."""
-        return "mujoco"
-
-    @property
-    def name(self) -> str:
-        """Of its file."""
-        return f"{self.benchmark}_{self.size}"
+    more: tuple[str, ...] = ()  # that figures do not depend on
 
     def parts(self) -> dict[str, Any]:
         """Its command, and the code of all benchmarks."""
@@ -96,7 +80,7 @@ class Every(Benchmark):
 
     def _cell(self, name: str) -> CommandCell:
         choice, row = self.choice, rows().get(name)
-        takes = {*OPTIONS[name][2].split(), *((*row.shared, "out") if row else ())}
+        takes = {*row.shared, *(() if row.dated else ("out",))} if row else TAKES.get(name, ())
         seed = ["--seed", str(choice.seed)] if "seed" in takes else []
         given: dict[str, Any] = {
             "jobs": choice.jobs,
@@ -106,9 +90,16 @@ class Every(Benchmark):
         more = [
             word for key in given if key in takes and given[key] for word in (f"--{key}", str(given[key]))
         ]
-        more += ["--fresh"] if choice.fresh and takes & {"fresh", "resume"} else []
+        more += ["--fresh"] if choice.fresh and "resume" in takes else []
         words = ("fulmar", "benchmark", name, *options(name, choice.size), *seed)
-        return CommandCell(name, choice.size, words, tuple(more))
+        return CommandCell(
+            name=f"{name}_{choice.size}",
+            where=HERE,
+            way="mujoco",
+            benchmark=name,
+            words=words,
+            more=tuple(more),
+        )
 
     def document(self, found: Found) -> dict[str, Any]:
         """A document as `page_of` takes it: a section for each benchmark."""
