@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import json
-import multiprocessing
 import tempfile
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from fulmar_benchmarks.pool import ended_with_us, one_thread_each
+from fulmar_benchmarks.pool import pool_of
 from fulmar_core.robots.actuators.differential_drive import DifferentialDrive
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_evaluation.driven_run import driven_run
@@ -83,14 +81,16 @@ PLATFORM = "floating_platform"
 def run_identification(
     trials: Sequence[Trial], *, jobs: int, on_done: Callable[[dict[str, Any]], None] = lambda result: None
 ) -> list[dict[str, Any]]:
-    """Run trials in processes of their own; results in the order of the trials."""
+    """Run trials in processes of their own, or on a cluster; results in the order of the trials."""
     results: dict[int, dict[str, Any]] = {}
-    spawn = multiprocessing.get_context("spawn")
-    with one_thread_each(), ended_with_us(ProcessPoolExecutor(jobs, spawn)) as pool:
-        futures = {pool.submit(run_trial, trial): i for i, trial in enumerate(trials)}
-        for future in as_completed(futures):
-            results[futures[future]] = future.result()
-            on_done(future.result())
+
+    def note(index: int, result: Any) -> None:
+        if isinstance(result, Exception):
+            raise result
+        results[index] = result
+        on_done(result)
+
+    pool_of(jobs).run(run_trial, [(trial,) for trial in trials], on_done=note, watch=lambda _: None)
     return [results[i] for i in range(len(trials))]
 
 

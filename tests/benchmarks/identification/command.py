@@ -11,7 +11,7 @@ from rich.table import Table
 
 from fulmar_bringup.console import console, output, print_json
 from fulmar_bringup.progress import work_bar
-from fulmar_cli.commands.arguments import JsonOption, SeedOption
+from fulmar_cli.commands.arguments import JsonOption, RayOption, SeedOption
 from fulmar_core.config.errors import FAILED, UnknownNameError
 
 ROBOTS = ("floating_platform", "kingfisher", "turtlebot2", "jetbot")
@@ -34,6 +34,7 @@ def identify(
     jobs: Annotated[
         int | None, typer.Option(metavar="N", min=1, help="Processes at once; one for each core.")
     ] = None,
+    ray: RayOption = None,
     check: Annotated[
         bool, typer.Option("--check", help="End with code 1 unless everything asked was met.")
     ] = False,
@@ -50,10 +51,11 @@ def identify(
 
     fulmar benchmark identify --robots kingfisher,turtlebot2 --platforms 5
     """
+    from fulmar_benchmarks.pool import on_cluster
     from fulmar_cli.installation.extras import require
     from tests.benchmarks.identification.campaign import Trial, document_of, run_identification
 
-    require("mujoco")
+    require("mujoco", *(["ray"] if ray else []))
     names = ROBOTS if robots == "all" else tuple(dict.fromkeys(name.strip() for name in robots.split(",")))
     for name in names:
         if name not in ROBOTS:
@@ -72,7 +74,7 @@ def identify(
         )
         console.print(f"{result['robot']} {result['number']}: {worst}", markup=False, soft_wrap=True)
 
-    with work_bar("driving") as progress:
+    with on_cluster(ray), work_bar("driving") as progress:
         results = run_identification(trials, jobs=jobs or len(os.sched_getaffinity(0)), on_done=state)
     document = document_of(results, seed=seed)
     if as_json:

@@ -33,7 +33,7 @@ OPTIONS = {  # smoke, quick; full: no options
 TAKES = {
     "estimator": ("seed",),
     "hardware": ("jobs", "out"),
-    "identify": ("seed", "jobs"),
+    "identify": ("seed", "jobs", "ray"),
     "network": ("jobs", "out"),
 }
 NAMES = tuple(OPTIONS)
