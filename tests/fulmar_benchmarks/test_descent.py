@@ -17,7 +17,6 @@ from fulmar_benchmarks.descent.batch import fly_in_batch
 from fulmar_benchmarks.descent.campaign import Descents, requirements, summary
 from fulmar_benchmarks.descent.flights import KILLED_S, Descent, DescentLog, Flights
 from fulmar_benchmarks.descent.live import fly_in_lockstep
-from fulmar_benchmarks.shape import ALONE
 from fulmar_core.config.errors import ConfigError, UnknownNameError
 from fulmar_core.robots.actuators.refuge import StopAtOnce
 from fulmar_core.robots.robot_file import load_robot
@@ -150,7 +149,7 @@ def test_without_a_controller_the_watchdog_acts_at_the_tick_at_which_it_would_by
 
 
 def test_flights_that_were_flown_are_kept_and_a_benchmark_that_was_broken_off_goes_on(tmp_path, monkeypatch):
-    monkeypatch.setattr("fulmar_benchmarks.pool.POOL", ALONE)  # in this process
+    monkeypatch.setattr("fulmar_benchmarks.pool.POOL", "")  # all in this process
     monkeypatch.setattr(
         "fulmar_benchmarks.descent.live.fly_in_lockstep", lambda _, number: replace(GOOD, number=number)
     )

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from fulmar_benchmarks.falcon import cells
-from fulmar_benchmarks.shape import ALONE
 from fulmar_core.tasks import load_task
 from tests.fulmar_cli.command_line import complaint
 
@@ -23,7 +22,7 @@ FIGURES = {
 def brief(monkeypatch):
     """Flights of a second in the place of a minute, in this process."""
     monkeypatch.setattr(cells, "load_task", lambda name: replace(load_task(name), episode_s=1.0))
-    monkeypatch.setattr("fulmar_benchmarks.pool.POOL", ALONE)
+    monkeypatch.setattr("fulmar_benchmarks.pool.POOL", "")
 
 
 def test_a_flight_has_the_stated_keys(fulmar, brief, tmp_path):

@@ -41,7 +41,7 @@ def test_the_real_time_flight_is_held_against_its_own_twin_not_against_the_other
 
 
 def test_flights_that_were_flown_are_kept_and_one_that_failed_is_flown_again(tmp_path, monkeypatch):
-    monkeypatch.setattr("fulmar_benchmarks.pool.POOL", "alone")
+    monkeypatch.setattr("fulmar_benchmarks.pool.POOL", "")
     monkeypatch.setattr(live, "ROS", "alone")
     monkeypatch.setattr(live, "_flown", lambda *_: dict.fromkeys(SHOWN, 1.0))
     failing = [False]

@@ -125,7 +125,7 @@ def test_an_outcome_counts_only_for_what_it_was_made_of(tmp_path, monkeypatch):
 
 
 def test_what_was_evaluated_before_is_taken_from_its_file_unless_it_is_asked_anew(tmp_path, monkeypatch):
-    monkeypatch.setattr("fulmar_benchmarks.pool.POOL", "alone")
+    monkeypatch.setattr("fulmar_benchmarks.pool.POOL", "")
     told = []
     for fresh in (False, False, True):
         given = {"folder": tmp_path, "jobs": 1, "fresh": fresh}

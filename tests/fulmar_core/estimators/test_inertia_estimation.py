@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from filterpy.kalman import ExtendedKalmanFilter
 
-from fulmar_benchmarks.inertia.simulated_runs import WHEEL_STD, measured, simulate
 from fulmar_core.estimators.inertia.batch import batch_fit
 from fulmar_core.estimators.inertia.ekf import OWN as BESIDE
 from fulmar_core.estimators.inertia.ekf import EkfSettings, InertiaFilter, kalman_update
@@ -16,6 +15,7 @@ from fulmar_core.estimators.kinds import load_estimator
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.robots.sensors.imu import ImuSample
 from fulmar_core.robots.sensors.wheels import WheelSpeeds
+from fulmar_core.simulation.satellite_runs import WHEEL_STD, measured, simulate
 from fulmar_core.tasks.torque_profiles import OWN, PROFILES, gain_of, profile_of
 from fulmar_core.wires.reading import Reading
 

@@ -9,7 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fulmar_benchmarks.inertia.simulated_runs import (
+from fulmar_benchmarks.shape import Benchmark, Cell, Check, Figures, Found, Progress, known
+from fulmar_core.estimators.inertia.batch import batch_fit
+from fulmar_core.estimators.inertia.ekf import EkfSettings, InertiaFilter
+from fulmar_core.estimators.inertia.recursive import RecursiveFit
+from fulmar_core.robots.actuators.reaction_wheels import ReactionWheels
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.simulation.satellite_runs import (
     LEVELS,
     SAMPLE_S,
     WHEEL_STD,
@@ -18,12 +24,6 @@ from fulmar_benchmarks.inertia.simulated_runs import (
     simulate,
     wheels_of,
 )
-from fulmar_benchmarks.shape import Benchmark, Cell, Check, Figures, Found, Progress, known
-from fulmar_core.estimators.inertia.batch import batch_fit
-from fulmar_core.estimators.inertia.ekf import EkfSettings, InertiaFilter
-from fulmar_core.estimators.inertia.recursive import RecursiveFit
-from fulmar_core.robots.actuators.reaction_wheels import ReactionWheels
-from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.tasks.torque_profiles import GAINS, OWN, PROFILES
 
 if TYPE_CHECKING:
@@ -47,10 +47,9 @@ FOUND, IN_S, KNOWN = (
 class InertiaCell(Cell):
     """One satellite under every profile, with an inertia that changes in one way or does not."""
 
-    modules = (f"{__package__}.simulated_runs",)
     satellite: str
     profiles: tuple[str, ...]
-    change: str  # of simulated_runs.GROWTHS
+    change: str  # of satellite_runs.GROWTHS
     draws: int  # of sensor noise, of `static`
     seed: int
 

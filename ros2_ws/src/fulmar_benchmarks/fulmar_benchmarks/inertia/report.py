@@ -9,8 +9,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from fulmar_benchmarks.inertia.campaign import METHODS
-from fulmar_benchmarks.inertia.simulated_runs import wheels_of
 from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.simulation.satellite_runs import wheels_of
 from fulmar_core.tasks.torque_profiles import PROFILES, gain_of, profile_of
 from fulmar_evaluation.report.page import Plot
 from fulmar_evaluation.report.style import quiet_grid
