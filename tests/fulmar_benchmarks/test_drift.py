@@ -11,7 +11,6 @@ import pytest
 from rich.console import Console
 from typer.testing import CliRunner
 
-from fulmar_benchmarks.catalogue import Selector, read_names
 from fulmar_benchmarks.drift.cells import path_lines, pose_lines, shown, unmet
 from fulmar_benchmarks.drift.conditions import CONDITIONS, CONTROLLERS, PATHS, ROWS
 from fulmar_benchmarks.drift.targets import (
@@ -24,6 +23,7 @@ from fulmar_benchmarks.drift.targets import (
     published,
     requirements,
 )
+from fulmar_benchmarks.selectors import Selector, read_names
 from fulmar_benchmarks.tables import BAD, GOOD, print_shown
 from fulmar_cli.main import app
 from fulmar_core.config.errors import UnknownNameError

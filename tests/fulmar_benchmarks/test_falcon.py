@@ -7,9 +7,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fulmar_benchmarks.catalogue import choice, read_names, rows
+from fulmar_benchmarks.catalogue import choice, rows
 from fulmar_benchmarks.falcon.campaign import Falcon, ground_effect, requirements
 from fulmar_benchmarks.falcon.cells import SCENARIOS, first_flight
+from fulmar_benchmarks.selectors import read_names
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.simulation.flight_figures import flight_figures as figures
 

@@ -126,11 +126,11 @@ def test_an_outcome_counts_only_for_what_it_was_made_of(tmp_path, monkeypatch):
 
 def test_what_was_evaluated_before_is_taken_from_its_file_unless_it_is_asked_anew(tmp_path, monkeypatch):
     monkeypatch.setattr("fulmar_benchmarks.pool.POOL", "")
-    told = []
+    known = []
     for fresh in (False, False, True):
         given = {"folder": tmp_path, "jobs": 1, "fresh": fresh}
-        measured([unit_of(tmp_path)], **given, on_done=lambda cell, figures, before: told.append(before))
-    assert told == [False, True, False]
+        measured([unit_of(tmp_path)], **given, on_done=lambda cell, figures, before: known.append(before))
+    assert known == [False, True, False]
 
 
 def test_an_outcome_does_not_depend_on_where_the_policy_lies(tmp_path):

@@ -73,10 +73,10 @@ def keep(path: Path, key: str, figures: Figures) -> Figures:
     arrays: list[np.ndarray] = []
     value = _without_arrays(figures, arrays)
     path.parent.mkdir(parents=True, exist_ok=True)
+    written: dict[str, Any] = {KEY: np.array(key), VALUE: np.array(json.dumps(value))}
+    written |= {f"{ARRAY}{number}": array for number, array in enumerate(arrays)}
     with whole_file(path) as file:
-        named: dict[str, Any] = {KEY: np.array(key), VALUE: np.array(json.dumps(value))}
-        named |= {f"{ARRAY}{number}": array for number, array in enumerate(arrays)}
-        np.savez_compressed(file, **named)
+        np.savez_compressed(file, **written)
     return read(path, key) or {}
 
 

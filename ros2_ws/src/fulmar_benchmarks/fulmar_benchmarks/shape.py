@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
+from importlib import import_module
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -81,6 +82,7 @@ class Benchmark:
         name: As in `fulmar benchmark NAME`.
         title: Of its page.
         style: Rules of the page.
+        report: Function that draws its plots, as `module:function`.
         width: Columns of its tables, where the output is not a terminal.
         choice: What is asked for.
     """
@@ -88,6 +90,7 @@ class Benchmark:
     name: ClassVar[str]
     title: str = ""
     style: str = ""
+    report: str = ""
     width: int = 110
 
     def __init__(self, choice: Choice) -> None:
@@ -121,9 +124,17 @@ class Benchmark:
         """Lines and tables, of terminal and page alike."""
         raise NotImplementedError
 
+    def drawn(self, document: Mapping[str, Any], found: Found) -> tuple[Any, ...]:
+        """What `report` gets."""
+        return (document,)
+
     def plots(self, document: Mapping[str, Any], found: Found) -> Sequence[Part]:
         """What is drawn; called inside `house_style`."""
-        return ()
+        module, _, name = self.report.partition(":")
+        if not module:
+            return ()
+        parts: Sequence[Part] = getattr(import_module(module), name)(*self.drawn(document, found))
+        return parts
 
     def conclusion(self, document: Mapping[str, Any]) -> str:
         """One sentence on what was required and met."""

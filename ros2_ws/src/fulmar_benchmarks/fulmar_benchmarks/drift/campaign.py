@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from fulmar_benchmarks.drift.cells import STYLE, conclusion, shown
 from fulmar_benchmarks.drift.conditions import (
@@ -19,6 +19,7 @@ from fulmar_benchmarks.drift.conditions import (
     ROBOT,
 )
 from fulmar_benchmarks.drift.document import Key, document_of
+from fulmar_benchmarks.drift.physics import physics_of
 from fulmar_benchmarks.drift.unit import DriftCell
 from fulmar_benchmarks.pairs import Pair, plan_of, with_law, with_policy
 from fulmar_benchmarks.results import Outcome, PairResult, outcome_of
@@ -29,12 +30,8 @@ from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.simulation.counts import check_episodes
 from fulmar_core.simulation.episode import episode_steps
 from fulmar_core.tasks import load_task
-from fulmar_evaluation.bounds.approach import physics_of
 from fulmar_evaluation.evaluation import Trial
 from policy_server.controllers import policies_directory
-
-if TYPE_CHECKING:
-    from fulmar_evaluation.report.page import Plot
 
 
 class Drift(Benchmark):
@@ -42,6 +39,7 @@ class Drift(Benchmark):
 
     name = "drift"
     title = "Fulmar beside DRIFT"
+    report = "fulmar_benchmarks.drift.report.sections:plots"
     width = 170
 
     def check(self) -> None:
@@ -136,12 +134,10 @@ class Drift(Benchmark):
         """Colours of the bands."""
         return STYLE
 
-    def plots(self, document: Mapping[str, Any], found: Found) -> list[Plot]:
-        """At a glance, over time, starts and paths."""
-        from fulmar_benchmarks.drift.report.sections import plots
-
+    def drawn(self, document: Mapping[str, Any], found: Found) -> tuple[Any, ...]:
+        """Document and outcomes."""
         every = self.outcomes(found)
-        return plots(document, {key: one for key, one in every.items() if isinstance(one, PairResult)})
+        return document, {key: one for key, one in every.items() if isinstance(one, PairResult)}
 
     def said(self, cell: Cell, figures: Figures) -> str:
         """Its main figure."""

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 
 from fulmar_benchmarks.drift.conditions import CONDITIONS, PATHS
+from fulmar_benchmarks.drift.physics import Physics
 from fulmar_benchmarks.drift.targets import FIGURES, TRACKING, band_of, drop_percent, published, requirements
 from fulmar_benchmarks.pairs import Pair
 from fulmar_benchmarks.results import PairResult, statistics
 from fulmar_benchmarks.shape import Choice
-from fulmar_evaluation.bounds.approach import Physics
 
 Key = tuple[str, str]  # row and controller
 # Names of our figures by those of the thesis.

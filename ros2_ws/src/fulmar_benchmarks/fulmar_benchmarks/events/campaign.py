@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from scipy.stats import chi2
@@ -14,9 +14,6 @@ from fulmar_benchmarks.events.pointing import point_without_gyroscope
 from fulmar_benchmarks.events.random_windows import Conditions, measure_window
 from fulmar_benchmarks.shape import Benchmark, Cell, Check, Figures, Found, Progress, known
 from fulmar_core.robots.sensors.catalogue import load_stars
-
-if TYPE_CHECKING:
-    from fulmar_evaluation.report.page import Plot
 
 # Thesis Table 6.2 [deg/s].
 THESIS = {
@@ -85,6 +82,7 @@ class Events(Benchmark):
 
     name = "events"
     title = "Turn rate from the events of stars"
+    report = "fulmar_benchmarks.events.report:plots"
 
     def check(self) -> None:
         """Refuse to begin without a catalogue of stars."""
@@ -191,12 +189,6 @@ class Events(Benchmark):
     def tables(self, document: Mapping[str, Any]) -> list[str]:
         """Lines for a terminal; rates in °/s."""
         return [*lines(document), *self.check_lines(document)]
-
-    def plots(self, document: Mapping[str, Any], found: Found) -> list[Plot]:
-        """Figures like thesis Figs. 6.11, 6.13 and 6.14."""
-        from fulmar_benchmarks.events.report import plots
-
-        return plots(document)
 
 
 def _at_field(usual: Conditions, fov_deg: float) -> Conditions:

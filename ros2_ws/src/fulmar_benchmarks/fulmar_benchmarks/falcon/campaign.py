@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -18,9 +18,6 @@ from fulmar_core.robots.airframe.ground_effect import induced_drag_ratio, lift_r
 from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.robot_file import load_robot
 from policy_server.controllers import shipped_policy
-
-if TYPE_CHECKING:
-    from fulmar_evaluation.report.page import Plot
 
 HEIGHTS_M = (1.0, 2.5, 5.0, 10.0, 100.0)  # of thesis Table 5.2
 THESIS_ENERGY = (0.303, 0.590, 0.689, 0.723, 0.743)  # same
@@ -45,6 +42,7 @@ class Falcon(Benchmark):
     """Every task by every controller in every scenario, and ground effect over height."""
 
     name = "falcon"
+    report = "fulmar_benchmarks.falcon.report:plots"
     width = 130
 
     @property
@@ -107,11 +105,9 @@ class Falcon(Benchmark):
         """Every figure beside the thesis', then what is required."""
         return [*lines(document), *self.check_lines(document)]
 
-    def plots(self, document: Mapping[str, Any], found: Found) -> list[Plot]:
-        """Errors, flights and ground effect."""
-        from fulmar_benchmarks.falcon.report import plots
-
-        return plots(document, self._flights(found))
+    def drawn(self, document: Mapping[str, Any], found: Found) -> tuple[Any, ...]:
+        """Document and flights."""
+        return document, self._flights(found)
 
     def _flights(self, found: Found) -> Flights:
         """A flight of each task by each controller, in calm if flown."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -25,9 +25,6 @@ from fulmar_core.simulation.satellite_runs import (
     wheels_of,
 )
 from fulmar_core.tasks.torque_profiles import GAINS, OWN, PROFILES
-
-if TYPE_CHECKING:
-    from fulmar_evaluation.report.page import Plot
 
 SATELLITES = tuple(GAINS)
 METHODS = ("ls", "rls", "ekf")
@@ -75,6 +72,7 @@ class Inertia(Benchmark):
 
     name = "inertia"
     title = "Inertia of satellites from wheels and gyroscope"
+    report = "fulmar_benchmarks.inertia.report:plots"
 
     def cells(self) -> list[InertiaCell]:
         """Every satellite, static and changing."""
@@ -118,12 +116,6 @@ class Inertia(Benchmark):
     def tables(self, document: Mapping[str, Any]) -> list[str]:
         """Lines for a terminal; errors in percent."""
         return [*lines(document), *self.check_lines(document)]
-
-    def plots(self, document: Mapping[str, Any], found: Found) -> list[Plot]:
-        """Figures like thesis Figs. 6.7, 6.8 and 6.9."""
-        from fulmar_benchmarks.inertia.report import plots
-
-        return plots(document)
 
 
 def _errors(satellite: str, run: Run, level: str, draws: int, seed: int) -> dict[str, Any]:

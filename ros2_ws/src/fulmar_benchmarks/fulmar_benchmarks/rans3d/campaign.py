@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 from fulmar_benchmarks.pairs import Pair, plan_of, with_law, with_policy
 from fulmar_benchmarks.rans3d.bound import BoundCell, bound_cell
@@ -31,9 +31,6 @@ from fulmar_core.simulation.episode import episode_steps
 from fulmar_core.tasks import load_task
 from policy_server.controllers import policies_directory
 
-if TYPE_CHECKING:
-    from fulmar_evaluation.report.page import Plot
-
 WAY = "mujoco"
 
 
@@ -42,6 +39,7 @@ class Rans3d(Benchmark):
 
     name = "rans3d"
     title = "Fulmar at the 3-D tasks of RANS"
+    report = "fulmar_benchmarks.rans3d.report.plots:plots"
     width = 180
 
     @functools.cached_property
@@ -123,12 +121,10 @@ class Rans3d(Benchmark):
         """One sentence on what was required and met."""
         return conclusion(document)
 
-    def plots(self, document: Mapping[str, Any], found: Found) -> list[Plot]:
-        """At a glance, and over time."""
-        from fulmar_benchmarks.rans3d.report.plots import plots
-
+    def drawn(self, document: Mapping[str, Any], found: Found) -> tuple[Any, ...]:
+        """Document and outcomes."""
         every = self.outcomes(found)
-        return plots(document, {key: one for key, one in every.items() if isinstance(one, PairResult)})
+        return document, {key: one for key, one in every.items() if isinstance(one, PairResult)}
 
     def said(self, cell: Cell, figures: Figures) -> str:
         """Its success."""

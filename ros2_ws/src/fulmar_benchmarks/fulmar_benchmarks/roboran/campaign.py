@@ -6,7 +6,7 @@ import functools
 import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from fulmar_benchmarks.pairs import Pair, cells_of, find_pair
 from fulmar_benchmarks.results import Outcome, PairResult, outcome_of
@@ -21,9 +21,6 @@ from fulmar_core.tasks import load_task
 from fulmar_core.worlds.scenario import load_scenario
 from fulmar_evaluation.evaluation import BATCH_EPISODES
 from fulmar_evaluation.evaluation import EPISODES as MUJOCO_EPISODES
-
-if TYPE_CHECKING:
-    from fulmar_evaluation.report.page import Part
 
 EPISODES = {"batch": BATCH_EPISODES, "mujoco": MUJOCO_EPISODES, "ros": 16}
 
@@ -42,6 +39,7 @@ class Roboran(Benchmark):
 
     name = "roboran"
     title = "Fulmar beside RoboRAN"
+    report = "fulmar_benchmarks.roboran.report.sections:plots"
     width = 140
 
     @property
@@ -108,17 +106,15 @@ class Roboran(Benchmark):
         """One sentence on what was required and met."""
         return conclusion(document)
 
-    def plots(self, document: Mapping[str, Any], found: Found) -> list[Part]:
-        """At a glance, and every task."""
-        from fulmar_benchmarks.roboran.report.sections import plots
-
+    def drawn(self, document: Mapping[str, Any], found: Found) -> tuple[Any, ...]:
+        """Findings."""
         evaluated = {
             pair: {
                 way: one for way, one in self._outcomes(found, pair).items() if isinstance(one, PairResult)
             }
             for pair in self.pairs
         }
-        return plots(Findings(document, self.pairs, evaluated))
+        return (Findings(document, self.pairs, evaluated),)
 
     def said(self, cell: Cell, figures: Figures) -> str:
         """Its success."""

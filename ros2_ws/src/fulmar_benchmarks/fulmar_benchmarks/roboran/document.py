@@ -15,7 +15,7 @@ from fulmar_core.simulation.metrics import summarise
 from fulmar_evaluation.evaluation import share_of_mean
 
 Z95 = 1.96
-VERDICT = ("name", "measured", "limit", "met")
+OF_A_CHECK = ("name", "measured", "limit", "met")
 
 
 def pair_entry(pair: Pair, outcomes: dict[str, PairResult | str]) -> dict[str, Any]:
@@ -53,7 +53,7 @@ def pair_entry(pair: Pair, outcomes: dict[str, PairResult | str]) -> dict[str, A
         "ways": {way: _way(outcome) for way, outcome in evaluated.items()},
         "thesis": dataclasses.asdict(thesis_row(pair.robot, pair.task))
         | {"time_to_target_s": thesis_row(pair.robot, pair.task).time_to_target_s},
-        "verdicts": [{key: getattr(check, key) for key in VERDICT} for check in checks],
+        "verdicts": [{key: getattr(check, key) for key in OF_A_CHECK} for check in checks],
         "met": None if not met or None in met else all(met),
     }
 

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 import typer.core
 
-from fulmar_benchmarks.catalogue import SHARED, Row, Selector, choice, no_such_selector, owners
+from fulmar_benchmarks.catalogue import SHARED, choice, no_such_selector, owners
+from fulmar_benchmarks.selectors import Row, Selector
 from fulmar_bringup.console import log_line, output, print_result
 from fulmar_bringup.progress import work_bar
 from fulmar_cli.commands.arguments import JsonOption, invoked_command

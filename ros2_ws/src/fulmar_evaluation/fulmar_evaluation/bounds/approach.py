@@ -13,18 +13,15 @@ line comes up to the bound within one control step (`tests/fulmar_benchmarks/tes
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from fulmar_core.config.errors import ConfigError
 from fulmar_core.robots.actuators.thrusters import Thrusters
 from fulmar_core.robots.robot import Robot
-from fulmar_core.simulation.episode import Episode, episode_steps
+from fulmar_core.simulation.episode import Episode
 from fulmar_core.states.planar import at_rest
 from fulmar_core.worlds.holdability import LEAST_MARGIN, hold_margin
 from fulmar_core.worlds.world import World, outside_wrench
-from fulmar_evaluation.evaluation import Trial
 
 # Directions about the line to the goal that are tried; the strictest counts [rad].
 DIRECTIONS = np.deg2rad(np.arange(-60.0, 61.0, 5.0))
@@ -134,26 +131,3 @@ def can_hold_episodes(robot: Robot, drawn: Episode) -> np.ndarray:
             )
         able[i] = known[key]
     return able
-
-
-RADII = {"PT5": 0.05, "PT2": 0.02, "PT1": 0.01}  # [m]
-
-
-@dataclass(frozen=True)
-class Physics:
-    """Bounds and feasibility of some episodes."""
-
-    bounds: dict[str, np.ndarray]  # most of PT5, PT2 and PT1, shapes (episodes,) [%]
-    can_hold: np.ndarray  # whether the goal's pose can be held there, shape (episodes,)
-
-
-def physics_of(trial: Trial) -> Physics:
-    """Bound and decide every episode of a trial that goes to poses."""
-    robot, drawn = trial.robot, trial.drawn(np.arange(trial.episodes))
-    dt = robot.timing.substeps(trial.plan.control_hz) * robot.timing.physics_dt
-    steps = episode_steps(trial.task, dt)
-    bounds = {
-        name: approach_bound(robot, drawn, radius=radius, steps=steps, control_dt=dt)
-        for name, radius in RADII.items()
-    }
-    return Physics(bounds, can_hold_episodes(robot, drawn))
