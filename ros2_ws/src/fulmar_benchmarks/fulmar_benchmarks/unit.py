@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -48,7 +48,7 @@ class Extra:
 class TrialCell(Cell):
     """A trial of a pair: run it in one way, evaluate it, keep what tables and plots need."""
 
-    modules = ("fulmar_benchmarks.results",)
+    modules: ClassVar[tuple[str, ...]] = ("fulmar_benchmarks.results",)
     trial: Trial
     defines: str  # hash of the controller
     bounds: Path  # folder of bounds, which several cells share

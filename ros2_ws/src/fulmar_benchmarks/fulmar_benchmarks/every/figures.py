@@ -89,7 +89,7 @@ def _published(path: tuple[str, ...], each: dict[str, Any], source: str) -> Iter
 def _ours(figure: str, each: dict[str, Any]) -> float | None:
     """Our figure beside a published one: in the same object, among its figures, or of the first way of running."""
     for place in (each, each.get("figures", {}), *each.get("ways", {}).values()):
-        value = place.get(figure, place.get(OURS.get(figure, "")))
+        value: Any = place.get(figure, place.get(OURS.get(figure, "")))
         value = value.get("mean") if isinstance(value, dict) else value
         if _is_number(value):
             return float(value)

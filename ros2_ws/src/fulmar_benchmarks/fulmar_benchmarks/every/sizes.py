@@ -23,6 +23,7 @@ OPTIONS = {  # smoke, quick; full: no options
     "inertia": ("--satellites microsat --draws 1 --no-report", "--draws 1"),
     "latency": ("--rates 50 --seconds 2 --executors events", "--rates 50"),
     "network": ("--episodes 1 --seconds 10", "--episodes 8 --seconds 18"),
+    "pace": ("--systems floating_platform_policy --steps 200 --seconds 2", "--steps 1000 --seconds 10"),
     "rans3d": (_RANS_FEW, _RANS),
     "recorder": ("--parts lockstep,kills --kills 2 --lockstep-s 20", "--loss-s 60 --kills 10"),
     "roboran": ("--through batch --episodes 64 --no-report", "--episodes 256"),

@@ -86,7 +86,7 @@ class Latency(Benchmark):
         rows = [Row(tuple(map(Entry, _written(row)))) for row in document["cells"]]
         return [Table(title, HEADS, rows, words=2), *self.check_lines(document)]
 
-    def said(self, cell: LatencyCell, figures: Figures) -> str:
+    def said(self, cell: Cell, figures: Figures) -> str:
         """Its latency."""
         return figures["failure"] or f"p99 {number(figures['latency_ms']['p99'], 2, '-')} ms"
 

@@ -45,28 +45,15 @@ REAL_TIME_HZ = 50.0
 SHARE, LATENCY_P99_MS, PERIOD_P99_MS = 0.9, 1.0, 0.05  # aims
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class PaceCell(Cell):
     """One system in lock step, then its messages between two bare nodes."""
 
     modules = (f"{__package__}.bare_pair",)
+    where: str = ALONE
+    way: str = "ros"
     system: str
     steps: int
-
-    @property
-    def name(self) -> str:
-        """File name without suffix."""
-        return self.system
-
-    @property
-    def where(self) -> str:
-        """It needs the whole computer."""
-        return ALONE
-
-    @property
-    def way(self) -> str:
-        """Through ROS all of Fulmar counts."""
-        return "ros"
 
     def measure(self, progress: Progress, pool: Any = None) -> Figures:
         """Steps a second of the system, with its recorder, and of the bare pairs."""
@@ -85,27 +72,14 @@ class PaceCell(Cell):
         return {"steps_per_s": pace, "bare_steps_per_s": bare, "messages_a_step": count}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class RealTimeCell(Cell):
     """An LQR in real time."""
 
+    where: str = ALONE
+    way: str = "ros"
     seconds: float
     steps: int = 0
-
-    @property
-    def name(self) -> str:
-        """File name without suffix."""
-        return "real_time"
-
-    @property
-    def where(self) -> str:
-        """It needs the whole computer."""
-        return ALONE
-
-    @property
-    def way(self) -> str:
-        """Through ROS all of Fulmar counts."""
-        return "ros"
 
     def measure(self, progress: Progress, pool: Any = None) -> Figures:
         """Latency from state to command, and errors of the period [ms]."""
@@ -191,8 +165,8 @@ class Pace(Benchmark):
     def cells(self) -> list[PaceCell | RealTimeCell]:
         """Each system, then real time."""
         asked = self.choice
-        real = [RealTimeCell(asked.seconds)] if asked.seconds else []
-        return [*(PaceCell(system, asked.steps) for system in asked.systems), *real]
+        real = [RealTimeCell(name="real_time", seconds=asked.seconds)] if asked.seconds else []
+        return [*(PaceCell(name=system, system=system, steps=asked.steps) for system in asked.systems), *real]
 
     def document(self, found: Found) -> dict[str, Any]:
         """Figures by system."""

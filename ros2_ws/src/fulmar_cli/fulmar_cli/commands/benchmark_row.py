@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import inspect
 from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -68,9 +69,8 @@ def _parameter(selector: Selector, row: Row) -> inspect.Parameter:
     if selector.name == "out":
         place = "<time>..." if row.dated else row.name
         words["help"] = f"{selector.help} runs/benchmark/{place} by default."
-    option = (
-        typer.Argument(**words) if selector.positional else typer.Option(*selector.names, **words, **given)
-    )
+    declared: Any = typer.Argument if selector.positional else partial(typer.Option, *selector.names)
+    option = declared(**words) if selector.positional else declared(**words, **given)
     kind = selector.kind if default is not None else selector.kind | None
     return inspect.Parameter(
         selector.name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=Annotated[kind, option]

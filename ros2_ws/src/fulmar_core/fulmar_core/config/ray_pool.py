@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import socket
 import time
@@ -43,7 +44,7 @@ class RayPool:
             ray.init(
                 address=address,
                 log_to_driver=False,
-                logging_level="ERROR",
+                logging_level=logging.ERROR,
                 runtime_env={"env_vars": variables},
             )
         except (Exception, SystemExit) as error:  # Ray ends the process where a node is gone
@@ -57,7 +58,7 @@ class RayPool:
         self, function: Callable[..., Any], items: Sequence[Item], *, on_done: OnDone, watch: Watch
     ) -> None:
         """See `Pool.run`; a call that raises gives a RunFailed with its words."""
-        board, code = _Board.remote(), _code()
+        board, code = _Board.remote(), _code()  # type: ignore[attr-defined] # by its decorator
         calls = [_call.remote(board, code, index, function, item) for index, item in enumerate(items)]
         try:
             futures = {call.future(): index for index, call in enumerate(calls)}
