@@ -150,7 +150,7 @@ def test_a_tank_that_cannot_be_is_refused(changed, said):
         Tank(**{"volume": 1e-3, "pressure": 3e7, "regulated": 8e5, "specific_impulse": 50.0} | changed)
 
 
-def test_a_pressure_is_judged_once_and_its_warning_stays_until_the_next():
+def test_a_pressure_is_checked_once_and_its_warning_stays_until_the_next():
     asked: list[float] = []
 
     def warning(pressure):
