@@ -347,8 +347,8 @@ class ControllerNode(LifecycleNode):
             self._status.inference_ms.add(took_ns / 1e6)
             try:
                 guard.watch(inputs, step)
-            except TaskError as error:
-                self._give_up(str(error), stamp)
+            except Exception as error:  # noqa: BLE001 - as above
+                self._give_up(f"progress cannot be seen: {error}", stamp)
                 return
             self.wires.publish_reasoning(step.observation[0], step.action.ravel(), stamp)
             self._publish_believed(inputs, stamp)

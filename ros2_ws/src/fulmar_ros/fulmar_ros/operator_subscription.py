@@ -20,6 +20,7 @@ from fulmar_ros.qos import AT_ONCE, STREAM_DEPTH, subscriber_qos
 
 # Asks rclpy for message info.
 _WITH_INFO = inspect.signature(lambda message, info: None)
+SETTLED_S = 0.1  # after the match of a publisher, until subscriptions are made for it
 SUBSCRIPTIONS = 2  # of one latched wire, as its latched publishers count them
 # Messages by which a second delivery is recognised; the middleware keeps no more for a reader
 REMEMBERED = 5000
@@ -76,7 +77,7 @@ def subscribe_every(
                     node.create_subscription(kind, name, receive, qos, raw=raw, event_callbacks=events)
                 )
 
-    def add_best_effort(_event: Any = None) -> None:
+    def add_best_effort() -> None:
         add("best effort", reliable=False, latched=False, events=SubscriptionEventCallbacks())
 
     def add_latched() -> None:
@@ -84,13 +85,14 @@ def subscribe_every(
         quiet = SubscriptionEventCallbacks(use_default_callbacks=False)
         add("latched", reliable=True, latched=True, events=quiet)
 
-    def on_publisher(_event: Any) -> None:
+    def add_latched_if_offered() -> None:
         if "latched" not in kinds and _is_offered_latched(node, topic or wire.name):
             add_latched()
 
     on_demand = wire.delivery == "latched" and wire.source == "operator" and wire not in AT_ONCE
     events = SubscriptionEventCallbacks(
-        incompatible_qos=add_best_effort, matched=on_publisher if on_demand else None
+        incompatible_qos=_once_settled(node, add_best_effort),
+        matched=_once_settled(node, add_latched_if_offered) if on_demand else None,
     )
     add("usual", reliable=True, latched=False, events=events)
     if wire.delivery == "latched" and not on_demand:
@@ -98,6 +100,23 @@ def subscribe_every(
     if wire in AT_ONCE:
         add_best_effort()
     return made
+
+
+def _once_settled(node: Node, add: Callable[[], None]) -> Callable[[Any], None]:
+    """A callback of an event that adds a subscription a moment later.
+
+    Where a subscription is made while its executor serves the event of a match, and further matches arrive, the process
+    crashes within seconds (EventsExecutor of rclpy 7.1.6, Fast DDS: a segmentation fault in whatever runs then).
+    """
+
+    def on_event(_event: Any) -> None:
+        def add_once() -> None:
+            node.destroy_timer(timer)
+            add()
+
+        timer = node.create_timer(SETTLED_S, add_once, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    return on_event
 
 
 def _is_offered_latched(node: Node, topic: str) -> bool:
