@@ -173,7 +173,7 @@ else code=$$?; echo; \
 endef
 
 .PHONY: test
-test: dev ## Run the tests, without those that take more than ten seconds
+test: dev ## Run the tests, without those that take over 1.5 s of processor time
 	@$(call run_tests,-m "not slow")
 
 .PHONY: test-all

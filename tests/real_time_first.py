@@ -48,6 +48,11 @@ class RealTimeFirst(LoadFileScheduling):  # type: ignore[misc]  # xdist has no t
             self._go_on()
         return crashed
 
+    def _reschedule(self, node: Any) -> None:
+        """Give a process more work; one that replaces another has none before it has collected."""
+        if node in self.registered_collections:
+            super()._reschedule(node)
+
     def _go_on(self) -> None:
         """Give everybody work; twice, since a process begins its last test when it knows of one more."""
         for _ in range(2):

@@ -17,7 +17,7 @@ from rich.console import Console
 from fulmar_benchmarks import outcomes
 from fulmar_benchmarks.campaign import measured, run, write
 from fulmar_benchmarks.catalogue import choice, rows
-from fulmar_benchmarks.outcomes import keys_of
+from fulmar_benchmarks.outcomes import keep, keys_of, read
 from fulmar_benchmarks.shape import Check
 from fulmar_benchmarks.tables import Entry, Row, Table, print_shown, shown_as_html
 from fulmar_core.config.errors import ConfigError, RunFailed, UnknownNameError
@@ -70,6 +70,17 @@ def test_a_torn_outcome_is_set_aside_in_one_line_and_measured_again(tmp_path, ca
     assert line.startswith("warning: ")
     assert "is now cell_2.npz.torn, and is measured again" in line
     assert noted(tmp_path)[3:] == ["2"]
+
+
+def test_whatever_bits_of_an_outcome_are_flipped_it_is_the_same_or_set_aside(tmp_path):
+    path = tmp_path / "one.npz"
+    figures = {"name": "x", "numbers": np.arange(40.0)}
+    keep(path, "key", figures)
+    whole = path.read_bytes()
+    for place in range(0, len(whole), 7):
+        path.write_bytes(whole[:place] + bytes([whole[place] ^ 0xFF]) + whole[place + 1 :])
+        found = read(path, "key")
+        assert found is None or found["name"] == "x"
 
 
 def test_a_cell_that_fails_costs_no_other_its_figures_and_is_tried_again(tmp_path):

@@ -491,6 +491,26 @@ def test_a_robot_that_another_one_drives_is_not_said_not_to_converge():
         assert bench.step()[0].may_act
 
 
+def test_a_report_that_comes_before_its_step_is_seen_is_of_no_other():
+    """The plant may report a command while the controller still looks at its step."""
+    history = AppliedHistory(S)
+    bench = Bench(applied=history)
+    bench.give()
+    act = bench.guard.act
+
+    def act_and_report(inputs):
+        step = act(inputs)
+        history.add(bench.now_ns, step.command[0])
+        return step
+
+    bench.guard.act = act_and_report
+    for number in range(600):
+        bench.controller.answer = FAST[0] * (1.0 - 1e-3 * (number % 97)), FAST[1]
+        if not bench.step()[0].may_act:
+            return
+    pytest.fail("it was taken for one that others drive")
+
+
 def test_a_gentle_controller_is_not_said_not_to_converge():
     bench = Bench()
     bench.give()

@@ -10,6 +10,7 @@ import pytest
 
 from fulmar_core.states import plain_numbers
 from fulmar_core.states.arrays import array_namespace, clip, is_number, is_single, power
+from fulmar_core.states.attitude import from_euler, length
 
 NUMPY = array_api_compat.array_namespace(np.zeros(1))
 RANGES = {
@@ -60,3 +61,10 @@ def test_single_precision_is_not_computed_in_plain_numbers():
     assert not is_single(np.zeros(1, dtype=np.float32))
     assert not is_single(np.zeros(2))
     assert not is_single(0.0)
+
+
+def test_a_vector_of_a_number_and_arrays_is_turned_as_one_of_arrays():
+    yaw = np.linspace(-2.0, 2.0, 5)
+    mixed, arrays = from_euler(0.0, 0.0, yaw), from_euler(0.0 * yaw, 0.0 * yaw, yaw)
+    np.testing.assert_array_equal(np.broadcast_arrays(*mixed), arrays)
+    np.testing.assert_array_equal(length((0.0, yaw, yaw)), length((0.0 * yaw, yaw, yaw)))

@@ -119,6 +119,18 @@ def test_motion_of_targets_is_their_difference_and_a_jump_is_none():
     assert not stacked(motion.update(np.stack((here, here)), 0, 0.2)).any()
 
 
+def test_a_goal_that_comes_a_step_late_asks_for_no_force():
+    """One that comes twice and then leaps: its velocity jumps by itself, and nothing bends like that."""
+    motion = TargetMotion(speed=0.4, rate=0.6, acceleration=0.12, turning=0.3)
+    found = []
+    for step, shown in enumerate((0, 1, 2, 3, 3, 5, 6)):
+        target = SpatialState.target_at((0.02 * shown, 0.0, 0.0, 0.0, 0.0, 0.0))[None]
+        found.append(motion.update(target, (1 + step) * 200_000_000, 0.2).change)
+    assert np.abs(found).max() < 1e-9
+    bent = SpatialState.target_at((0.14, 0.004, 0.0, 0.0, 0.0, 0.0))[None]
+    assert motion.update(bent, 8 * 200_000_000, 0.2).change[0, 1] == pytest.approx(0.1)
+
+
 def test_motion_goes_by_the_time_that_has_passed():
     motion = TargetMotion(speed=0.4, rate=0.6)
     begin, step_ns = 3_000_000_000, 200_000_000

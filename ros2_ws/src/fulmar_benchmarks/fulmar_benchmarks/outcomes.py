@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import inspect
 import json
-import zipfile
 from collections.abc import Iterable
 from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
@@ -21,7 +20,13 @@ from fulmar_core.config.paths import config_files
 
 _BATCH = ("fulmar_core", "fulmar_evaluation", "policy_server")
 # Packages whose code figures depend on, by the way of running.
-PACKAGES = {"batch": _BATCH, "mujoco": (*_BATCH, "sim_nodes"), "ros": (*_BATCH, "sim_nodes")}
+_NODES = ("fulmar_ros", "fulmar_bringup", "fulmar_bags")
+PACKAGES = {
+    "batch": _BATCH,
+    "mujoco": (*_BATCH, "sim_nodes"),
+    "ros": (*_BATCH, "sim_nodes", *_NODES),
+    "training": (*_BATCH, "training"),
+}
 FAMILIES = ("robots", "tasks", "scenarios", "controllers", "goals", "estimators")  # of configs
 COMPUTING = ("numpy", "onnxruntime", "mujoco")  # libraries whose version is part of a key
 ARRAY, KEY, VALUE = "array", "key", "value"
@@ -84,14 +89,14 @@ def read(path: Path, key: str) -> Figures | None:
     """Figures under a key, if an earlier run kept them; a file that is torn is set aside, and said."""
     try:
         with np.load(path, allow_pickle=False) as file:
-            if str(file[KEY]) != key:
+            if KEY not in file.files or str(file[KEY]) != key:
                 return None
             arrays = [file[f"{ARRAY}{number}"] for number in range(len(file.files) - 2)]
             figures: Figures = _with_arrays(json.loads(str(file[VALUE])), arrays)
             return figures
     except FileNotFoundError:
         return None
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+    except Exception:  # noqa: BLE001 - zlib, zipfile, json and NumPy raise whatever they meet
         aside = path.with_suffix(f"{path.suffix}.torn")
         path.replace(aside)
         log_line(f"warning: {path} is no whole outcome; it is now {aside.name}, and is measured again")

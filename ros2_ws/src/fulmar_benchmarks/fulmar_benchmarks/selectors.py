@@ -70,7 +70,7 @@ class Selector:
             raise ConfigError(
                 f"--{self.name} = '{text}' must be numbers from {low:g} to {high:g}, with commas between."
             )
-        return values
+        return tuple(dict.fromkeys(values))
 
 
 def known_names(place: str) -> tuple[str, ...]:

@@ -59,7 +59,7 @@ class Training(Benchmark):
         groups = [tuple(self._jobs[first : first + step]) for first in range(0, len(self._jobs), step)]
         return [
             TrainingCell(
-                name="_".join(job.name.replace(" ", "_") for job in group), where=ALONE, jobs=group,
+                name="_".join(job.name.replace(" ", "_") for job in group), where=ALONE, way="training", jobs=group,
                 at_once=self.choice.at_once,
             )
             for group in groups

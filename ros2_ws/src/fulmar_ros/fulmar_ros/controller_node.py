@@ -347,7 +347,8 @@ class ControllerNode(LifecycleNode):
             self._status.inference_ms.add(took_ns / 1e6)
             try:
                 guard.watch(inputs, step)
-            except Exception as error:  # noqa: BLE001 - as above
+            except Exception as error:  # noqa: BLE001 - as above; the safe command follows that of the controller
+                guard.loop.rest(stamp)
                 self._give_up(f"progress cannot be seen: {error}", stamp)
                 return
             self.wires.publish_reasoning(step.observation[0], step.action.ravel(), stamp)

@@ -12,6 +12,7 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -19,13 +20,14 @@ from fulmar_benchmarks.catalogue import rows
 from fulmar_benchmarks.every.figures import rows_of
 from fulmar_benchmarks.every.page import page_of, write_text
 from fulmar_benchmarks.every.sizes import SIZES, TAKES, options
-from fulmar_benchmarks.outcomes import hash_of
-from fulmar_benchmarks.shape import HERE, Benchmark, Cell, Check, Figures, Found, Progress
+from fulmar_benchmarks.outcomes import PACKAGES, hash_of
+from fulmar_benchmarks.shape import AGAIN, HERE, Benchmark, Cell, Check, Figures, Found, Progress
 from fulmar_core.config.errors import RunFailed, UnknownNameError
 from fulmar_core.config.process import end_with
 from fulmar_core.config.provenance import git_revision
 
 PACKAGE = Path(__file__).parents[1]
+CODE = (*PACKAGES["ros"], "fulmar_benchmarks", "hardware_drivers", "training", "tests.benchmarks")
 TEXT = (
     "Each row names the command that repeats it, the day and the revision. "
     "Met: ours is at least as good as what is published or required."
@@ -42,7 +44,9 @@ class CommandCell(Cell):
 
     def parts(self) -> dict[str, Any]:
         """Its command, and the code of all benchmarks."""
-        files = [path for path in sorted(PACKAGE.rglob("*.py")) if "every" not in path.parts]
+        folders = [Path(find_spec(name).submodule_search_locations[0]) for name in CODE]  # type: ignore[union-attr,index]
+        files = [path for folder in folders for path in sorted(folder.rglob("*.py"))]
+        files = [path for path in files if not path.is_relative_to(PACKAGE / "every")]
         return {"words": self.words, "code": hash_of(*(path.read_text(encoding="utf-8") for path in files))}
 
     def measure(self, progress: Progress, pool: Any = None) -> Figures:
@@ -61,7 +65,11 @@ class CommandCell(Cell):
         except ValueError:
             last = done.stderr.strip().splitlines()[-1:]
             raise RunFailed(last[0] if last else f"ended with code {done.returncode}") from None
-        return {"document": document, "made": f"{time.strftime('%Y-%m-%d')} {git_revision()}".strip()}
+        return {
+            AGAIN: bool(document.get("open")),
+            "document": document,
+            "made": f"{time.strftime('%Y-%m-%d')} {git_revision()}".strip(),
+        }
 
 
 class Every(Benchmark):

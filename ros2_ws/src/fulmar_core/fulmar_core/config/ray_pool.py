@@ -63,9 +63,9 @@ class RayPool:
         try:
             futures = {call.future(): index for index, call in enumerate(calls)}
             for future in as_they_end(futures, lambda: watch(_read(board))):
-                if (error := future.exception()) is not None:
-                    raise RunFailed(f"a worker process of the Ray cluster was lost: {_first_line(error)}")
-                on_done(futures[future], future.result())
+                error = future.exception()
+                lost = f"a worker process of the Ray cluster was lost: {_first_line(error)}" if error else ""
+                on_done(futures[future], RunFailed(lost) if lost else future.result())
         finally:
             for call in calls:  # nothing to those that are done
                 ray.cancel(call, force=True)
@@ -120,5 +120,5 @@ def _call(board: Any, code: str, index: int, function: Callable[..., Any], item:
         return function(*item)
     except FulmarError as error:
         return RunFailed(str(error))
-    except Exception as error:  # noqa: BLE001 - whoever asked decides
+    except Exception as error:  # noqa: BLE001 - the caller decides
         return RunFailed(_first_line(error))

@@ -51,10 +51,15 @@ class SpaceLaw(Law):
         self.frame = SpaceFrame(self.task)
         self._modulation: DeltaSigma | None = None
         can = self.robot.performance
-        self._target = TargetMotion(speed=can.speed, rate=can.yaw_rate)
+        self._largest_inertia = float(np.linalg.eigvalsh(self.robot.body.inertia_matrix)[-1])
+        self._target = TargetMotion(
+            speed=can.speed,
+            rate=can.yaw_rate,
+            acceleration=can.turning_acceleration,
+            turning=can.torque / self._largest_inertia,
+        )
         self._com = np.array(self.robot.body.com)
         self._inertia = self.robot.body.inertia_matrix
-        self._largest_inertia = float(np.linalg.eigvalsh(self._inertia)[-1])
 
     def allocate_by(self, weight: np.ndarray, *, lead: float, turn_lead: float) -> None:
         """Prepare the allocation and the limits of the errors.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,13 +35,18 @@ class TargetMotion:
     Targets that stand still have exactly no motion.
     """
 
-    def __init__(self, *, speed: float, rate: float) -> None:
+    def __init__(
+        self, *, speed: float, rate: float, acceleration: float = math.inf, turning: float = math.inf
+    ) -> None:
         """Begin without a target.
 
         Args:
             speed: Beyond it a target has jumped [m/s].
             rate: Same of its attitude [rad/s].
+            acceleration: Beyond it a target does not bend: it came a step late or early [m/s²].
+            turning: Same of its turn rate [rad/s²].
         """
+        self._acceleration, self._turning = ROUNDING * acceleration, ROUNDING * turning
         self._speed, self._rate = ROUNDING * speed, ROUNDING * rate
         self._before: np.ndarray | None = None
         self._differences: tuple[np.ndarray, float] | None = None
@@ -82,4 +88,9 @@ class TargetMotion:
             return Moved(now, np.zeros_like(now), elapsed)
         # Of two steps that both follow; what begins or ends to move makes a jump of its velocity, and no acceleration.
         change = (now - earlier[0]) / (0.5 * (elapsed + earlier[1]))
-        return Moved(now, change * (np.any(now, axis=-1) & np.any(earlier[0], axis=-1))[:, None], elapsed)
+        bends = (np.linalg.norm(change[:, :3], axis=-1) <= self._acceleration) & (
+            np.linalg.norm(change[:, 3:], axis=-1) <= self._turning
+        )
+        return Moved(
+            now, change * (bends & np.any(now, axis=-1) & np.any(earlier[0], axis=-1))[:, None], elapsed
+        )

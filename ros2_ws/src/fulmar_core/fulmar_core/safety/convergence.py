@@ -185,7 +185,7 @@ class ConvergenceWatch:
 
     def see(self, inputs: Inputs, command: np.ndarray) -> None:
         """Take a control step: what was observed, and the command that answers it, shape (1, m)."""
-        if self._is_moved_by_others(inputs):
+        if self._is_moved_by_others(inputs, command[0]):
             self.reset()
         self._own.append(command[0])
         late = bool(self._monitor.see(inputs.state, inputs.goal, command)[0])
@@ -202,11 +202,11 @@ class ConvergenceWatch:
                 "Look at it, then give a new goal."
             )
 
-    def _is_moved_by_others(self, inputs: Inputs) -> bool:
-        """Whether a person, a watchdog or a hand had the robot since the last step."""
+    def _is_moved_by_others(self, inputs: Inputs, command: np.ndarray) -> bool:
+        """Whether a person, a watchdog or a hand had the robot since the last step; `command` may be in effect."""
         if inputs.estimates is not None and bool(inputs.estimates.health.held[0]):
             return True
         newest = self._applied.newest if self._applied is not None else None
         if newest is None or not self._own:
             return False
-        return not any((np.abs(newest - own) <= self._alike).all() for own in reversed(self._own))
+        return not any((np.abs(newest - own) <= self._alike).all() for own in (command, *reversed(self._own)))

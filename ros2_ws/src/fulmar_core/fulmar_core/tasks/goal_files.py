@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -198,6 +199,10 @@ class Trajectory:
 
     def target(self) -> MovingTarget:
         """What moves."""
+        return self._target
+
+    @functools.cached_property
+    def _target(self) -> MovingTarget:
         return MovingTarget(
             self.path, self.speed, self.facing, self.angles_deg, self.loops, self.point, self.ease_s
         )

@@ -53,8 +53,7 @@ class PeriodInbox(Generic[T]):
         """Keep what came on a topic; a repetition of what is there or was handed over is left out."""
         if stamp_ns > self._taken_ns[topic] and stamp_ns not in self._early[topic]:
             self._items[topic].setdefault(stamp_ns, item)
-            if stamp_ns > self._newest_ns.get(topic, stamp_ns):
-                self._newest_ns[topic] = stamp_ns
+            self._newest_ns[topic] = max(self._newest_ns.get(topic, stamp_ns), stamp_ns)
 
     def ready(self) -> list[tuple[str, T]]:
         """Hand over what belongs first into the period under way, before the period is complete; ordered as by `take`.
@@ -102,13 +101,14 @@ class PeriodInbox(Generic[T]):
             for topic, count in counts.items():
                 wanted[topic] += count
         here = {topic: [s for s in items if s <= stamp_ns] for topic, items in self._items.items()}
-        if any(len(here[topic]) + len(self._early[topic]) < count for topic, count in wanted.items()):
+        early = {topic: {s for s in stamps if s <= stamp_ns} for topic, stamps in self._early.items()}
+        if any(len(here[topic]) + len(early[topic]) < count for topic, count in wanted.items()):
             return None
         found = []
         for topic, stamps in here.items():
             found += [(stamp, self._topics[topic], self._items[topic].pop(stamp)) for stamp in stamps]
             self._taken_ns[topic] = max(*stamps, *self._early[topic], self._taken_ns[topic], -1)
-            self._early[topic].clear()
+            self._early[topic] -= early[topic]
         self.answered_ns = stamp_ns
         return stamp_ns, _in_order(found)
 

@@ -152,6 +152,11 @@ class Odometer(MutableState, Generic[S]):
         self._keys: Keys | None = None
         self._ahead: tuple[Keys, int, Drawn] | None = None  # of which keys, from which measurement on
 
+    def take(self, state: dict[str, Any]) -> None:
+        """See `MutableState.take`."""
+        super().take(state)
+        self._ahead = None
+
     def measure(
         self,
         truth: S,

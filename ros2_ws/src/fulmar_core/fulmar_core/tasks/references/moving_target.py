@@ -48,7 +48,7 @@ class MovingTarget:
 
     def rounds(self, time_s: float) -> float:
         """Rounds, or of an open path the share, that lie behind it at a time, no more than there are."""
-        late, ease_s = min(time_s, self.duration_s), self.ease_s
+        late, ease_s = max(0.0, min(time_s, self.duration_s)), self.ease_s
         left = self.duration_s - late
         if left < late:  # the end mirrors the begin
             return (self.duration_s - ease_s - self._eased(left)) / self.round_s
