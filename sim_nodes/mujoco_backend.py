@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from fulmar_core.config.errors import SafetyError
-from fulmar_core.dynamics.batch_dynamics import left_of
+from fulmar_core.dynamics.motion import left_of
 from fulmar_core.dynamics.things import Thing
 from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.sensors.kind import Truth

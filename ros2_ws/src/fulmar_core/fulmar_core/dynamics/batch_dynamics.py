@@ -18,7 +18,7 @@ from fulmar_core.dynamics.actuators.actuation import ActuationState
 from fulmar_core.dynamics.actuators.wheel_actuation import WheelActuation
 from fulmar_core.dynamics.free_body import Wrench, free_body_step
 from fulmar_core.dynamics.gyrostat import Flywheels, gyrostat_step
-from fulmar_core.dynamics.motion import to_center
+from fulmar_core.dynamics.motion import left_of, to_center
 from fulmar_core.dynamics.rigid_body import inertia_of, rigid_body_step, shifted
 from fulmar_core.dynamics.rolling import rolling_step
 from fulmar_core.dynamics.things import Poses, Thing, push_things
@@ -51,23 +51,6 @@ from fulmar_core.worlds.world import Drawn, World, outside_wrench, push_is_const
 
 W = TypeVar("W", bound=Drawn)
 Push = tuple[Array, ...]  # on a body in space, as its dynamics take it
-
-
-def left_of(mass: Array, lost_before: Array, lost: Array) -> tuple[Array, Array]:
-    """What a body keeps of its mass and inertia while it blows some of itself out.
-
-    What leaves takes its own momentum along and comes from the centre of mass, so that the body's turn rate stays; jets
-    that turn with the body and slow it down are left out (RANS and SRB scale the inertia alike).
-
-    Args:
-        mass: Of the whole body, shape (worlds,) [kg].
-        lost_before: When an integration step begins, same shape [kg].
-        lost: When it ends.
-
-    Returns:
-        The share in the middle of the step, which makes it one of second order [-]; and `lost`.
-    """
-    return 1.0 - 0.5 * (lost_before + lost) / mass, lost
 
 
 @dataclass(frozen=True)

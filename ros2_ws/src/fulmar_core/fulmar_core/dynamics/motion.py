@@ -1,10 +1,11 @@
-"""What the motion of a robot in the plane depends on: late valves, and where its centre of mass is."""
+"""What the motion of a robot depends on: late valves, where its centre of mass is, and what it blows out."""
 
 from __future__ import annotations
 
 from fulmar_core.robots.robot import Robot
 from fulmar_core.states.arrays import array_namespace
 from fulmar_core.states.planar import PlanarState
+from fulmar_core.states.rotation import Array
 from fulmar_core.worlds.scenario import Scenario, longest_opening
 from fulmar_core.worlds.world import World
 
@@ -34,3 +35,20 @@ def to_center(state: PlanarState, world: World, sign: float = 1.0) -> PlanarStat
     dy = sign * (s * world.com_x + c * world.com_y)
     r = state.yaw_rate
     return PlanarState(state.x + dx, state.y + dy, state.yaw, state.vx - r * dy, state.vy + r * dx, r)
+
+
+def left_of(mass: Array, lost_before: Array, lost: Array) -> tuple[Array, Array]:
+    """What a body keeps of its mass and inertia while it blows some of itself out.
+
+    What leaves takes its own momentum along and comes from the centre of mass, so that the body's turn rate stays; jets
+    that turn with the body and slow it down are left out (RANS and SRB scale the inertia alike).
+
+    Args:
+        mass: Of the whole body, shape (worlds,) [kg].
+        lost_before: When an integration step begins, same shape [kg].
+        lost: When it ends.
+
+    Returns:
+        The share in the middle of the step, which makes it one of second order [-]; and `lost`.
+    """
+    return 1.0 - 0.5 * (lost_before + lost) / mass, lost

@@ -361,12 +361,8 @@ def _check_pushed(robot: Robot) -> None:
         )
     if (robot.airframe is None) is not robot.kind.stays:
         raise ValueError(_WINGS)
-    tank, mass = robot.actuators.tank, robot.body.mass
-    if tank is not None and tank.weighs and tank.content >= mass:
-        raise ValueError(
-            f"'tank' holds {tank.content:.3g} kg, and the whole body has 'mass' = {mass:g} kg: with 'weighs' the full "
-            "tank is a part of it. Give the mass of the body with its tank full."
-        )
+    if robot.actuators.tank is not None:
+        robot.actuators.tank.check_part_of(robot.body.mass)
 
 
 def _check_rolling(robot: Robot) -> None:

@@ -58,6 +58,18 @@ class Tank:
         """Mass of what is in the full tank [kg]."""
         return self.volume / self.volume_per_kg
 
+    def check_part_of(self, mass: float) -> None:
+        """Refuse to be a part of a body of some mass that is no more than what is in it [kg].
+
+        Raises:
+            ValueError: With what to do.
+        """
+        if self.weighs and self.content >= mass:
+            raise ValueError(
+                f"'tank' holds {self.content:.3g} kg, and the whole body has 'mass' = {mass:g} kg: with 'weighs' the "
+                "full tank is a part of it. Give the mass of the body with its tank full."
+            )
+
     def gone(self, pressure: Array) -> Array:
         """Mass that a full tank has lost at some pressures [Pa], shape of these [kg]."""
         return (self.pressure - pressure) * (self.volume / self._specific_energy)
