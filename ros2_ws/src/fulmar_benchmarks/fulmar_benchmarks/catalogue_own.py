@@ -207,7 +207,7 @@ TRAINING = Row(
     "fulmar_benchmarks.training_campaign:Training",
     """Train with both, the same seeds side by side; print speed, and success over time.
 
-    Success is the mean of the training scenario and the nominal one, on episodes that nobody learns from.
+    Success is the mean of the training scenario and the nominal one, on episodes that are held out.
     """,
     (
         Selector("robot", "[ROBOT]", "A name from `fulmar list robots`.", "floating_platform", positional=True),

@@ -35,7 +35,7 @@ class Pair:
 
     @property
     def missing(self) -> bool:
-        """Whether nobody can drive it."""
+        """Whether it has no controller."""
         return not self.controller
 
 
@@ -43,7 +43,7 @@ def find_pair(robot: str, task: str, kind: str, policies: Path | None = None) ->
     """Find who drives a robot at a task.
 
     Returns:
-        The pair, perhaps with a reason why nobody does.
+        The pair, perhaps with a reason why it has no controller.
     """
     folder = (policies or policies_directory()) / f"{robot}_{task}"
     if kind == "policy":

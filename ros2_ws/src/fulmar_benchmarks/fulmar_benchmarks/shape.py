@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from importlib import import_module
@@ -24,7 +25,7 @@ Progress = Callable[[float], None]  # how much of the cost of a cell is done
 
 
 @dataclass(frozen=True, kw_only=True)
-class Cell:
+class Cell(ABC):
     """What is run at once and kept in one file. Subclasses have the fields that tell cells apart."""
 
     modules: ClassVar[tuple[str, ...]] = ()  # whose code its figures depend on, beside those of its class
@@ -38,9 +39,9 @@ class Cell:
         """Everything that its figures depend on beside code, configuration and libraries."""
         return {key: value for key, value in asdict(self).items() if key not in OF_EVERY_CELL}
 
+    @abstractmethod
     def measure(self, progress: Progress, pool: Any = None) -> Figures:
         """Measure it, in any process; a `ROS` cell gets the pool."""
-        raise NotImplementedError
 
 
 OF_EVERY_CELL = tuple(each.name for each in fields(Cell))
@@ -75,7 +76,7 @@ class Check:
         return f"{met:8} {self.name}: {found} (required: {sign} {self.limit:.4g})"
 
 
-class Benchmark:
+class Benchmark(ABC):
     """One run of a benchmark. `campaign.run` measures, keeps, resumes and puts the document together.
 
     Attributes:
@@ -97,20 +98,20 @@ class Benchmark:
         """Of what is asked for, as `catalogue.choice` makes it."""
         self.choice = choice
 
-    def check(self) -> None:
+    def check(self) -> None:  # noqa: B027 - most have nothing to refuse
         """Refuse what cannot be measured, before anything is.
 
         Raises:
             ConfigError: Where it was asked for something that does not exist.
         """
 
+    @abstractmethod
     def cells(self) -> Sequence[Cell]:
         """What is run."""
-        raise NotImplementedError
 
+    @abstractmethod
     def document(self, found: Found) -> dict[str, Any]:
         """Its keys of the document, JSON-ready."""
-        raise NotImplementedError
 
     def checks(self, document: Mapping[str, Any]) -> Sequence[Check]:
         """What is required, beside what was measured."""
@@ -120,9 +121,9 @@ class Benchmark:
         """A line for each requirement."""
         return [check.line for check in self.checks(document)]
 
+    @abstractmethod
     def tables(self, document: Mapping[str, Any]) -> Sequence[Shown]:
         """Lines and tables, of terminal and page alike."""
-        raise NotImplementedError
 
     def drawn(self, document: Mapping[str, Any], found: Found) -> tuple[Any, ...]:
         """What `report` gets."""

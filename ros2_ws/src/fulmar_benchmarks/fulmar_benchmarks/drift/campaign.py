@@ -85,7 +85,7 @@ class Drift(Benchmark):
         return Trial(plan, asked.through, episodes, episodes, asked.jobs)
 
     def cells(self) -> list[DriftCell]:
-        """Every pair that somebody drives."""
+        """Every pair that has a controller."""
         found = []
         for (row, name), pair in self.pairs.items():
             if pair.missing:

@@ -27,7 +27,7 @@ class BoundCell(Cell):
         return np.arange(min(self.trial.episodes, BOUNDED))
 
     def parts(self) -> dict[str, Any]:
-        """Whoever drives."""
+        """The same for every controller."""
         plan = asdict(replace(self.trial.plan, policy="", controller=""))
         return {"plan": plan, "farthest_m": self.trial.farthest_m, "episodes": len(self.numbers)}
 

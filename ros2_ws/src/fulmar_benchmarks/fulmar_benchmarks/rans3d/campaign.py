@@ -65,7 +65,7 @@ class Rans3d(Benchmark):
 
     @functools.cached_property
     def _trials(self) -> dict[Key, SpaceCell]:
-        """Of those that somebody drives."""
+        """Of pairs that have a controller."""
         return {
             key: cell_of(self.choice, self.pairs[key[:3]], key[3])
             for key in self.keys
@@ -159,7 +159,7 @@ def _keys(asked: Choice) -> list[Key]:
 
 
 def pair_of(asked: Choice, robot: str, task: str, controller: str) -> Pair:
-    """Who drives a robot at a task, or why nobody does."""
+    """The controllers of a robot at a task, or why one is missing."""
     if controller != "policy":
         return with_law(robot, task, controller)
     folder = (asked.policies or policies_directory()) / f"{robot}_{task}"

@@ -75,7 +75,7 @@ class Roboran(Benchmark):
         )  # fmt: skip
 
     def cells(self) -> list[TrialCell]:
-        """Every pair that somebody drives, in every way."""
+        """Every pair that has a controller, in every way."""
         return [cell for pair in self.pairs for cell in self._cells(pair)]
 
     def _outcomes(self, found: Found, pair: Pair) -> dict[str, Outcome]:

@@ -48,7 +48,7 @@ _receive: Callable[[Any], None] = lambda progress: None  # noqa: E731 - what pro
 
 
 def report(progress: Any) -> None:
-    """Report from inside a call how far it is; outside of a pool nobody receives it.
+    """Report from inside a call how far it is; outside of a pool it goes nowhere.
 
     Args:
         progress: For processes of this machine a number.
@@ -115,7 +115,7 @@ _counts: Any = None
 
 
 def _begin_worker(counts: Any, parent: int) -> None:
-    """Begin a process of a pool: without `parent` it ends, as nobody would take what it does."""
+    """Begin a process of a pool: without `parent` it ends, as its results would be lost."""
     global _counts
     _counts = counts
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the parent, which ends its children
