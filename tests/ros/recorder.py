@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
@@ -33,6 +34,11 @@ class Recorder:
 
     def wait_until_recording(self, words: str = "recording to") -> None:
         assert self.process.stdout.readline() == f"{words} {self.directory}\n"
+
+    def pause(self) -> None:
+        """Stop the process and wait until each of its threads has stopped: the signal alone returns before."""
+        self.process.send_signal(signal.SIGSTOP)
+        os.waitid(os.P_PID, self.process.pid, os.WSTOPPED | os.WNOWAIT)
 
     def end(self, number: signal.Signals) -> tuple[int, str, str]:
         self.process.send_signal(number)

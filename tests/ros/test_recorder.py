@@ -13,7 +13,6 @@ import threading
 import time
 from importlib.metadata import version
 
-import psutil
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import PoseStamped
@@ -81,7 +80,7 @@ def test_a_paused_recorder_says_when_a_message_was_sent_and_received_and_sigterm
     recorder = record()
     recorder.wait_until_recording()
     publisher = odometry(node)
-    recorder.process.send_signal(signal.SIGSTOP)
+    recorder.pause()
     spans = []
     for stamp in range(20):
         before = time.time_ns()
@@ -163,7 +162,7 @@ def test_in_lock_step_a_paused_recorder_is_waited_for_and_lacks_nothing(record, 
     recorder = record()
     recorder.wait_until_recording()
     publisher = odometry(node, lockstep=True)
-    recorder.process.send_signal(signal.SIGSTOP)
+    recorder.pause()
     threading.Timer(2.0, recorder.process.send_signal, (signal.SIGCONT,)).start()
     message, begin, slowest_s = Odometry(), time.monotonic(), 0.0
     for stamp in range(6000):  # more than the history of a publisher that keeps everything
@@ -183,9 +182,7 @@ def test_in_lock_step_a_recorder_that_hangs_ends_the_waiting_with_a_reason(recor
     recorder = record()
     recorder.wait_until_recording()
     publisher = odometry(node, lockstep=True)
-    recorder.process.send_signal(signal.SIGSTOP)
-    while psutil.Process(recorder.process.pid).status() != psutil.STATUS_STOPPED:
-        time.sleep(0.01)
+    recorder.pause()
     with pytest.raises(LockstepError, match="a reader has taken nothing for 0"):
         for _ in range(20_000):
             publish_patiently(publisher, Odometry())
@@ -204,7 +201,7 @@ def test_in_real_time_a_recorder_that_hangs_holds_up_nothing(record, node):
         return time.monotonic() - begin
 
     received_s = [round_s() for _ in range(3)]
-    recorder.process.send_signal(signal.SIGSTOP)
+    recorder.pause()
     hung_s = [round_s() for _ in range(3)]
     # Who is held up is so each time; the machine's own pauses are not.
     assert statistics.median(hung_s) < 3.0 * statistics.median(received_s)
