@@ -101,6 +101,10 @@ def _check_options(request: TrainingRequest) -> None:
         raise ConfigError(
             "--resume goes on with the calibration that the run began with; leave --calibration out."
         )
+    if r.address and r.executor == "local":
+        raise ConfigError(
+            "--address is of a Ray cluster: give --ray ADDRESS alone, or --executor ray beside it."
+        )
     if (r.executor == "ray" or r.address) and r.seeds == 1:
         raise ConfigError(
             "--ray, --executor ray and --address are for campaigns: give --seeds N, or leave them out."

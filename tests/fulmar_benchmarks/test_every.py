@@ -170,3 +170,9 @@ def test_parts_that_only_pass_and_bare_figures_are_rows_too():
     required = {"required": [{"what": "p99", "limit": 20.0, "value": None, "passed": False}], "passed": False}
     assert figures(required) == [("p99", "", "20", False)]
     assert figures({"robots": {"a": {"batch_steps_per_s": 5.0}}}) == [("a, batch_steps_per_s", "5", "", None)]
+
+
+def test_a_requirement_that_a_document_says_twice_is_one_row():
+    check = {"name": "error", "measured": 0.5, "limit": 1.0, "met": True, "better": "less"}
+    cell = {"name": "error", "required": 1.0, "share": 0.5, "met": True}
+    assert len(rows_of({"checks": [check], "cells": [cell]})) == 1

@@ -8,9 +8,9 @@ import pytest
 
 from fulmar_benchmarks.campaign import run
 from fulmar_benchmarks.catalogue import choice
-from fulmar_benchmarks.latency import cells
+from fulmar_benchmarks.latency import cells, endurance
 from fulmar_benchmarks.latency.cells import Latency
-from fulmar_benchmarks.latency.endurance import endure
+from fulmar_benchmarks.latency.endurance import Endurance, endure
 from fulmar_core.config.errors import ConfigError
 
 real_time = pytest.mark.real_time
@@ -79,3 +79,22 @@ def test_cells_that_were_measured_are_kept_and_one_that_failed_is_measured_again
     assert documents[0]["cells"][0]["failure"] == "it ended"
     assert documents[1]["cells"] == documents[2]["cells"]
     assert [check["met"] for check in documents[2]["checks"]] == [True, True]
+
+
+def test_a_long_run_that_was_cut_off_is_run_again_beside_its_bag(tmp_path, monkeypatch) -> None:
+    folders: list[Path] = []
+
+    def endure(*, simulated_s, rate, folder, progress):
+        folders.append(folder)
+        (folder / "bag").mkdir(parents=True)
+        if len(folders) == 1:
+            raise KeyboardInterrupt
+        return {"commands_lost": 0, "commands_answered": 9, "memory_growth_mb": {"plant": 0.0},
+                "memory_mb": {"plant": 9.0}, "simulated_s": simulated_s, "rate": rate}  # fmt: skip
+
+    monkeypatch.setattr(endurance, "endure", endure)
+    asked = Endurance(choice("endurance", out=tmp_path))
+    with pytest.raises(KeyboardInterrupt):
+        run(asked)
+    assert run(asked).document["commands_lost"] == 0
+    assert folders == [tmp_path / "run_1", tmp_path / "run_2"]

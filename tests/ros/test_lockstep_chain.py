@@ -106,12 +106,8 @@ def test_an_own_node_that_answers_nothing_ends_the_run_by_its_name(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("name", "words"), [("estimator", "estimator is silent"), ("controller", "controller is")]
-)
-def test_a_link_that_hangs_ends_the_run_by_its_name(
-    name: str, words: str, ros_domain: RosDomain, tmp_path: Path
-) -> None:
+@pytest.mark.parametrize("name", ["estimator", "controller"])
+def test_a_link_that_hangs_ends_the_run_by_its_name(name: str, ros_domain: RosDomain, tmp_path: Path) -> None:
     run = start_fulmar("run", *ESTIMATED, "--duration", "9999", "--json", env=ros_domain.env, cwd=tmp_path)
     hung: list[psutil.Process] = []
     try:
@@ -135,4 +131,4 @@ def test_a_link_that_hangs_ends_the_run_by_its_name(
                 one.kill()
         if run.poll() is None:
             run.kill()
-    assert words in json_of(output)["failure"], errors
+    assert f"{name} was stopped (SIGSTOP) for 3 s" in json_of(output)["failure"], errors

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,6 @@ import numpy as np
 from fulmar_bags.run_record import read_run
 from fulmar_benchmarks.latency.watched_system import STEP_HZ, plan_at, watched_system
 from fulmar_benchmarks.shape import ALONE, Benchmark, Cell, Check, Figures, Found, Progress, known
-from fulmar_core.config.errors import ConfigError
 
 ALLOWED_MB = 5.0
 WARM_UP_SHARE = 0.1  # of the time: pools fill and windows of statistics grow to their size
@@ -27,15 +27,16 @@ class EnduranceCell(Cell):
     modules = (f"{__package__}.watched_system",)
     simulated_s: float
     rate: float
-    folder: Path  # of policy and bag
+    folder: Path  # of the folders of all attempts
 
     def parts(self) -> dict[str, Any]:
-        """Not where the bag lies."""
+        """Not where bags lie."""
         return {"simulated_s": self.simulated_s, "rate": self.rate}
 
     def measure(self, progress: Progress, pool: Any = None) -> Figures:
-        """As in `endure`."""
-        return endure(simulated_s=self.simulated_s, rate=self.rate, folder=self.folder, progress=progress)
+        """As in `endure`, in a folder of its own beside those of earlier attempts."""
+        folder = next(path for number in count(1) if not (path := self.folder / f"run_{number}").exists())
+        return endure(simulated_s=self.simulated_s, rate=self.rate, folder=folder, progress=progress)
 
 
 class Endurance(Benchmark):
@@ -43,13 +44,6 @@ class Endurance(Benchmark):
 
     name = "endurance"
     title = "A long run"
-
-    def check(self) -> None:
-        """Refuse a folder with a bag."""
-        if (self.choice.out / "bag").exists() and not (self.choice.out / "outcomes").exists():
-            raise ConfigError(
-                f"{self.choice.out} exists already; nothing recorded is overwritten. Give --out another folder."
-            )
 
     def cells(self) -> list[EnduranceCell]:
         """The run."""

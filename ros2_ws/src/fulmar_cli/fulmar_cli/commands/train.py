@@ -79,6 +79,8 @@ def train(
 
     if wandb:
         require("wandb")
+    if ray and address:
+        raise ConfigError("--ray and --address both name a cluster: give one of them.")
     request = TrainingRequest(
         robot, task, seed, seeds, time_limit, updates, stop_at_success, settings, control_hz, out, episodes,
         calibration, resume, "ray" if ray else executor, ray or address, wandb, invoked_command(),
