@@ -11,6 +11,7 @@ from fulmar_benchmarks.catalogue import choice
 from fulmar_benchmarks.pace import systems
 from fulmar_benchmarks.pace.systems import SYSTEMS, Pace, messages_of, steps_per_s
 from fulmar_core.config.errors import ConfigError, RunFailed
+from tests.fulmar_benchmarks.test_shape import without_moment
 
 SPACE, STEPS, PERIOD_NS = "/floating_platform", 100, 2_000_000
 
@@ -99,3 +100,19 @@ def test_a_system_that_is_not_there_is_refused():
     assert len(SYSTEMS) == 6
     with pytest.raises(ConfigError, match="floating_platform_lqr"):
         choice("pace", systems="floating_platform_lqi")
+
+
+def test_one_that_is_interrupted_goes_on_and_gives_an_equal_document(tmp_path, measured):
+    def asked(folder):
+        return Pace(choice("pace", systems="floating_platform_lqr", out=tmp_path / folder, resume=True))
+
+    def breaks_off(cells, *, on_done, **_others):
+        on_done(cells[0], cells[0].measure(lambda done: None))
+        raise KeyboardInterrupt
+
+    whole = without_moment(run(asked("whole")).document)
+    with pytest.raises(KeyboardInterrupt):
+        run(asked("broken"), using=breaks_off)
+    measured.clear()
+    assert without_moment(run(asked("broken")).document) == whole
+    assert measured == ["real_time"]
