@@ -88,7 +88,9 @@ def recipe(policy: ShippedPolicy, settings: TrainingSettings) -> str:
 
 def _as_trained(robot: Robot) -> Any:
     """A robot as batches have it: on air, its supply full, and without sensors that no policy reads."""
-    actuators: Any = robot.actuators if robot.actuators.tank is None else replace(robot.actuators, tank=None)
+    tank = robot.actuators.tank
+    # A tank that is a part of the body empties in batches too.
+    actuators: Any = robot.actuators if tank is None or tank.weighs else replace(robot.actuators, tank=None)
     sensors = replace(robot.sensors, supply=None)
     found = _chosen(
         replace(robot, air_bearing=False, usual_controller="", actuators=actuators, sensors=sensors)

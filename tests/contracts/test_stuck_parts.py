@@ -33,8 +33,8 @@ ROBOTS = {name: robots_of_every_family()[name] for name in NAMES}  # each family
 IDEAL = load_scenario("ideal")
 STEPS = 8  # control steps
 SCENARIOS = {
-    "valve_stuck_open": ["floating_platform", "spacecraft_16", "int_ball2"],
-    "valve_stuck_closed": ["floating_platform", "spacecraft_16", "int_ball2"],
+    "valve_stuck_open": ["floating_platform", "spacecraft_16", "cubesat_8", "int_ball2"],
+    "valve_stuck_closed": ["floating_platform", "spacecraft_16", "cubesat_8", "int_ball2"],
     "surface_stuck": ["airship_v7", "navion"],
     "wheel_dead": ["cubesat_wheels", "turtlebot2"],
     "propeller_lost": ["kingfisher", "airship_v7", "cessna_182"],

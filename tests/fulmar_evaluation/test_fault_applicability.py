@@ -42,16 +42,23 @@ AIRCRAFT = [name for name in ROBOTS if load_robot(name).flies]
 MOST_LEFT_OUT = 4
 # Faults of parts that some robots have, by the robots of these that have them.
 OF_PARTS = {
-    "mocap_frozen": {"floating_platform", "spacecraft_16", "int_ball2", "kingfisher", "turtlebot2"},
+    "mocap_frozen": {
+        "floating_platform",
+        "spacecraft_16",
+        "cubesat_8",
+        "int_ball2",
+        "kingfisher",
+        "turtlebot2",
+    },
     "star_tracker_frozen": {"cubesat_wheels"},
     "star_tracker_drifts": {"cubesat_wheels"},
     "gnss_creeps": {"kingfisher", "airship_v7"},
-    "valve_stuck_open": {"floating_platform", "spacecraft_16", "int_ball2"},
-    "valve_stuck_closed": {"floating_platform", "spacecraft_16", "int_ball2"},
+    "valve_stuck_open": {"floating_platform", "spacecraft_16", "cubesat_8", "int_ball2"},
+    "valve_stuck_closed": {"floating_platform", "spacecraft_16", "cubesat_8", "int_ball2"},
     "surface_stuck": {"airship_v7"},
     "wheel_dead": {"cubesat_wheels", "turtlebot2"},
     "propeller_lost": {"kingfisher", "airship_v7"},
-    "supply_pressure_falls": {"floating_platform", "spacecraft_16"},
+    "supply_pressure_falls": {"floating_platform", "spacecraft_16", "cubesat_8"},
 }
 
 

@@ -36,8 +36,8 @@ def commands_of(name, *, seconds=90.0, worlds=4):
     return robot, np.array(commands), far
 
 
-# Both are pushed in space; what turns one, turns the other.
-ALIKE = {"int_ball2"}
+# All are pushed in space; what turns one, turns the others.
+ALIKE = {"int_ball2", "cubesat_8"}
 
 
 @pytest.mark.parametrize(

@@ -17,9 +17,8 @@ from fulmar_core.tasks import load_task
 from fulmar_core.worlds.scenario import load_scenario
 from sim_nodes.mock_backend import MockBackend
 from sim_nodes.mujoco_backend import MujocoBackend
-from tests.new_robots import new_robot
 
-CUBESAT, PLATFORM = new_robot("cubesat_8"), load_robot("floating_platform")
+CUBESAT, PLATFORM = load_robot("cubesat_8"), load_robot("floating_platform")
 TANK, IDEAL = CUBESAT.actuators.tank, load_scenario("ideal")
 BACKENDS = pytest.mark.parametrize("backend", [MockBackend, MujocoBackend])
 CONTROL_S = CUBESAT.timing.control_s

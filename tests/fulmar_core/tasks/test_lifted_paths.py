@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from fulmar_core.controllers.classical import load_classical
+from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.simulation.episode import draw_episode
 from fulmar_core.states.attitude import angle_between, turn
 from fulmar_core.states.spatial import SpatialState, quat_of
@@ -20,9 +21,8 @@ from fulmar_core.tasks.references.rounded import Capsule, Rectangle
 from fulmar_core.worlds.scenario import load_scenario
 from sim_nodes.mock_backend import MockBackend
 from tests.inputs import inputs_at
-from tests.new_robots import new_robot
 
-CUBESAT, POSE = new_robot("cubesat_8"), load_task("go_to_pose_3d")
+CUBESAT, POSE = load_robot("cubesat_8"), load_task("go_to_pose_3d")
 TILTED = (30.0, 20.0, 0.0)
 ROUND = Trajectory(
     "trajectory", "t", Lifted("lifted", Circle("circle", 1.8), TILTED), speed=0.2, facing="point", ease_s=6.0
