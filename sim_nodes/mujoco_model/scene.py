@@ -14,6 +14,7 @@ from fulmar_core.dynamics.things import Thing
 from fulmar_core.robots.robot import Robot
 from fulmar_core.simulation.episode import Episode
 from fulmar_core.states.gravity import GRAVITY
+from fulmar_core.worlds.structures import Structure
 from sim_nodes.mujoco_model.aircraft import Aircraft
 from sim_nodes.mujoco_model.car import Car
 from sim_nodes.mujoco_model.differential_base import DifferentialBase
@@ -28,6 +29,7 @@ from sim_nodes.mujoco_model.objects import (
 )
 from sim_nodes.mujoco_model.satellite import Satellite
 from sim_nodes.mujoco_model.scenery import BODY, add_scenery, add_sensors
+from sim_nodes.mujoco_model.structures import add_structure
 
 
 def _rolling(robot: Robot) -> RobotModel:
@@ -51,13 +53,20 @@ PALE, WATER = [0.85, 0.87, 0.9, 1.0], [0.55, 0.75, 0.85, 1.0]
 class Scene:
     """A robot's model with room for some obstacles and things."""
 
-    def __init__(self, robot: Robot, radii: tuple[float, ...] = (), things: tuple[Thing, ...] = ()) -> None:
+    def __init__(
+        self,
+        robot: Robot,
+        radii: tuple[float, ...] = (),
+        things: tuple[Thing, ...] = (),
+        structures: tuple[Structure, ...] = (),
+    ) -> None:
         """Compile.
 
         Args:
             robot: The robot.
             radii: Of the obstacles that there is room for [m].
             things: Those with a body have one in the model; the others do not move.
+            structures: Things in space, which stand still and which the robot runs into.
 
         Raises:
             ConfigError: MuJoCo rejects the robot.
@@ -66,7 +75,7 @@ class Scene:
         self._poses: dict[str, np.ndarray] = {}
         self.robot_model: RobotModel = robot_model_of(robot)
         try:
-            self.model = _spec(robot, self.robot_model, radii, things).compile()
+            self.model = _spec(robot, self.robot_model, radii, things, structures).compile()
         except ValueError as error:
             raise ConfigError(
                 f"robot '{robot.name}': MuJoCo cannot build it: {' '.join(str(error).split())}. "
@@ -121,7 +130,11 @@ def build_model(robot: Robot) -> mujoco.MjModel:
 
 
 def _spec(
-    robot: Robot, robot_model: RobotModel, radii: tuple[float, ...], things: tuple[Thing, ...]
+    robot: Robot,
+    robot_model: RobotModel,
+    radii: tuple[float, ...],
+    things: tuple[Thing, ...],
+    structures: tuple[Structure, ...],
 ) -> mujoco.MjSpec:
     spec = mujoco.MjSpec()
     spec.modelname = robot.name
@@ -140,6 +153,8 @@ def _spec(
     for thing in things:
         if thing.body is not None:
             add_block(spec, thing.name, thing.body)
+    for structure in structures:
+        add_structure(spec, structure)
     return spec
 
 

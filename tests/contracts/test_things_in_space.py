@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 
-from fulmar_core.config.errors import ConfigError
+from fulmar_core.config.errors import ConfigError, UnknownNameError
 from fulmar_core.config.paths import OWN_FOLDERS, config_path
 from fulmar_core.config.strict_yaml import load_config
 from fulmar_core.worlds.structure_file import StructureFile
@@ -115,5 +115,6 @@ def test_a_thing_without_parts_and_an_unknown_one_are_refused(
     monkeypatch.setenv(OWN_FOLDERS, str(tmp_path))
     with pytest.raises(ConfigError, match="a thing without a surface cannot be inspected"):
         load_structure("empty")
-    with pytest.raises(ConfigError, match="unknown thing 'gatway'. Did you mean 'gateway'?"):
+    with pytest.raises(UnknownNameError, match="unknown thing 'gatway'") as unknown:
         load_structure("gatway")
+    assert str(unknown.value).endswith("Did you mean 'gateway'?")
