@@ -5,8 +5,9 @@ The explicit table of tasks. A new task is one file here, one line below and one
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
 from fulmar_core.config.errors import ConfigError
 from fulmar_core.config.own_class import is_own
@@ -14,6 +15,7 @@ from fulmar_core.config.paths import config_path
 from fulmar_core.config.plausibility import check_plausible
 from fulmar_core.config.plausible_ranges import TASK
 from fulmar_core.config.strict_yaml import load_config
+from fulmar_core.robots.kinds import FREE_FLYER
 from fulmar_core.tasks.follow_reference import FollowReference
 from fulmar_core.tasks.go_to_pose import GoToPose
 from fulmar_core.tasks.go_to_pose_3d import GoToPose3d
@@ -57,16 +59,21 @@ ShippedTask = (  # what a file of `configs/tasks` can be
 _asked_for: set[str] = set()  # dotted paths that this process was given, in the place of what a bag names
 
 
-def load_task(name: str) -> Task:
+def load_task(name: str, thing: str = "") -> Task:
     """Load a task by a name that `fulmar list tasks` shows, or by the dotted path of a user's own class.
 
+    Args:
+        name: Of the task.
+        thing: Of `configs/things`, in the place of that of the task; empty: that of the task, if it has any.
+
     Raises:
-        ConfigError: Unknown name, a mistake in the file, or a class as in `load_own_task`.
+        ConfigError: Unknown name, a mistake in the file, a class as in `load_own_task`, or a thing in space in the
+            world of a robot that does not fly there.
     """
     if is_own(name):
         task = load_own_task(name)
         _asked_for.add(name)
-        return task
+        return _among(task, thing)
     path = config_path("tasks", name)
     shipped = cast(ShippedTask, load_config(ShippedTask, path))  # type: ignore[arg-type]
     if shipped.name != name:
@@ -74,10 +81,25 @@ def load_task(name: str) -> Task:
             f"{path}: 'name' is '{shipped.name}', the file's own name is '{name}'. Make them equal."
         )
     check_plausible(shipped, TASK, path)
-    return shipped
+    return _among(shipped, thing)
 
 
-def load_recorded_task(name: str, bag: Path) -> Task:
+def _among(task: Task, thing: str) -> Task:
+    """A task with a thing in space in its world; the thing's file is read, so that its mistakes come first."""
+    if thing and is_own(task.name):
+        raise ConfigError(
+            f"task '{task.name}' is a class of your own, which takes no thing in space. Leave it out."
+        )
+    among = cast(Task, replace(cast(Any, task), thing=thing)) if thing else task  # all others are dataclasses
+    if among.structures and FREE_FLYER not in task.kinds:
+        raise ConfigError(
+            f"'{among.thing}' stands in space, and task '{task.name}' is for robots that do not fly there. Leave "
+            f"--thing out, or choose a task of free flyers, such as {FREE_FLYER.usual_task}."
+        )
+    return among
+
+
+def load_recorded_task(name: str, bag: Path, thing: str = "") -> Task:
     """Load the task that a bag names, as `load_task` does, without importing a class that only the bag names.
 
     Raises:
@@ -87,4 +109,4 @@ def load_recorded_task(name: str, bag: Path) -> Task:
         raise ConfigError(
             f"{bag}: the task is '{name}', a class that only this bag names. To use it: --task {name}."
         )
-    return load_task(name)
+    return load_task(name, thing)

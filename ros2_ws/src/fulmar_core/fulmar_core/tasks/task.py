@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Generic, Self
@@ -12,6 +13,7 @@ from fulmar_core.dynamics.things import Thing
 from fulmar_core.robots.kinds import GOING
 from fulmar_core.robots.kinds.kind import Kind
 from fulmar_core.robots.robot import Robot
+from fulmar_core.states.arrays import side_by_side
 from fulmar_core.states.counter_rng import Draws
 from fulmar_core.states.planar import PlanarState
 from fulmar_core.states.rotation import Array
@@ -19,6 +21,7 @@ from fulmar_core.states.state import S, State
 from fulmar_core.tasks.goal import Goal, goal_at
 from fulmar_core.tasks.goal_words import counted, goal_words
 from fulmar_core.tasks.terms import Errors, Tolerance
+from fulmar_core.worlds.structures import KeepOut, Structure, load_structure
 
 
 class Task(ABC, Generic[S]):
@@ -34,6 +37,7 @@ class Task(ABC, Generic[S]):
         tolerance: What counts as success.
         required: Targets that make an episode a success; None where a closing window does.
         state_type: Form of the states that its methods take.
+        thing: Of `configs/things`, in its world; empty: none.
         observes_numbers: Whether `observe` answers the state of one robot in plain numbers by plain numbers.
     """
 
@@ -44,6 +48,7 @@ class Task(ABC, Generic[S]):
     tolerance: Tolerance
     required: int | None = None
     state_type: type[State] = PlanarState
+    thing: str = ""
     observes_numbers: bool = False
 
     # A class, a property or a field has these two: dataclasses would take a property of this class for a default.
@@ -71,6 +76,16 @@ class Task(ABC, Generic[S]):
     def things(self) -> tuple[Thing, ...]:
         """What stands or moves in its world: every goal has the pose of each in `Goal.things`."""
         return ()
+
+    @property
+    def structures(self) -> tuple[Structure, ...]:
+        """Things in space that stand in its world."""
+        return ()
+
+    @property
+    def keep_outs(self) -> tuple[KeepOut, ...]:
+        """Volumes about them that a robot stays out of: to enter one is a failure."""
+        return tuple(structure.keep_out for structure in self.structures)
 
     @property
     def subject(self) -> str:
@@ -184,8 +199,15 @@ class Task(ABC, Generic[S]):
         return self.advance(goal, state, time_s)
 
     def collides(self, state: S, goal: Goal, robot: Robot) -> Array | None:
-        """Whether a state touches something it must not, shape (...,); None where nothing stands about."""
-        return None
+        """Whether a state touches something it must not, or lies in a volume to keep out of, shape (...,).
+
+        None where nothing stands about.
+        """
+        touching: Array | None = None
+        for volume in self.keep_outs:
+            within = volume.distance(side_by_side(*state.columns()[:3])) < 0.0
+            touching = within if touching is None else touching | within
+        return touching
 
     def penalty(self, state: S, goal: Goal, robot: Robot) -> Array | None:
         """What a state costs a learner beside the reward, shape (...,); None: nothing."""
@@ -209,3 +231,13 @@ class FileTask(Task[S]):
     title: str
     episode_s: float  # length of an episode [s]
     tolerance: Tolerance  # what counts as success; of targets that follow each other, within which one counts
+    thing: str = ""  # of `configs/things`, that stands at the world's origin; empty: none
+
+    @functools.cached_property
+    def structures(self) -> tuple[Structure, ...]:
+        """See `Task.structures`.
+
+        Raises:
+            ConfigError: As in `load_structure`.
+        """
+        return (load_structure(self.thing),) if self.thing else ()
