@@ -20,6 +20,7 @@ from fulmar_core.states.state import RigidBodyState
 from fulmar_core.tasks import Task
 from fulmar_core.wires.reading import Reading
 from fulmar_core.worlds.scenario import Scenario, sensors_in
+from fulmar_core.worlds.structures import Structure
 from sim_nodes.mujoco_model import Scene
 from sim_nodes.mujoco_model.aircraft import Aircraft
 from sim_nodes.mujoco_model.objects import radii_for
@@ -37,20 +38,22 @@ class MujocoBackend:
         *,
         sensor_noise: bool = True,
         things: tuple[Thing, ...] = (),
+        structures: tuple[Structure, ...] = (),
         sensors: Mapping[str, Any] | None = None,
     ) -> None:
         """Build it; `sensors` by name in the place of those of the robot's file."""
         self.robot = robot
-        self._things = things
+        self._things, self._structures = things, structures
         self._sensors = SimulatedSensors(sensors or robot.sensors.specs, noisy=sensor_noise)
         self._world = OneWorld(robot, noisy=sensor_noise)
-        self._use(Scene(robot, things=things))
+        self._use(Scene(robot, things=things, structures=structures))
 
     @classmethod
     def of(cls, robot: Robot, task: Task, scenario: Scenario) -> MujocoBackend:
         """The simulator that a task and a scenario ask for."""
         sensors = sensors_in(robot, scenario)
-        return cls(robot, sensor_noise=scenario.sensor_noise, things=task.things, sensors=sensors)
+        among = {"things": task.things, "structures": task.structures}
+        return cls(robot, sensor_noise=scenario.sensor_noise, **among, sensors=sensors)
 
     @property
     def model(self) -> mujoco.MjModel:
@@ -66,7 +69,7 @@ class MujocoBackend:
         """Begin anew; see `Backend.reset`."""
         obstacles = np.asarray(episode.goal.obstacles, dtype=float)
         if not self._scene.has_room_for(obstacles):
-            self._use(Scene(self.robot, radii_for(obstacles), self._things))
+            self._use(Scene(self.robot, radii_for(obstacles), self._things, self._structures))
         self._scene.begin(episode)
         self._sensors.reset(seed, number)
         self._world.begin_episode(episode)

@@ -26,7 +26,7 @@ def make_backend(robot: Robot, settings: PlantSettings) -> Backend:
 
 def _simulator(robot: Robot, settings: PlantSettings) -> CanStand:
     """The simulator that the parameters name; only that one is imported."""
-    task = load_task(settings.task)
+    task = load_task(settings.task, settings.thing)
     if settings.backend == "mujoco":
         from sim_nodes.mujoco_backend import MujocoBackend
 

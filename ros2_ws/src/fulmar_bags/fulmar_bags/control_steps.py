@@ -125,7 +125,8 @@ def control_steps_of(
     """
     the_robot = load_robot(_name(bag, "robot", robot))
     task = task or bag.reading.task
-    the_task = load_task(task) if task else load_recorded_task(_name(bag, "task", None), bag.path)
+    thing = str((bag.info or {}).get("thing") or "")
+    the_task = load_task(task) if task else load_recorded_task(_name(bag, "task", None), bag.path, thing)
     the_task.check_running(the_robot)
     reader = WireReader(bag)
     settings = _settings(bag, the_robot, the_task, control_hz, reader.warnings)
@@ -197,6 +198,7 @@ def _settings(
         return ControllerSettings(
             robot=robot.name,
             task=task.name,
+            thing=task.thing,
             control_hz=hz,
             lockstep=bool(info.get("lockstep")),
             rate=rate,

@@ -56,6 +56,7 @@ def provenance(bag: Bag) -> dict[str, Any]:
         "fulmar_version": info.get("fulmar_version"),
         "git_revision": info.get("git_revision"),
         "policy": info.get("policy") or None,
+        "thing": info.get("thing") or None,
         "controller_sha256": controller.get("sha256"),
         "made_by": json_object(bag.attachments.get(MADE_BY, b"").decode(errors="replace")),
         "uncommitted_changes": PATCH in bag.attachments,

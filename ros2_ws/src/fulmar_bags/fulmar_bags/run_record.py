@@ -234,7 +234,7 @@ def _named(bag: Bag) -> dict[str, Any]:
 
 
 def _record(bag: Bag, info: dict[str, Any]) -> RunRecord:
-    reader, task = WireReader(bag), _task_of(info.get("task"), bag.path)
+    reader, task = WireReader(bag), _task_of(info.get("task"), bag.path, str(info.get("thing") or ""))
     if not any(len(topic) for topic in bag.topics.values()):
         reader.warnings.append(f"{bag.files[0].name}: holds no message.")
     texts = [json_object(message.data) for _, message in reader.messages(METADATA)]
@@ -275,10 +275,10 @@ def _commands(reader: WireReader, odom: Odometries) -> Vectors:
     return replace(plain, stamp_ns=plain.stamp_ns + int(np.median(odom.stamp_ns - odom.log_ns)))
 
 
-def _task_of(name: object, path: Path) -> Task | None:
+def _task_of(name: object, path: Path, thing: str) -> Task | None:
     """The task of the run; None where it is not known here."""
     try:
-        return load_recorded_task(str(name), path)
+        return load_recorded_task(str(name), path, thing)
     except ConfigError:
         return None
 

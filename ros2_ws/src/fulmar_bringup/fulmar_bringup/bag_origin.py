@@ -66,6 +66,7 @@ def attachments(plan: RunPlan) -> str:
         "robot.yaml": config_path("robots", plan.robot),
         **_of_task(plan.task),
         "scenario.yaml": scenario_path(plan.scenario),
+        **({"thing.yaml": config_path("things", plan.thing)} if plan.thing else {}),
         **_of_goals(plan.goals or plan.excitation),
         **({"hardware.yaml": Path(plan.hardware)} if plan.hardware else {}),
         **_of_estimator(estimator),

@@ -62,7 +62,9 @@ def completed(plan: RunPlan) -> RunPlan:
     robot = load_robot(plan.robot)
     _check_asked(plan, robot)
     task = _asked_task(plan)
-    plan = replace(plan, controller=plan.controller or usual_controller(robot, task, plan.policy))
+    plan = replace(
+        plan, thing=task.thing, controller=plan.controller or usual_controller(robot, task, plan.policy)
+    )
     check_names(plan.robot, task, plan.controller, plan.backend, plan.hardware or None)
     policy = Path(plan.policy) if plan.policy else None
     if policy is None and controller_entry(plan.controller).runs_bundle:
@@ -84,7 +86,7 @@ def completed(plan: RunPlan) -> RunPlan:
 
 def _asked_task(plan: RunPlan) -> Task:
     """The task of a plan, at the height that was asked for."""
-    task = load_task(plan.task)
+    task = load_task(plan.task, plan.thing)
     return task.at_height(plan.height) if plan.height else task
 
 

@@ -28,7 +28,7 @@ from policy_server.controllers import controller_entry
 
 def controller_spec(plan: RunPlan) -> NodeSpec:
     """The node that controls."""
-    robot, task = load_robot(plan.robot), load_task(plan.task)
+    robot, task = load_robot(plan.robot), load_task(plan.task, plan.thing)
     parameters: dict[str, Parameter] = {
         "controller": plan.controller,
         "robot": plan.robot,
@@ -48,6 +48,7 @@ def controller_spec(plan: RunPlan) -> NodeSpec:
     # Encoders of a base at rest repeat; motion capture never does.
     encoded = hardware is not None and not (estimates_odometry(plan) or hardware.seen_from_outside)
     parameters |= given(
+        thing=plan.thing,
         excitation=plan.excitation,
         max_run_time_s=guards.max_run_time_s,
         area=list(guards.area) if guards.area != NO_AREA else None,

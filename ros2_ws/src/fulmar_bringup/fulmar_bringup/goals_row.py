@@ -45,7 +45,7 @@ def run_goals_spec(plan: RunPlan) -> NodeSpec:
         plan.robot,
         plan.goals,
         name=plan.name,
-        as_path=is_path_of_places(load_task(plan.task)),
+        as_path=is_path_of_places(load_task(plan.task, plan.thing)),
         control_hz=goal_rate(plan.control_hz),
     )
     more: dict[str, Parameter] = {"stay": True, "lockstep": plan.lockstep, "rate": plan.rate}

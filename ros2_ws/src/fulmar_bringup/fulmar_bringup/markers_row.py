@@ -13,8 +13,10 @@ from fulmar_core.tasks import load_task
 def _specs(plan: RunPlan, _launcher: Launcher) -> tuple[NodeSpec, ...]:
     if "markers" not in plan.extras:
         return ()
-    task, area = load_task(plan.task), plan.guards.area
-    parameters = given(robot=plan.robot, task=plan.task, area=list(area) if area != NO_AREA else None)
+    task, area = load_task(plan.task, plan.thing), plan.guards.area
+    parameters = given(
+        robot=plan.robot, task=plan.task, thing=plan.thing, area=list(area) if area != NO_AREA else None
+    )
     goals = (wire.name for wire in goal_wires(task.goal_topic))
     row = robot_spec(
         plan,

@@ -49,7 +49,7 @@ def checked(plan: RunPlan) -> RunPlan:
         ConfigError: It cannot, or a part of it would have no effect.
         BundleError: The policy is damaged or made for something else.
     """
-    robot, task = load_robot(plan.robot), load_task(plan.task)
+    robot, task = load_robot(plan.robot), load_task(plan.task, plan.thing)
     _check_surroundings(plan, robot)
     checked_rate(robot, plan.control_hz)
     _check_pace(plan)

@@ -53,6 +53,7 @@ def plant_spec(plan: RunPlan, *, port: str = "") -> NodeSpec:
     estimated, chain = estimates_odometry(plan), chain_of(plan)
     captured = estimated and takes_poses(plan)
     parameters |= given(
+        thing=plan.thing,
         estop=plan.guards.estop,
         estimated=estimated,
         truth_in_period=any(TRUTH.name in node.inputs for node in (*plan.nodes, *between(plan))),
@@ -60,7 +61,7 @@ def plant_spec(plan: RunPlan, *, port: str = "") -> NodeSpec:
     )
     if estimated and not captured:
         parameters["captured"] = False
-    commands, things = command_wire(load_robot(plan.robot)).name, load_task(plan.task).things
+    commands, things = command_wire(load_robot(plan.robot)).name, load_task(plan.task, plan.thing).things
     sensed = (ACTUATORS_STATE.name, *_sensor_topics(plan))
     if plan.backend == "hardware":
         module, inputs = "hardware_drivers.driver_node", (commands,)

@@ -23,7 +23,7 @@ def recorder_spec(plan: RunPlan, *, directory: str = "", info: str = "", files: 
         info: As `bag_origin.run_info` gives it.
         files: As `bag_origin.attachments` gives it.
     """
-    things, own = load_task(plan.task).things, own_wires(load_robot(plan.robot))
+    things, own = load_task(plan.task, plan.thing).things, own_wires(load_robot(plan.robot))
     usual = asdict(Recording())
     unusual = {key: value for key, value in asdict(plan.recording).items() if value != usual[key]}
     texts = given(directory=directory, run_info=info, attachments=files)

@@ -77,6 +77,7 @@ class How:
     control_hz: float = 0.0  # 0: as the system file, the policy or the robot have it [Hz]
     _: KW_ONLY
     scenario: str = "nominal"
+    thing: str = ""  # in space, of `configs/things`; empty: as the task has it
     seed: int = 0
     start: PoseTuple = ()  # as `State.NUMBERS`, or a place alone; empty: as the seed draws it [m, deg]
     goal: PoseTuple | None = None  # the same; None: as the seed draws it, or not one place [m, deg]

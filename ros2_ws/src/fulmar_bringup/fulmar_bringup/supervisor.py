@@ -61,7 +61,7 @@ class Supervisor:
 
     def __init__(self, node: Node, plan: RunPlan, errors: list[Exception] | None = None) -> None:
         """Listen to plant and controller of the plan's robot; `errors` gets what a callback raises."""
-        task = load_task(plan.task)
+        task = load_task(plan.task, plan.thing)
         self._node, self._plan, self._task = node, plan, task
         self._made_s = time.monotonic()
         self.plant, self.controller, self.recorder = Report(), Report(), Report()

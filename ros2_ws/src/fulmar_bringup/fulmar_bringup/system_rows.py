@@ -132,7 +132,7 @@ def _from_outside(plan: RunPlan) -> set[str]:
     if plan.hardware:  # motion capture, or another node that knows where the robot is
         found |= {"odom", "mocap/pose"}
     if plan.hardware and not plan.emulated:  # an emulator sees no things
-        found |= {thing.wire.name for thing in load_task(plan.task).things}
+        found |= {thing.wire.name for thing in load_task(plan.task, plan.thing).things}
     return found
 
 

@@ -54,7 +54,8 @@ class Trial:
     @property
     def task(self) -> Task:
         """The task, with the length of its episodes."""
-        return evaluated_task(self.plan.task, episode_s=self.plan.duration_s, goals=self.plan.goals)
+        plan = self.plan
+        return evaluated_task(plan.task, thing=plan.thing, episode_s=plan.duration_s, goals=plan.goals)
 
     def controller(self) -> Controller:
         """The controller, made anew."""

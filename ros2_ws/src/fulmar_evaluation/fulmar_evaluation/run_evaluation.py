@@ -123,7 +123,7 @@ def evaluate_run(record: RunRecord) -> RunResult | None:
     motion = record.motion
     if len(motion) < 2 or motion.stamp_s[-1] <= motion.stamp_s[0]:
         return None
-    task = load_recorded_task(_text(record, "task"), record.path)
+    task = load_recorded_task(_text(record, "task"), record.path, str(record.info.get("thing") or ""))
     goals = [replace(goal, targets=task.state_type.targets_of(goal.targets)) for goal in _goals(record, task)]
     robot = load_robot(_text(record, "robot"))
     time_s, samples = _even(motion)

@@ -67,7 +67,7 @@ class ControllerNode(LifecycleNode):
         super().__init__("controller", cli_args=cli_args)
         self.settings = read_parameters(self, ControllerSettings)
         self.robot = load_robot(self.settings.robot)
-        self.task = load_task(self.settings.task)
+        self.task = load_task(self.settings.task, self.settings.thing)
         self._make_controller, self._request_exit = make_controller, request_exit
         self._sending = threading.Lock()  # held from the look at whether commands may go out until one has
         hz = self.settings.control_rate(self.robot)

@@ -51,6 +51,7 @@ class MarkersSettings:
 
     robot: str = "floating_platform"
     task: str = "go_to_pose"
+    thing: str = ""  # in space, in the place of that of the task; empty: as the task has it
     area: tuple[float, ...] = NO_AREA  # as in `Guards.area` [m]
 
     def __post_init__(self) -> None:
@@ -73,7 +74,7 @@ class MarkersNode(Node):
         """
         super().__init__("markers", cli_args=cli_args)
         settings = read_parameters(self, MarkersSettings)
-        robot, task = load_robot(settings.robot), load_task(settings.task)
+        robot, task = load_robot(settings.robot), load_task(settings.task, settings.thing)
         task.check_running(robot)
         check_area_of(robot, settings.area)
         self._name, self._frames = name_of(self, robot), own_frames(self, robot)

@@ -80,7 +80,7 @@ class PlantNode(LifecycleNode):
         self.settings = read_parameters(self, settings_class)
         self.robot = load_robot(self.settings.robot)
         load_scenario(self.settings.scenario)  # a wrong name is refused before anything starts
-        load_task(self.settings.task)
+        load_task(self.settings.task, self.settings.thing)
         self._make_backend, self._request_exit, self._simulated = make_backend, request_exit, simulated
         self._backend: Backend | None = None
         self._exit_code = 0

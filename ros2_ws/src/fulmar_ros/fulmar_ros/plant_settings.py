@@ -25,6 +25,7 @@ class PlantSettings:
 
     robot: str = "floating_platform"
     task: str = "go_to_position"  # what the robot is to do: it may bring obstacles, or something to push
+    thing: str = ""  # in space, in the place of that of the task; empty: as the task has it
     backend: str = "mujoco"
     scenario: str = "nominal"
     seed: int = 0
@@ -105,7 +106,11 @@ def first_episode(robot: Robot, settings: PlantSettings) -> Episode:
         ConfigError: A name is unknown, a file is wrong, the task is of the other space, or six numbers are the start
             of a robot in the plane.
     """
-    task, scenario, form = load_task(settings.task), load_scenario(settings.scenario), robot.state_type
+    task, scenario, form = (
+        load_task(settings.task, settings.thing),
+        load_scenario(settings.scenario),
+        robot.state_type,
+    )
     if len(settings.start) > len(form.NUMBERS):
         raise ConfigError(
             f"start = {list(settings.start)}: robot '{robot.name}' moves in {form.WORLD}, where a start is "

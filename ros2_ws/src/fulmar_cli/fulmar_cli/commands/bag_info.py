@@ -19,6 +19,7 @@ ORIGIN = (
     "robot",
     "name",
     "task",
+    "thing",
     "controller",
     "policy",
     "backend",

@@ -27,6 +27,7 @@ class ControllerSettings:
     controller: str = POLICY  # a name of `fulmar list controllers`
     robot: str = "floating_platform"
     task: str = "go_to_pose"
+    thing: str = ""  # in space, in the place of that of the task; empty: as the task has it
     policy: str = ""  # folder of the bundle, for policies
     control_hz: float = 0.0  # 0: the robot's own [Hz]
     lockstep: bool = False

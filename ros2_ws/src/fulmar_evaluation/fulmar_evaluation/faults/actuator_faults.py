@@ -64,7 +64,7 @@ def _stuck(live: LiveSystem, limit_s: float, *, named: bool = False) -> Outcome:
         limit_s: Until it is said [s].
         named: The words have to name the part.
     """
-    task, scenario = load_task(live.plan.task), load_scenario(live.plan.scenario)
+    task, scenario = load_task(live.plan.task, live.plan.thing), load_scenario(live.plan.scenario)
     world = draw_episode(live.robot, task, scenario, seed=live.plan.seed, number=0).world
     part = live.robot.actuators.parts.names[int(world.stuck_part)]
     distance = None if live.flight is not None else DistanceWatch(live)

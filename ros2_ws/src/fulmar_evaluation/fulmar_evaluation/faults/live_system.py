@@ -162,7 +162,7 @@ class LiveSystem:
 
     def _give_goal(self) -> None:
         """As `fulmar goals` gives one to a system that is up."""
-        wire, form = GOAL_WIRES[load_task(self.plan.task).goal_topic], self.robot.state_type
+        wire, form = GOAL_WIRES[load_task(self.plan.task, self.plan.thing).goal_topic], self.robot.state_type
         now_ns = time.time_ns() if self.plan.hardware else SIMULATION_START_NS
         assert self.plan.mission is not None  # as in `completed`
         message = goal_message(self.plan.mission, wire.name, now_ns, self.plan.frames, form=form)

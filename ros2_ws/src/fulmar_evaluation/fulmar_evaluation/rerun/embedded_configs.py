@@ -23,6 +23,7 @@ FAMILIES = {
     "robot": "robots",
     "task": "tasks",
     "scenario": "scenarios",
+    "thing": "things",
 }  # by what the record of a run calls it
 
 
@@ -62,7 +63,7 @@ def unknown(info: Mapping[str, Any]) -> list[tuple[str, str]]:
     return [
         (family, name)
         for family, name in asked
-        if isinstance(name, str) and name == Path(name).name and name not in config_names(family)
+        if isinstance(name, str) and name and name == Path(name).name and name not in config_names(family)
     ]
 
 
