@@ -60,7 +60,7 @@ DIRECTIONS = {
     "operator": "From the operator to plant and controller",
     "every node": "From every node to the operator",
     "display": "From the node that draws to viewers",
-    "camera": "From cameras to estimators",
+    "camera": "From simulated cameras",
 }
 
 HEAD = "| Topic | Type | QoS | Rate | Unit | Frame | Content |\n|---|---|---|---|---|---|---|"

@@ -70,6 +70,34 @@ EVENTS, EVENTS_2 = (
     )
     for topic, which, frame in (("events", "first", "event_camera"), ("events_2", "second", "event_camera_2"))
 )  # fmt: skip
+CAMERA_INFO = Wire(
+    "camera/camera_info", "sensor_msgs/msg/CameraInfo", "camera", "stream", "with each image, where a camera runs",
+    "intrinsics of the camera's images, stamped as they", unit="px", frame="`camera_optical_frame`",
+)  # fmt: skip
+CAMERA_IMAGE, CAMERA_DEPTH, CAMERA_SEGMENTATION = CAMERA_IMAGES = tuple(
+    Wire(
+        topic, "sensor_msgs/msg/Image", "camera", "stream",
+        "`rate_hz` of the robot's camera, where one runs; bags have it compressed",
+        content, unit=unit, frame="`camera_optical_frame`", recorded=False,
+    )
+    for topic, content, unit in (
+        ("camera/image_raw", "`rgb8`: what the camera sees, stamped as the state that it sees it from", "0 to 255"),
+        ("camera/depth/image_raw", "`32FC1`: depth along the optical axis, infinity where nothing is", "m"),
+        ("camera/segmentation/image_raw", "`16UC1`: semantic id of what each pixel shows, 0 for none", "none"),
+    )
+)  # fmt: skip
+# What a recorder makes of each of `CAMERA_IMAGES`.
+CAMERA_IMAGE_COMPRESSED, CAMERA_DEPTH_COMPRESSED, CAMERA_SEGMENTATION_COMPRESSED = CAMERA_COMPRESSED = tuple(
+    Wire(
+        topic, "sensor_msgs/msg/CompressedImage", "camera", "stream", "with each image, in bags",
+        f"the same as `{image.name}`; `format` is `{form}`", unit=image.unit, frame=image.frame,
+    )
+    for image, topic, form in (
+        (CAMERA_IMAGE, "camera/image_raw/compressed", "rgb8; jpeg compressed rgb8"),
+        (CAMERA_DEPTH, "camera/depth/image_raw/compressedDepth", "32FC1; compressedDepth png"),
+        (CAMERA_SEGMENTATION, "camera/segmentation/image_raw/compressed", "mono16; png compressed"),
+    )
+)  # fmt: skip
 RATE = Wire(
     "rate", "geometry_msgs/msg/TwistWithCovarianceStamped", "estimator", "stream",
     "each window of events, where a rate estimator runs",
@@ -232,7 +260,7 @@ WIRES: tuple[Wire, ...] = (
     OBSERVATION, ACTION, BELIEVED, METADATA, STATUS, DIAGNOSTICS, GOAL_POSE, GOAL_POINT, GOAL_PATH, GOAL_POSES,
     GOAL_VELOCITY, OBSTACLES, MARKERS, BLOCK, AIR_BEARING, DEVICE_STATE, ESTOP, ESTOP_RELEASED, TELEOP, JOY, SWAP,
     RELAY, TRANSFORMS, STATIC_TRANSFORMS, DESCRIPTION, INERTIA, INERTIA_COVARIANCE, INERTIA_STATUS, EVENTS, EVENTS_2,
-    RATE, RATE_STATUS, PERIOD, ANSWER,
+    *CAMERA_IMAGES, *CAMERA_COMPRESSED, CAMERA_INFO, RATE, RATE_STATUS, PERIOD, ANSWER,
 )  # fmt: skip
 
 
