@@ -9,7 +9,7 @@ from typing import Annotated, Any, TypeVar
 import numpy as np
 
 from fulmar_core.config.errors import ConfigError
-from fulmar_core.config.strict_yaml import Kinds
+from fulmar_core.config.strict_yaml import Kinds, Named
 from fulmar_core.robots.actuators.families import FAMILIES
 from fulmar_core.robots.actuators.family import Actuators
 from fulmar_core.robots.actuators.parts import check_part_names
@@ -19,6 +19,7 @@ from fulmar_core.robots.airframe.airframe import Airframe
 from fulmar_core.robots.hydrodynamics import Hydrodynamics
 from fulmar_core.robots.kinds import kind_of
 from fulmar_core.robots.kinds.kind import Kind
+from fulmar_core.robots.sensors.camera import PROFILES, CameraConfig
 from fulmar_core.robots.sensors.event_camera import EventCamera
 from fulmar_core.robots.sensors.imu import ImuSpec
 from fulmar_core.robots.sensors.kind import SensorKind
@@ -190,6 +191,8 @@ class Sensors:
     odometry: OdometrySpec
     imu: ImuSpec
     own: dict[str, OwnSensorSpec] = field(default_factory=dict, hash=False)  # by a name that no row has
+    # In simulation a node of its own, which runs where it is asked for, shows what it sees.
+    camera: Annotated[CameraConfig | None, Named(PROFILES)] = None
 
     @property
     def specs(self) -> dict[str, Any]:
@@ -207,7 +210,7 @@ class Sensors:
 
     def __post_init__(self) -> None:
         for name in self.own:
-            if name in SENSORS or not name.isidentifier():
+            if name in (*SENSORS, "camera") or not name.isidentifier():
                 raise ValueError(
                     f"'own' has a sensor '{name}': a name of letters, digits and _ is needed that is none of "
                     f"{', '.join(SENSORS)}."

@@ -12,6 +12,7 @@ from fulmar_core.config.plausible_ranges import RELATIONS, ROBOT
 from fulmar_core.config.strict_yaml import load_config
 from fulmar_core.robots.calibration import VARIABLE, calibrated, calibration_in_use, load_calibration
 from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.sensors.camera import RANGES as CAMERA_RANGES
 from fulmar_core.robots.sensors.table import RANGES
 from fulmar_core.states.planar import PlanarState
 
@@ -47,7 +48,7 @@ def load_robot_file(path: Path) -> Robot:
     robot = load_config(Robot, path)
     own = robot.actuators.ranges(robot)
     replaced = {row.key for row in own}
-    rows = (*own, *(row for row in ROBOT if row.key not in replaced), *RANGES)
+    rows = (*own, *(row for row in ROBOT if row.key not in replaced), *RANGES, *CAMERA_RANGES)
     # A number that is wrong by itself is named before one that does not fit to others.
     alone = [row for row in rows if row.scale is None]
     check_plausible(robot, (*alone, *RELATIONS, *(row for row in rows if row.scale is not None)), path)

@@ -11,6 +11,8 @@ from scipy.spatial.transform import Rotation
 
 from fulmar_core.robots.actuators.parts import Fixture
 from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.sensors.camera import LINK, OPTICAL, CameraConfig
+from fulmar_core.states.attitude import euler_of
 from fulmar_core.wires.robot_name import PLAIN, Frames
 
 IMU = "imu_link"
@@ -40,15 +42,24 @@ def body_frames(robot: Robot) -> tuple[BodyFrame, ...]:
     """Frames of the parts of a robot.
 
     Returns:
-        `imu_link`, then `<name>_link` of each of `Actuators.fixtures`.
+        `imu_link`, those of its camera, if any, then `<name>_link` of each of `Actuators.fixtures`.
     """
+    camera = robot.sensors.camera
     return (
         BodyFrame(IMU, (0.0, 0.0, 0.0)),
+        *(_camera_frames(camera) if camera is not None else ()),
         *(
             BodyFrame(f"{part.name}_link", part.position, _x_axis_along(part.axis), part)
             for part in robot.actuators.fixtures
         ),
     )
+
+
+def _camera_frames(camera: CameraConfig) -> tuple[BodyFrame, BodyFrame]:
+    """Where it sits, with x ahead, and the same with ROS's optical axes."""
+    attitudes = (LINK, camera.quat_xyzw), (OPTICAL, camera.optical_quat_xyzw)
+    link, optical = (BodyFrame(name, camera.position, euler_of(quat)) for name, quat in attitudes)
+    return link, optical
 
 
 def urdf_of(robot: Robot, frames: Frames = PLAIN) -> str:
