@@ -86,16 +86,17 @@ CAMERA_IMAGE, CAMERA_DEPTH, CAMERA_SEGMENTATION = CAMERA_IMAGES = tuple(
         ("camera/segmentation/image_raw", "`16UC1`: semantic id of what each pixel shows, 0 for none", "none"),
     )
 )  # fmt: skip
-# What a recorder makes of each of `CAMERA_IMAGES`.
-CAMERA_IMAGE_COMPRESSED, CAMERA_DEPTH_COMPRESSED, CAMERA_SEGMENTATION_COMPRESSED = CAMERA_COMPRESSED = tuple(
+# What a recorder makes of each of `CAMERA_IMAGES`; of depth two, since RViz reads the one and Foxglove the other.
+CAMERA_COMPRESSED = tuple(
     Wire(
-        topic, "sensor_msgs/msg/CompressedImage", "camera", "stream", "with each image, in bags",
-        f"the same as `{image.name}`; `format` is `{form}`", unit=image.unit, frame=image.frame,
+        f"{image.name}/{ending}", "sensor_msgs/msg/CompressedImage", "camera", "stream", "with each image, in bags",
+        f"the same as `{image.name}`; `format` is `{form}`{more}", unit=unit, frame=image.frame,
     )
-    for image, topic, form in (
-        (CAMERA_IMAGE, "camera/image_raw/compressed", "rgb8; jpeg compressed rgb8"),
-        (CAMERA_DEPTH, "camera/depth/image_raw/compressedDepth", "32FC1; compressedDepth png"),
-        (CAMERA_SEGMENTATION, "camera/segmentation/image_raw/compressed", "mono16; png compressed"),
+    for image, ending, form, more, unit in (
+        (CAMERA_IMAGE, "compressed", "rgb8; jpeg compressed bgr8", "", CAMERA_IMAGE.unit),
+        (CAMERA_DEPTH, "compressedDepth", "32FC1; compressedDepth png", ", to 100 m", CAMERA_DEPTH.unit),
+        (CAMERA_DEPTH, "compressed", "16UC1; png compressed", ", to 65.5 m", "mm"),
+        (CAMERA_SEGMENTATION, "compressed", "mono16; png compressed", "", CAMERA_SEGMENTATION.unit),
     )
 )  # fmt: skip
 RATE = Wire(
