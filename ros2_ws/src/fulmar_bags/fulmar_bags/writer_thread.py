@@ -25,6 +25,7 @@ from fulmar_core.config.yielding import BEHIND
 MAX_QUEUED = 100_000  # messages that may wait for the thread
 MAX_WAITING = 64 << 20  # bytes that may wait for the thread, and as many for a disk that refuses them
 EMPTY_EVERY_S = 0.05  # longer batches wake the processor less often, shorter ones lose nothing less
+PAUSE_S = 0.002  # between two looks of who waits for room
 SLOW_S = 1.0  # a disk that takes longer for half a second of messages is a slow one
 RECORDING = "fulmar_recording"  # entry of `custom_data`: JSON of `Account`
 
@@ -67,7 +68,7 @@ class Account:
 
 
 class BagThread:
-    """Writes a bag in a thread of its own; `put` never waits."""
+    """Writes a bag in a thread of its own; `put` never waits, unless it is patient."""
 
     def __init__(
         self,
@@ -77,6 +78,7 @@ class BagThread:
         max_queued: int = MAX_QUEUED,
         max_waiting: int = MAX_WAITING,
         before: Mapping[str, Any] | None = None,
+        patient: bool = False,
     ) -> None:
         """Start the thread.
 
@@ -86,7 +88,9 @@ class BagThread:
             max_queued: Messages that may wait for the thread.
             max_waiting: Bytes that may wait for the thread, and as many for the disk.
             before: What `RECORDING` says of an interrupted bag that goes on; its counts are added in the bag.
+            patient: Whether `put` waits for room, in lock step, where whoever publishes waits, too.
         """
+        self._patient = patient
         self._before = dict(before or {})
         self._bag, self._on_error = bag, on_error
         self._max_queued, self._max_waiting = max_queued, max_waiting
@@ -109,10 +113,9 @@ class BagThread:
     def put(self, topic: str, data: bytes, log_ns: int, publish_ns: int | None = None) -> None:
         """Offer a message, from one thread only; arguments as in `BagWriter.write`."""
         self._received += 1
-        if (
-            self._queue.qsize() >= self._max_queued
-            or self._put_bytes - self._taken_bytes >= self._max_waiting
-        ):
+        while self._patient and self._is_full() and self._thread.is_alive():
+            time.sleep(PAUSE_S)
+        if self._is_full():
             self._crowded_out[topic] += 1
             self._report_once(
                 "full", "the disk is too slow and memory is full: further messages are dropped."
@@ -120,6 +123,10 @@ class BagThread:
             return
         self._put_bytes += len(data)
         self._queue.put((topic, data, log_ns, publish_ns))
+
+    def _is_full(self) -> bool:
+        waiting = self._put_bytes - self._taken_bytes
+        return self._queue.qsize() >= self._max_queued or waiting >= self._max_waiting
 
     def attach(self, name: str, data: bytes) -> None:
         """Carry a file along; from any thread."""
