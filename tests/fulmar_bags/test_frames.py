@@ -132,7 +132,7 @@ REFUSED = {
     "an encoding that nobody knows": (raw(GREY, "theirs"), IMAGE, "'theirs' of frames is not read.*rgb8"),
     "a length that is none": (raw(GREY, "mono8")[:-9], IMAGE, "no sensor_msgs/msg/Image"),
     "pixels that are missing": (raw(GREY, "rgb8"), IMAGE, "damaged: 4 × 4 of 'rgb8' with 4 bytes a row"),
-    "a image that ends too early": (
+    "an image that ends too early": (
         compressed(codecs.png(scene()[IDS])[:120], "png"),
         COMPRESSED,
         "damaged",

@@ -10,7 +10,7 @@ from fulmar_bringup.node_spec import NodeSpec, given
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_core.config.recording import Recording
 from fulmar_core.robots.robot_file import load_robot
-from fulmar_core.robots.topics import WIRES, own_wires
+from fulmar_core.robots.topics import CAMERA_IMAGES, WIRES, own_wires
 from fulmar_core.tasks import load_task
 
 
@@ -38,7 +38,9 @@ def recorder_spec(plan: RunPlan, *, directory: str = "", info: str = "", files: 
         "fulmar_ros.recorder_node",
         texts | unusual | more,
         observed=tuple(
-            wire.name for wire in (*WIRES, *own, *(thing.wire for thing in things)) if wire.recorded
+            wire.name
+            for wire in (*WIRES, *own, *(thing.wire for thing in things))
+            if wire.recorded or wire in CAMERA_IMAGES
         ),
         loss=plan.loss_of_helpers,
     )

@@ -14,6 +14,9 @@ from rclpy.node import Node
 from rclpy.subscription import Subscription
 
 from fulmar_bags.contents import recorded_faults
+from fulmar_bags.frame_messages import COMPRESSED, IMAGE
+from fulmar_bags.frame_recording import PackedFrames
+from fulmar_bags.frame_topics import PACKED_ENDINGS
 from fulmar_bags.gathered import json_object
 from fulmar_bags.interrupted_bag import interrupted_bag
 from fulmar_bags.mcap_records import custom_text
@@ -26,6 +29,9 @@ from fulmar_core.config.provenance import attachments
 from fulmar_core.robots.topics import (
     ACTUATORS_STATE,
     AIR_BEARING,
+    CAMERA_COMPRESSED,
+    CAMERA_IMAGES,
+    CAMERA_INFO,
     COMMAND,
     GOAL_POSES,
     GOAL_WIRES,
@@ -61,6 +67,10 @@ MEASURED = tuple(
     wire for wire in SENSOR_WIRES.values() if wire != ODOMETRY
 )  # repeated at the beginning of lock step
 REMEMBERED_OF_OTHERS = 32
+STAMPED = frozenset(
+    (*CAMERA_IMAGES, *CAMERA_COMPRESSED, CAMERA_INFO)
+)  # one of each stamp is enough, in lock step
+STAMP = slice(4, 12)  # of a message with a header, in CDR
 Keep = Callable[[bytes, dict[str, int]], None]
 
 
@@ -84,7 +94,7 @@ class RecorderNode(Node):
         self._run_info, self._attachments = settings.run(), settings.files()
         own = settings.own_wires()
         wires = dict.fromkeys((*WIRES, *own, *(thing_wire(name) for name in settings.things if name)))
-        found = {wire: message_class(wire) for wire in wires if wire.recorded}
+        found = {wire: message_class(wire) for wire in wires if wire.recorded or wire in CAMERA_IMAGES}
         classes = {wire: kind for wire, kind in found.items() if kind is not None}
         # The bag names topics as every reader of bags knows them, whatever they are remapped to on the wire.
         self._topics = {wire: self.resolve_topic_name(wire.name, only_expand=True) for wire in classes}
@@ -92,7 +102,15 @@ class RecorderNode(Node):
         whole = self._bag_per_goal if settings.mode == "goals" else self._open_bag
         before = (json_object(custom_text(self._directory, RECORDING)) or {}) if settings.resume else {}
         warnings = [self._interruption()] if settings.resume else []
-        self._thread = BagThread(self._ring or whole(), on_error=self.get_logger().error, before=before)
+        images = {topic for wire, topic in self._topics.items() if wire.type == IMAGE}
+        report = self.get_logger().error
+        bag = self._ring or whole()
+        self._thread = BagThread(
+            PackedFrames(bag, images, report) if settings.frames == "compressed" else bag,
+            on_error=report,
+            before=before,
+            patient=settings.lossless,
+        )
         self._provenance = threading.Thread(target=self._attach_provenance, name="provenance", daemon=True)
         self._provenance.start()
         commands: list[list[Subscription]] = []
@@ -101,6 +119,8 @@ class RecorderNode(Node):
             put = self._keep(topic)
             if settings.lossless and wire in REPEATED:
                 put = once(put, REPEATED[wire])
+            elif settings.lossless and wire in STAMPED:
+                put = once(put, REMEMBERED_OF_OTHERS, STAMP)
             elif wire in (*MEASURED, *own):
                 put = once(put, REMEMBERED_OF_OTHERS)
             made = subscribe_every(
@@ -161,6 +181,9 @@ class RecorderNode(Node):
         )
         for wire, topic in self._topics.items():
             bag.add_topic(topic, wire.type, wire.delivery)
+            if wire.type == IMAGE and wire not in CAMERA_IMAGES:  # of a sensor of the user's own
+                for ending in PACKED_ENDINGS:
+                    bag.add_topic(topic + ending, COMPRESSED, wire.delivery)
         return bag
 
     def _bag_per_goal(self) -> BagPerGoal:
@@ -241,14 +264,15 @@ class RecorderNode(Node):
         return FAILED if account.lost else DONE
 
 
-def once(keep: Keep, remembered: int) -> Keep:
-    """A callback that leaves out what equals one of so many newest messages, to the last byte."""
+def once(keep: Keep, remembered: int, part: slice = slice(None)) -> Keep:
+    """A callback that leaves out what equals one of so many newest messages, in all of its bytes or a part of them."""
     newest: dict[bytes, None] = {}  # in the order in which they came
 
     def keep_once(data: bytes, info: dict[str, int]) -> None:
-        if data in newest:
+        known = data[part]
+        if known in newest:
             return
-        newest[data] = None
+        newest[known] = None
         if len(newest) > remembered:
             del newest[next(iter(newest))]
         keep(data, info)
