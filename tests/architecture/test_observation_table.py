@@ -116,6 +116,11 @@ def in_space(task, side):
         aside = turned if task.goal_topic == "goal_velocity" else exponential(tuple(turned * turn))
         targets = np.concatenate((places, np.tile(aside, (3, 1))), axis=-1)
         goal = Goal(targets[None], np.zeros(1), no_obstacles(1))
+        if task.moves:  # ever faster, and turning faster than the body
+            targets[:, :3] += np.array([[0.0], [1.0], [4.0]]) * (places[1] - places[0])
+            for later in (1, 2):
+                targets[later, 3:] = exponential(tuple(turned * np.add(turn, 0.5 * later)))
+            goal = task.begun(goal, at)
         return dict(zip(task.observation_names, task.observe(at, goal), strict=True))
 
     shown = {

@@ -38,12 +38,15 @@ class SpaceFrame:
     """
 
     def __init__(self, task: Task) -> None:
-        self.tracks, self.passes = task.goal_topic == "goal_velocity", task.goal_topic == "goal_path"
-        self.heads = task.goal_topic == "goal_pose" or bool(getattr(task, "turns", False))
+        self.task = task
+        self.tracks = task.goal_topic == "goal_velocity"
+        self.passes = task.goal_topic == "goal_path" and not task.moves
+        self.heads = task.goal_topic == "goal_pose" or task.moves or bool(getattr(task, "turns", False))
 
     def motion(self, inputs: Inputs) -> SpaceMotion:
         """Errors and motion; of the estimated state, where there is an estimate."""
-        estimate, state, target = inputs.estimates, _state(inputs), inputs.goal.current
+        estimate, state = inputs.estimates, _state(inputs)
+        target = self.task.target_of(inputs.goal)
         alive = None if estimate is None else estimate.alive
         velocity, rate = _rows(state.velocity_in_body), _rows(state.rate)
         none = np.zeros_like(state.qw)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from fulmar_core.controllers.controller import Inputs
 from fulmar_core.controllers.delta_sigma import DeltaSigma
 from fulmar_core.controllers.law import Law
 from fulmar_core.controllers.space_frame import SpaceFrame, SpaceMotion
-from fulmar_core.controllers.target_motion import TargetMotion
+from fulmar_core.controllers.target_motion import Moved, TargetMotion
 from fulmar_core.robots.actuators.pushing import Pushing
 from fulmar_core.states.rotation import cross
 
@@ -88,7 +89,7 @@ class SpaceLaw(Law):
         """Choose commands; shapes as in `Controller.act`."""
         now, moved = self.frame.motion(inputs), None
         if not self.frame.tracks and not self.frame.passes:
-            moved = self._target.update(inputs.goal.current, inputs.stamp_ns, inputs.dt)
+            moved = self._moved(inputs)
             now = self.frame.less_target(now, inputs, moved.at_end)
         wrench = self.wrench(self._way(inputs, now), now)
         if moved is not None and moved.change.any():
@@ -98,6 +99,14 @@ class SpaceLaw(Law):
         wrench[..., 3:] += cross(self._com, wrench[..., :3])
         best = self.allocation if self._modulation is None else self._modulation
         return np.asarray(best.best(wrench, now.alive))
+
+    def _moved(self, inputs: Inputs) -> Moved:
+        """How the target moves: as its task knows it, or by the difference to the step before."""
+        task: Any = self.task
+        if not self.task.moves:
+            return self._target.update(inputs.goal.current, inputs.stamp_ns, inputs.dt)
+        now = task.reference_of(inputs.goal)
+        return Moved(now.motion, now.change, 0.0)
 
     @abstractmethod
     def wrench(self, way: np.ndarray, now: SpaceMotion) -> np.ndarray:

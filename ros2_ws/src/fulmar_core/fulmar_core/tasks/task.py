@@ -38,6 +38,7 @@ class Task(ABC, Generic[S]):
         required: Targets that make an episode a success; None where a closing window does.
         state_type: Form of the states that its methods take.
         thing: Of `configs/things`, in its world; empty: none.
+        moves: Whether its target moves by the clock; its goals have more of it than `Goal.current`, see `moving_pose`.
         observes_numbers: Whether `observe` answers the state of one robot in plain numbers by plain numbers.
     """
 
@@ -49,6 +50,7 @@ class Task(ABC, Generic[S]):
     required: int | None = None
     state_type: type[State] = PlanarState
     thing: str = ""
+    moves: bool = False
     observes_numbers: bool = False
 
     # A class, a property or a field has these two: dataclasses would take a property of this class for a default.
@@ -134,6 +136,10 @@ class Task(ABC, Generic[S]):
             targets: Poses in the world, shape (k, 7), or twists in the body's frame, shape (k, 6).
         """
         return goal_at(*self.state_type.targets_of(targets))
+
+    def target_of(self, goal: Goal) -> Array:
+        """The target that counts now, shape (..., 3), in space (..., 7 or 6)."""
+        return goal.current
 
     def said(self, goal: Goal) -> str:
         """A goal of one robot in words, as the line before a run says it."""
