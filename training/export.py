@@ -71,7 +71,7 @@ def export(run: Path, out: Path) -> Passport:
             key: record[key] for key in ("command", "seed", "steps", "wall_s", "settings", "best", "versions")
         }
         | {"git_revision": record.get("git_revision", ""), "interrupted": record.get("interrupted", False)}
-        | {key: record[key] for key in ("recipe", "fallback_policy") if key in record}
+        | {key: record[key] for key in ("updates", "cpu_s", "recipe", "fallback_policy") if key in record}
         | {"curve": _curve(record)}
         | _mujoco_result(record),
     )

@@ -49,6 +49,7 @@ class RunHistory:
     """History of a run, also across an interruption."""
 
     elapsed_s: float = 0.0  # wall-clock that earlier parts took [s]
+    cpu_s: float = 0.0  # processor time of the same, of all threads [s]
     updates: int = 0
     checks: list[Check] = field(default_factory=list)
     best: tuple[Check, DeployedNetwork] | None = None
@@ -94,8 +95,8 @@ class Session(BaseCallback):
         self._worlds, self._command_scale, self._watcher = worlds, command_scale, watcher
         self._fallback = fallback
         self._checkpoint, self._asked_to_stop = checkpoint, asked_to_stop
-        self._before_s = history.elapsed_s
-        self._began = time.monotonic()
+        self._before_s, self._cpu_before_s = history.elapsed_s, history.cpu_s
+        self._began, self._cpu_began = time.monotonic(), time.process_time()
         # A share of the run, not a time: which network is best must not depend on the speed of the machine.
         self._check_every = settings.evaluate_every_s / (limits.time_s or settings.time_limit_s)
         self._plan_check(limits.progress(history.elapsed_s, history.updates))
@@ -108,6 +109,10 @@ class Session(BaseCallback):
     def elapsed_s(self) -> float:
         """Wall-clock of learning, over all parts of the run [s]."""
         return self._before_s + time.monotonic() - self._began
+
+    def _take_time(self) -> None:
+        self.history.elapsed_s = self.elapsed_s
+        self.history.cpu_s = self._cpu_before_s + time.process_time() - self._cpu_began
 
     @property
     def steps_per_s(self) -> float:
@@ -139,7 +144,7 @@ class Session(BaseCallback):
         history = self.history
         history.updates += not self._first
         self._first = False
-        history.elapsed_s = self.elapsed_s
+        self._take_time()
         progress = self._limits.progress(history.elapsed_s, history.updates)
         self._watcher.advance(progress, history.elapsed_s, self._steps)
         if self._settings.annealing:
@@ -193,7 +198,7 @@ class Session(BaseCallback):
 
     def save(self) -> None:
         """Write a checkpoint."""
-        self.history.elapsed_s = self.elapsed_s
+        self._take_time()
         more: dict[str, Any] = {"history": self.history}
         save_checkpoint(self._checkpoint, self.model, more)
 

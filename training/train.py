@@ -182,6 +182,7 @@ def train(
         "steps": learner.num_timesteps * worlds.hold,
         "updates": history.updates,
         "wall_s": round(history.elapsed_s, 1),
+        "cpu_s": round(history.cpu_s, 2),
         "steps_per_s": round(session.steps_per_s),
         "interrupted": interrupted,
         "best": asdict(best),

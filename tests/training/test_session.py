@@ -77,11 +77,12 @@ def test_a_resumed_run_ends_with_the_weights_of_an_uninterrupted_one(tmp_path, q
     settings = small(name)
     whole, parts = tmp_path / "whole", tmp_path / "parts"
     train(TURTLEBOT, TASK, settings, seed=1, out=whole, updates=6)
-    train(TURTLEBOT, TASK, settings, seed=1, out=parts, updates=3)
+    first = train(TURTLEBOT, TASK, settings, seed=1, out=parts, updates=3)
     torch.manual_seed(99)
     np.random.seed(99)
     record = train(TURTLEBOT, TASK, settings, seed=1, out=parts, updates=6, resume=True)
     assert record["updates"] == 6
+    assert record["cpu_s"] >= first["cpu_s"] > 0.0, "of both parts"
     (expected, statistics), (found, others) = weights(whole, settings), weights(parts, settings)
     for key, value in expected.items():
         assert torch.equal(value, found[key]), key
