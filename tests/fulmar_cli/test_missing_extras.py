@@ -43,6 +43,7 @@ GIVEN = {
     "demo": ("", ("ros", "sim", "policy", "bags", "view")),
     "install-tf": ("", ()),
     "install-stars": ("", ()),
+    "benchmark avist": ("", ("sim", "policy")),
     "benchmark drift": ("", ("policy", "sim")),
     "benchmark events": ("", ("sim",)),
     "benchmark falcon": ("", ("view",)),

@@ -180,6 +180,36 @@ RANS3D = Row(
     measures="evaluating",
 )  # fmt: skip
 
+AVIST = Row(
+    "avist",
+    "fulmar_benchmarks.avist.campaign:Avist",
+    """Evaluate a cubesat at the tasks of RL-AVIST, by laws and by policies.
+
+    Every controller at every task in MuJoCo (part `tasks`), and the policy that follows a moving pose through live
+    nodes in lock step, in at most 64 episodes (part `live`). A bundle that does not exist leaves its cells empty and
+    says how to make it. The thesis, §6.2, prints no numbers; what its code sets stands in `published`. DIR keeps
+    results for the same code, configuration and controller, so an interrupted benchmark continues where it stopped.
+    DIR/index.html is the report, DIR/avist.json the figures.
+
+    Try:
+
+    fulmar benchmark avist --parts tasks --tasks go_to_pose_3d --controllers lqr,pd --json
+    """,
+    (
+        Selector("robot", "NAME", "A body that floats free.", "cubesat_8"),
+        Selector("tasks", "T,...", "Out of its tasks, or all.", "all",
+                 family="task", known="fulmar_benchmarks.avist.targets:TASKS"),
+        Selector("controllers", "K,...", "Out of lqr, pd and policy, or all.", "all",
+                 family="controller", known="fulmar_benchmarks.avist.targets:CONTROLLERS"),
+        Selector("parts", "P,...", "Out of tasks and live, or all.", "all",
+                 family="part", known="fulmar_benchmarks.avist.targets:PARTS"),
+        POLICIES,
+        Selector("episodes", "N", "Of each controller at each task.", 256, int, 1),
+    ),
+    needs=lambda choice: ("mujoco", *(("onnxruntime",) * ("policy" in choice.controllers))),
+    measures="evaluating",
+)  # fmt: skip
+
 ROBORAN = Row(
     "roboran",
     "fulmar_benchmarks.roboran.campaign:Roboran",
@@ -215,6 +245,7 @@ ROBORAN = Row(
 
 ROWS = (
     EVERY,
+    AVIST,
     DESCENT,
     DRIFT,
     ENDURANCE,

@@ -1,0 +1,1 @@
+"""The benchmark after RL-AVIST: a cubesat that goes, follows and inspects."""

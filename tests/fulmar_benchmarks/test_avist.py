@@ -1,0 +1,145 @@
+"""`fulmar benchmark avist`: what it asks for, its document, and that it goes on where it was broken off."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fulmar_benchmarks.avist.campaign import Avist, updates_of
+from fulmar_benchmarks.avist.targets import LEAST_SUCCESS, of_live
+from fulmar_benchmarks.campaign import run
+from fulmar_benchmarks.catalogue import choice
+from fulmar_benchmarks.results import PairResult
+from fulmar_benchmarks.shape import HERE
+from fulmar_benchmarks.tables import Table
+from fulmar_benchmarks.unit import TrialCell
+from tests.fulmar_benchmarks.test_shape import without_moment
+
+ROBOT = "spacecraft_16"  # stands in for the cubesat, whatever policies are there
+
+
+class InThisProcess(Avist):
+    """Where `quickly` stands for the measuring, which a pool's processes would not know."""
+
+    def cells(self):
+        return [replace(cell, where=HERE) for cell in super().cells()]
+
+
+def asked(out: Path, **more) -> Avist:
+    given = {
+        "tasks": "go_to_pose_3d,track_velocities_3d",
+        "controllers": "lqr,pd",
+        "parts": "tasks",
+        "episodes": 2,
+    }
+    return InThisProcess(choice("avist", robot=ROBOT, jobs=1, out=out, report=False, **given | more))
+
+
+def result_of(cell: TrialCell, rate: float) -> PairResult:
+    """As a trial gives it, of episodes that succeed at a rate."""
+    count, nothing = cell.trial.episodes, np.zeros((cell.trial.episodes, 2))
+    about = {
+        "scenario": "nominal", "control_hz": 10.0, "episode_s": 60.0, "control_steps": 1, "wall_s": 1.0,
+    }  # fmt: skip
+    figures = {"final_position_error_m": np.full(count, 0.01), "effort": np.full(count, 0.1)}
+    return PairResult(about, np.arange(count) < rate * count, figures, *([nothing] * 7))
+
+
+def quickly(cell: TrialCell, progress, pool=None):
+    """Measured without running anything; it waits where a file says so."""
+    with (cell.bounds.parent / "notes").open("a") as file:
+        file.write(f"{cell.name}\n")
+    if (cell.bounds.parent / f"block_{cell.name}").exists():
+        time.sleep(60.0)
+    return dict(vars(result_of(cell, 1.0 if "lqr" in cell.name else 0.5)))
+
+
+@pytest.fixture
+def quick(monkeypatch):
+    monkeypatch.setattr(TrialCell, "measure", quickly)
+
+
+def test_the_document_has_laws_and_policies_by_task_and_what_is_required(quick, tmp_path):
+    policies = tmp_path / "none"
+    document = run(asked(tmp_path, controllers="all", policies=policies)).document
+    assert set(document["laws"]) == {"go_to_pose_3d", "track_velocities_3d"}
+    assert document["laws"]["go_to_pose_3d"]["lqr"]["success_rate"] == 1.0
+    assert document["laws"]["go_to_pose_3d"]["pd"]["duty"] == pytest.approx(0.1)
+    policy = document["policies"]["go_to_pose_3d"]
+    assert (policy["success_rate"], policy["updates"], policy["cpu_s"]) == (None, None, None)
+    assert policy["reason"] == f"there is no bundle: `fulmar policies {ROBOT}_go_to_pose_3d` makes it"
+    met = {check["name"]: check["met"] for check in document["checks"]}
+    assert met == {
+        "go_to_pose_3d, lqr: success": True, "go_to_pose_3d, pd: success": False,
+        "go_to_pose_3d, policy: success": None, "track_velocities_3d, policy: success": None,
+    }  # fmt: skip
+    assert "no number" in document["published_note"]
+
+
+def test_the_page_shows_each_controller_and_why_one_is_missing(quick, tmp_path):
+    benchmark = asked(tmp_path, controllers="all", policies=tmp_path / "none")
+    table, *lines = benchmark.tables(run(benchmark).document)
+    assert isinstance(table, Table)
+    assert len(table.rows) == 6
+    assert "there is no bundle" in lines[0]
+    assert lines[-4].startswith("met      go_to_pose_3d, lqr")
+
+
+def test_every_key_is_written_down(quick, tmp_path):
+    text = (Path(__file__).parents[2] / "docs" / "evaluation.md").read_text()
+    document = run(asked(tmp_path, controllers="all", policies=tmp_path / "none")).document
+    keys = {*document, *document["policies"]["go_to_pose_3d"]}
+    assert [key for key in sorted(keys) if f"`{key}`" not in text] == []
+
+
+def test_a_benchmark_that_is_killed_goes_on_and_gives_an_equal_document(quick, tmp_path):
+    whole = run(asked(tmp_path))
+    broken = tmp_path / "broken"
+    broken.mkdir()
+    last = asked(broken).cells()[-1].name
+    (broken / f"block_{last}").touch()
+    process = subprocess.Popen([sys.executable, "-m", "tests.fulmar_benchmarks.test_avist", str(broken)])
+    notes, until = broken / "notes", time.monotonic() + 60.0
+    while time.monotonic() < until and not (notes.exists() and last in notes.read_text()):
+        time.sleep(0.02)
+    os.kill(process.pid, signal.SIGKILL)
+    assert process.wait() == -signal.SIGKILL
+    (broken / f"block_{last}").unlink()
+    assert without_moment(run(asked(broken)).document) == without_moment(whole.document)
+    measured = notes.read_text().split()
+    assert len(measured) == 5, "only the last one was measured again"
+    assert measured[-1] == measured[-2] == last
+
+
+def test_success_through_nodes_stands_beside_that_in_mujoco():
+    (check,) = of_live({"success_rate": 0.90}, {"success_rate": 0.86})
+    assert (check.met, check.measured) == (False, pytest.approx(0.04))
+    (check,) = of_live({"success_rate": None}, {"success_rate": 0.86})
+    assert check.met is None
+    assert of_live(None, {"success_rate": 0.86}) == []
+
+
+def test_updates_are_those_of_the_passport_or_follow_from_its_steps():
+    settings = {"worlds": 1024, "algorithm": {"kind": "ppo", "steps": 16}}
+    assert updates_of({"updates": 150, "steps": 1}) == 150
+    assert updates_of({"steps": 120 * 16384, "settings": settings}) == 120
+    assert updates_of({"steps": 5000, "settings": {"worlds": 8, "algorithm": {"kind": "td3"}}}) is None
+    assert updates_of({}) is None
+
+
+def test_laws_and_policies_of_the_cubesat_have_the_limits_that_were_asked_for():
+    assert LEAST_SUCCESS["go_to_pose_3d", "pd"] == LEAST_SUCCESS["go_to_pose_3d", "lqr"] == 0.99
+    assert LEAST_SUCCESS["follow_pose_3d", "policy"] == 0.85
+
+
+if __name__ == "__main__":
+    TrialCell.measure = quickly  # type: ignore[method-assign]
+    run(asked(Path(sys.argv[1])))
