@@ -52,8 +52,13 @@ class MujocoBackend:
     def of(cls, robot: Robot, task: Task, scenario: Scenario) -> MujocoBackend:
         """The simulator that a task and a scenario ask for."""
         sensors = sensors_in(robot, scenario)
-        among = {"things": task.things, "structures": task.structures}
-        return cls(robot, sensor_noise=scenario.sensor_noise, **among, sensors=sensors)
+        return cls(
+            robot,
+            sensor_noise=scenario.sensor_noise,
+            things=task.things,
+            structures=task.structures,
+            sensors=sensors,
+        )
 
     @property
     def model(self) -> mujoco.MjModel:

@@ -102,8 +102,8 @@ class Renderer:
         mujoco.mjr_readPixels(self._pixels, self._nearness, self._rect, self._drawing)
         for flag in SEGMENT:
             self._scene.flags[flag] = False
-        number, nearness = self._pixels[::-1].astype(np.uint32), self._nearness[::-1]
-        number = number[..., 0] | number[..., 1] << 8 | number[..., 2] << 16
+        digits, nearness = self._pixels[::-1].astype(np.uint32), self._nearness[::-1]
+        number = digits[..., 0] | digits[..., 1] << 8 | digits[..., 2] << 16
         return Frames(rgb, self._depth_of(nearness, number > 0), self._semantic()[number])
 
     def close(self) -> None:

@@ -11,7 +11,7 @@ from sim_nodes.mujoco_model.scenery import THING_BIT
 SLICES, STACKS = (
     128,
     64,
-)  # of round parts in pictures; with MuJoCo's own 28 and 16 depth is wrong by up to 4 %
+)  # of round parts in images; with MuJoCo's own 28 and 16 depth is wrong by up to 4 %
 SEPARATOR = "/"  # between the names of a structure and of its part in that of a geom
 SHAPES = {
     "box": mujoco.mjtGeom.mjGEOM_BOX,
@@ -30,7 +30,7 @@ def add_structure(
         spec: Model under construction; its round geoms are drawn finely from then on.
         structure: At its pose in the world.
         touches: Whether the hull of a robot touches it; off for models that only show it.
-        group: Of the geoms, 0 to 5, so that rays and pictures may leave them out.
+        group: Of the geoms, 0 to 5, so that rays and images may leave them out.
 
     Returns:
         Its body, which does not move.

@@ -10,7 +10,7 @@ import struct
 from io import BytesIO
 
 import numpy as np
-from PIL import Image
+from PIL import Image, UnidentifiedImageError
 
 from fulmar_core.config.errors import BagError
 
@@ -80,11 +80,7 @@ def read_image(data: bytes) -> np.ndarray:
                 return np.asarray(image).astype(np.uint16)
             return np.asarray(image if image.mode == "L" else image.convert("RGB"))
     except (OSError, ValueError, SyntaxError, EOFError, Image.DecompressionBombError) as error:
-        what = (
-            "is no JPEG, PNG, WebP or AVIF"
-            if isinstance(error, Image.UnidentifiedImageError)
-            else "is damaged"
-        )
+        what = "is no JPEG, PNG, WebP or AVIF" if isinstance(error, UnidentifiedImageError) else "is damaged"
         raise BagError(f"the image {what} ({len(data)} bytes)") from error
 
 

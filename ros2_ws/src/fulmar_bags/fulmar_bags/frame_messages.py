@@ -84,7 +84,9 @@ def _of_raw(message: Any, topic: str) -> Frame:
         what = f"{width} × {height} of '{name}' with {step} bytes a row and {len(message.data)} in all"
         raise BagError(f"a frame is damaged: {what}")
     rows = np.asarray(message.data[: step * height], dtype=np.uint8).reshape(height, step)[:, :row]
-    pixels = np.ascontiguousarray(rows).view(kind).astype(number, copy=False).reshape(height, width, count)
+    pixels: np.ndarray = (
+        np.ascontiguousarray(rows).view(kind).astype(number, copy=False).reshape(height, width, count)
+    )
     return _frame(message, topic, pixels[:, :, order] if order else pixels[:, :, 0], name)
 
 

@@ -77,7 +77,7 @@ class Avist(Benchmark):
         """By task, controller and way, of pairs that have a controller."""
         asked = self.choice
         ways = {"mujoco": asked.episodes} if "tasks" in asked.parts else {}
-        cells = {
+        cells: dict[tuple[str, ...], SpaceCell] = {
             (*place, way): self._trial(pair, way, count)
             for place, pair in self.pairs.items()
             for way, count in ways.items()

@@ -81,7 +81,7 @@ def _carried(quat: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndar
     """Attitudes turned by the least rotation from one direction to another, shape (n, 4)."""
     axis, cosine = np.cross(before, after), np.sum(before * after, axis=-1)
     least = _unit(np.concatenate((axis, 1.0 + cosine[:, None]), axis=-1))
-    return np.stack(product(tuple(least.T), tuple(quat.T)), axis=-1)  # type: ignore[arg-type]
+    return np.stack(product(tuple(least.T), tuple(quat.T)), axis=-1)
 
 
 @dataclass(frozen=True)

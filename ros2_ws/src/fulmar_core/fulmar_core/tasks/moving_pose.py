@@ -92,7 +92,7 @@ class MovingPose(FileTask[SpatialState]):
     reward_weights: FollowReward
 
     goal_topic: ClassVar[str] = "goal_path"
-    moves: ClassVar[bool] = True
+    moves: bool = True
     state_type = SpatialState
     observation_names: ClassVar[tuple[str, ...]] = (
         *POSITION_TERMS,

@@ -43,7 +43,7 @@ class _Box(_Part):
 
 @dataclass(frozen=True)
 class _Round(_Part):
-    kind: Literal["cylinder"]
+    kind: Literal["cylinder", "capsule"]
     diameter: float  # [m]
     length: float  # in all [m]
     axis: Literal["x", "y", "z"] = "z"
@@ -95,7 +95,7 @@ class StructureFile:
     title: str
     scale: float  # of the thing to the true one [-]
     sources: dict[str, str]  # where sizes come from, by the words that parts use
-    parts: tuple[Annotated[_Part, Kinds(SHAPES)], ...]
+    parts: tuple[Annotated[_Box | _Round | _Sphere, Kinds(SHAPES)], ...]
     keep_out: KeepOut | None = None  # true metres; none: a sphere about the origin
 
     def __post_init__(self) -> None:

@@ -75,7 +75,8 @@ class Part:
     def corners(self) -> np.ndarray:
         """Corners of that box in the structure's frame, shape (8, 3) [m]."""
         signs = np.array(np.meshgrid(*[(-1.0, 1.0)] * 3)).reshape(3, 8).T
-        return np.array(self.pose[:3]) + rotate(xyzw(self.pose), signs * self.half_box)
+        corners: np.ndarray = np.array(self.pose[:3]) + rotate(xyzw(self.pose), signs * self.half_box)
+        return corners
 
 
 @dataclass(frozen=True)

@@ -92,5 +92,6 @@ def _sphere_about(corners: np.ndarray, half: float) -> KeepOut:
 
 
 def _scaled_volume(volume: KeepOut, scale: float) -> KeepOut:
-    start, end = (tuple(scale * number for number in point) for point in (volume.start, volume.end))
+    (x, y, z), (u, v, w) = volume.start, volume.end
+    start, end = (scale * x, scale * y, scale * z), (scale * u, scale * v, scale * w)
     return KeepOut(start, end, scale * volume.radius)
