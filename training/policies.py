@@ -91,7 +91,7 @@ def _as_trained(robot: Robot) -> Any:
     tank = robot.actuators.tank
     # A tank that is a part of the body empties in batches too.
     actuators: Any = robot.actuators if tank is None or tank.weighs else replace(robot.actuators, tank=None)
-    sensors = replace(robot.sensors, supply=None)
+    sensors = replace(robot.sensors, supply=None, fuel=None)
     found = _chosen(
         replace(robot, air_bearing=False, usual_controller="", actuators=actuators, sensors=sensors)
     )

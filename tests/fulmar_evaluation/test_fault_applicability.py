@@ -59,6 +59,7 @@ OF_PARTS = {
     "wheel_dead": {"cubesat_wheels", "turtlebot2"},
     "propeller_lost": {"kingfisher", "airship_v7"},
     "supply_pressure_falls": {"floating_platform", "spacecraft_16", "cubesat_8"},
+    "tank_empty": {"floating_platform", "spacecraft_16", "cubesat_8"},
 }
 
 

@@ -12,6 +12,7 @@ from fulmar_core.config.errors import ConfigError
 from fulmar_core.config.paths import config_path
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.robots.sensors.air_data import AirData, AirDataSpec
+from fulmar_core.robots.sensors.fuel import fuel_of
 from fulmar_core.robots.sensors.imu import Gyroscope, ImuSpec
 from fulmar_core.robots.sensors.kind import Truth
 from fulmar_core.robots.sensors.odometer import Channel
@@ -31,6 +32,7 @@ TRUTH = Truth(
         "wheels": WheelSpeeds(("wheel_x", "wheel_y"), np.array([10.0, -20.0])),
         "air_data": AirData(AirDataSpec.NAMES, np.array([28.0, 0.03, -0.01, 1.0])),
         "supply": 2.1e7,
+        "fuel": fuel_of(0.7, 1.0),
         "surfaces": SurfacePositions(("elevator", "throttle"), np.array([0.1, 0.4])),
     },
 )

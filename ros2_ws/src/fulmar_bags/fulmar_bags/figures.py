@@ -10,6 +10,7 @@ import numpy as np
 
 from fulmar_bags.contents import Bag, span_ns
 from fulmar_bags.decode import messages, stamps_ns
+from fulmar_bags.fuel import fuel_of
 from fulmar_bags.gathered import Topic, json_object
 from fulmar_bags.stored_bytes import lengths_of
 from fulmar_core.config.errors import ConfigError
@@ -39,6 +40,7 @@ def describe(bag: Bag) -> dict[str, Any]:
         "topics": topics,
         "silent_topics": [name for name, topic in bag.topics.items() if not len(topic)],
         "faults": [asdict(fault) for fault in bag.faults],
+        "fuel": fuel_of(bag),
         "provenance": provenance(bag),
         "damage": list(bag.warnings),
     }

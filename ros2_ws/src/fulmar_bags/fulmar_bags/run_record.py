@@ -161,6 +161,7 @@ class RunRecord:
     warnings: tuple[str, ...]  # what could not be read
     surfaces: Surfaces = NO_SURFACES  # `surfaces/state` of an aircraft
     supply: Pressures = NO_PRESSURES  # `supply/pressure` of thrusters
+    fuel: Series = NO_SERIES  # `supply/fuel`: mass left [kg], and its share of the full tank [-]
     wheels: Series = NO_SERIES  # speeds of reaction wheels [rad/s]
     air_data: Series = NO_SERIES  # of an aircraft: airspeed [m/s], angles [rad], height [m]
     gyroscope_s: tuple[float, ...] = ()  # stamps of a satellite's inertial unit [s]
@@ -257,6 +258,7 @@ def _record(bag: Bag, info: dict[str, Any]) -> RunRecord:
         warnings=tuple(reader.warnings),
         surfaces=Surfaces(surfaces.stamp_ns / NS, surfaces.names, surfaces.values),
         supply=_pressures(reader),
+        fuel=series(reader, SENSOR_WIRES["fuel"], "position"),
         wheels=series(reader, SENSOR_WIRES["wheels"], "velocity"),
         air_data=series(reader, SENSOR_WIRES["air_data"], "position"),
         gyroscope_s=gyroscope_s(reader),

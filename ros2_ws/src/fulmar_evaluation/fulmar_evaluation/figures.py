@@ -90,6 +90,13 @@ FIGURES = {
     "AAV_rad_s": Figure("mean turn rate", "rad/s", "Mean size of the turn rate over the episode."),
     "AAS": Figure("actuators in use", "-", "Mean share of actuators with a command other than zero.", "less"),
     "effort": Figure("effort", "-", "Mean share of full command, over time and actuators.", "less"),
+    "impulse_N_s": Figure(
+        "impulse", "N·s",
+        "Thrust of all nozzles, added up over the episode, of a robot whose fuel is a part of its mass.", "less",
+    ),
+    "fuel_used_kg": Figure(
+        "fuel used", "kg", "What that takes from the tank, by the specific impulse of the nozzles.", "less",
+    ),
     "control_variation": Figure(
         "control variation", "-",
         "Sum over the actuators of the change of their shares of full command from one step to the next, mean "

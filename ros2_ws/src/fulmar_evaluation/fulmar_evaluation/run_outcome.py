@@ -67,6 +67,7 @@ def evaluate_execution(plan: RunPlan, execution: Execution) -> RunOutcome:
     lost = execution.plant_steps - summary["steps"]
     if not failure and not ring and lost > 0:
         failure = f"the bag lacks {lost} of {execution.plant_steps} commands"
+    failure = failure or summary["tank_empty"] or ""
     return RunOutcome({**summary, "failure": failure or None}, failure)
 
 

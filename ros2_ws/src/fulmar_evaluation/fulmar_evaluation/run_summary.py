@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from fulmar_bags.run_record import HealthSample, RunRecord
+from fulmar_core.estimators.actuator_health.supply_check import TANK_EMPTY
 from fulmar_core.robots.wire_check import BETWEEN, WARNINGS, WIRE_WARNINGS
 from fulmar_core.safety.command_range import CommandRange
 from fulmar_core.safety.estop import HOLDS
@@ -26,6 +27,8 @@ FIGURES = (
     "velocity_error_m_s",
     "yaw_rate_error_deg_s",
     "rate_error_deg_s",
+    "impulse_N_s",
+    "fuel_used_kg",
 )  # of `metrics.episode_metrics`; None where the task does not ask
 Spread = dict[str, float | None]
 
@@ -55,6 +58,8 @@ def summarise(record: RunRecord) -> dict[str, Any]:
         "path_error_m": result.path_error_m if result else None,
         **_tracking(result),
         "goals_progress": result.progress if result else None,
+        "fuel_left_share": _fuel_left(record),
+        "tank_empty": tank_empty(record) or None,
         "control_rate_hz": _own_rate_hz(record, wall_hz),
         "wall_control_rate_hz": wall_hz,
         "latency_ms": _known(_spread(plant, "latency_ms")) or percentiles(latencies_ms(record)),
@@ -87,7 +92,20 @@ def warnings_of(record: RunRecord) -> list[str]:
         if warning
     )
     pressed = ["the e-stop was pressed and held the robot until a reset"] if estop_pressed(record) else []
-    return [*pressed, *found]
+    empty = tank_empty(record)
+    return [*pressed, *([empty] if empty else []), *found]
+
+
+def tank_empty(record: RunRecord) -> str:
+    """What the plant said when its tank was empty; empty if it did not."""
+    said = (sample.values.get(TANK_EMPTY, "") for sample in record.health if sample.name.endswith(": plant"))
+    return next(filter(None, said), "")
+
+
+def _fuel_left(record: RunRecord) -> float | None:
+    """Share of the full tank by the newest reading."""
+    found = record.fuel
+    return _finite(found.values[-1, found.names.index("share")]) if "share" in found.names else None
 
 
 def _beyond_limits(record: RunRecord, result: RunResult | None) -> list[str]:
@@ -246,6 +264,7 @@ FIGURE_TEXTS: dict[str, Callable[[Any], str]] = {
     "tracking_error_m": "moving target {:.3f} m off".format,
     "tracking_error_deg": "its attitude {:.1f}° off".format,
     "goals_progress": str,
+    "fuel_used_kg": lambda value: f"{1e3 * value:.0f} g of fuel used",
 }
 
 

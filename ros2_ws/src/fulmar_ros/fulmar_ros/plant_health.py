@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from rclpy.lifecycle import LifecycleNode
 
 from fulmar_core.estimators.actuator_health.feedback_check import ActuatorFeedback
+from fulmar_core.estimators.actuator_health.supply_check import TANK_EMPTY
 from fulmar_core.robots.wire_check import BETWEEN, WIRE_WARNINGS
 from fulmar_core.safety.actuator_guard import ActuatorGuard
 from fulmar_core.safety.watchdog import NO_COMMAND
@@ -99,6 +100,8 @@ class PlantHealth:
         values = self._values() | {"failed_parts": parts, WIRE_WARNINGS: unfit} | more
         if supply is not None and supply.pressure is not None:
             values["supply_pressure_bar"] = f"{1e-5 * supply.pressure:.2f}"
+        if supply is not None and supply.empty is not None:
+            values[TANK_EMPTY] = supply.empty.words
         also = [text for text in (held, *failed, low) if text]
         self._health.publish(level, message, values, warnings=also)
 

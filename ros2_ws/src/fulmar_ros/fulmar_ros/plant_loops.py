@@ -289,7 +289,7 @@ def _compare(
     seconds: float,
     sample: Sample,
 ) -> None:
-    """Compare what was applied for a time [s] with what is measured; a wing with a failed surface is handed over."""
+    """Compare what was applied for a time [s] with what is measured; what fails for good is handed over."""
     if feedback is None:
         return
     feedback.see(command, seconds, sample)

@@ -66,6 +66,9 @@ def _show(found: dict[str, Any]) -> None:
         write_line(f"announced, without a message: {', '.join(found['silent_topics'])}")
     for fault in found["faults"]:
         write_line(f"recorded around a fault at {_when(fault['time_ns'])}: {fault['reason']}")
+    if fuel := found["fuel"]:
+        left = "" if fuel["left_share"] is None else f", {100 * fuel['left_share']:.0f} % of the tank left"
+        write_line(f"fuel: {1e3 * fuel['used_kg']:.1f} g used, impulse {fuel['impulse_N_s']:.1f} N·s{left}")
     _show_origin(found["provenance"])
     for line in found["damage"]:
         write_line(f"damage: {line}")

@@ -92,6 +92,9 @@ def episode_metrics(run: Trajectories, task: Task) -> dict[str, np.ndarray]:
     figures["AAV_rad_s"] = _mean(np.abs(run.yaw_rate))
     figures["AAS"] = _mean(run.actuators_in_use)
     figures["effort"] = _mean(run.effort)
+    if run.thrust is not None:
+        figures["impulse_N_s"] = run.control_dt * np.sum(run.thrust, axis=1, dtype=np.float64)
+        figures["fuel_used_kg"] = figures["impulse_N_s"] / run.exhaust_speed
     figures["control_variation"] = _mean(run.variation)
     figures["control_deviation"] = np.mean(np.std(run.shares, axis=1, dtype=np.float64), axis=-1)
     figures["collided"] = np.any(run.touching, axis=1).astype(float)

@@ -38,6 +38,9 @@ class Trajectories:
     z: np.ndarray | None = None  # (episodes, steps) [m]
     attitude_error: np.ndarray | None = None  # (episodes, steps) [rad]
     rate_error: np.ndarray | None = None  # (episodes, steps) [rad/s]
+    # Of robots whose fuel is a part of their body alone:
+    thrust: np.ndarray | None = None  # (episodes, steps) of all nozzles at the regulated pressure [N]
+    exhaust_speed: float = 0.0  # impulse of a kilogram of fuel [m/s]
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -66,8 +69,13 @@ class Trajectories:
         return np.asarray(np.sum(np.abs(self.shares - before), axis=-1))
 
 
-COLUMNS = tuple(field.name for field in dataclasses.fields(Trajectories) if field.name != "control_dt")
+COLUMNS = tuple(
+    field.name
+    for field in dataclasses.fields(Trajectories)
+    if field.name not in ("control_dt", "exhaust_speed")
+)
 IN_SPACE = ("z", "attitude_error", "rate_error")  # columns that robots in the plane have not
+OF_FUEL = ("thrust",)  # columns that robots without fuel in their mass have not
 
 
 class TrajectoryLog:
@@ -77,7 +85,10 @@ class TrajectoryLog:
         """Begin empty; `control_dt` in seconds."""
         self._robot, self._task, self._control_dt = robot, task, control_dt
         in_space = "z" in task.state_type.COLUMNS
-        self._names = tuple(name for name in COLUMNS if in_space or name not in IN_SPACE)
+        tank = robot.actuators.tank
+        self._exhaust_speed = tank.exhaust_speed if tank is not None and tank.weighs else 0.0
+        left_out = (*(() if in_space else IN_SPACE), *(() if self._exhaust_speed else OF_FUEL))
+        self._names = tuple(name for name in COLUMNS if name not in left_out)
         self._columns: dict[str, list[np.ndarray]] = {name: [] for name in self._names}
 
     def add(self, truth: State, goal: Goal, command: np.ndarray) -> None:
@@ -107,6 +118,8 @@ class TrajectoryLog:
     def _kept(self, state: State, goal: Goal, command: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
         values = _step_columns(self._robot, self._task, state, goal)
         values["shares"] = np.asarray(command) / self._robot.actuators.scale
+        if self._exhaust_speed:
+            values["thrust"] = self._robot.actuators.total_thrust(np.asarray(command).T)
         for name in self._names:
             value = np.asarray(values[name])
             shape = value.shape if name == "shares" else np.shape(state.like)
@@ -121,7 +134,7 @@ class TrajectoryLog:
             steps = np.stack(self._columns.pop(name), axis=-2 if name == "shares" else -1)
             arrays[name] = steps[None] if steps.ndim == (2 if name == "shares" else 1) else steps
         self._columns = {name: [] for name in self._names}
-        return Trajectories(**arrays, control_dt=self._control_dt)
+        return Trajectories(**arrays, control_dt=self._control_dt, exhaust_speed=self._exhaust_speed)
 
 
 def _step_columns(robot: Robot, task: Task, state: State, goal: Goal) -> dict[str, np.ndarray]:

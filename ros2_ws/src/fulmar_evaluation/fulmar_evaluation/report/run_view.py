@@ -208,6 +208,9 @@ def table_rows(runs: Sequence[View], own: Sequence[Row]) -> list[Row]:
         row("Turn rate error", "mean, about all axes", lambda s: _value(s["rate_error_deg_s"], "°/s", 1)),
         row("Length of the run", "simulated time", lambda s: _value(s["duration_s"], " s", 1)),
         *own,
+        row("Fuel used", "by the valves' openings", lambda s: _grams(s["fuel_used_kg"])),
+        row("Impulse", "of all nozzles", lambda s: _value(s["impulse_N_s"], " N·s", 1)),
+        row("Fuel left", "of the full tank, by its gauge", lambda s: _percent(s["fuel_left_share"])),
         row("Commands", "answered measurements", lambda s: f"{s['steps']}"),
         row("Control rate", "in the robot's own time", lambda s: _value(s["control_rate_hz"], " Hz", 2)),
         row("Command rate", "wall-clock", lambda s: _value(s["wall_control_rate_hz"], " Hz", 2)),
@@ -228,6 +231,10 @@ def _length(metres: float | None) -> str:
     if metres >= 1.0:
         return f"{metres:.2f} m"
     return f"{100 * metres:.1f} cm" if metres >= 0.01 else f"{1000 * metres:.1f} mm"
+
+
+def _grams(kilograms: float | None) -> str:
+    return "–" if kilograms is None else f"{1e3 * kilograms:.1f} g"
 
 
 def _percent(share: float | None) -> str:

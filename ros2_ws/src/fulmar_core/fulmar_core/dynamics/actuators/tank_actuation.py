@@ -8,6 +8,8 @@ import numpy as np
 
 from fulmar_core.dynamics.actuators.actuation import ActuationState
 from fulmar_core.robots.actuators.family import Actuators
+from fulmar_core.robots.sensors.fuel import NAME as FUEL
+from fulmar_core.robots.sensors.fuel import fuel_of
 from fulmar_core.robots.sensors.supply import NAME
 from fulmar_core.states.arrays import array_namespace, clip
 from fulmar_core.states.rotation import Array
@@ -43,12 +45,15 @@ class TankActuation(ActuationState):
 
     @property
     def readings(self) -> dict[str, np.ndarray]:
-        """Pressure of the tanks; see `ActuationState.readings`."""
-        return {NAME: np.asarray(self.pressure, dtype=float)[:, None]}
+        """Pressure and content of the tanks; see `ActuationState.readings`."""
+        pressure = np.asarray(self.pressure, dtype=float)
+        left = self._tank.left(pressure)
+        return {NAME: pressure[:, None], FUEL: np.stack((left, left / self._tank.content), axis=-1)}
 
     def truths(self) -> dict[str, Any]:
-        """Pressure of the tank; see `ActuationState.truths`."""
-        return {NAME: float(self.pressure[0])}
+        """Pressure and content of the tank; see `ActuationState.truths`."""
+        pressure = float(self.pressure[0])
+        return {NAME: pressure, FUEL: fuel_of(self._tank.left(pressure), self._tank.content)}
 
     def begin(self, command: Array, world: World, noise: Array | None) -> None:
         """Take a new command; see `ActuationState.begin`."""

@@ -94,8 +94,9 @@ class ActuatorFeedback:
 
     @property
     def grounds(self) -> Finding | None:
-        """Why no controller may fly on: a surface has failed; None if none has."""
-        return next((finding for finding in self.findings if finding.part in self._vital), None)
+        """Why no controller may go on: a surface has failed, or the tank is empty; None if neither is so."""
+        failed = next((finding for finding in self.findings if finding.part in self._vital), None)
+        return failed or self.supply.empty
 
     def reset(self) -> None:
         """Begin anew, with an episode."""
@@ -108,7 +109,7 @@ class ActuatorFeedback:
     def see(self, command: np.ndarray, seconds: float, sample: Sample) -> None:
         """Take a command that was applied, shape (n,), for how long [s], and the sample at the end."""
         self._joints.see(command, seconds, sample.readings)
-        self.supply.see(seconds, sample.readings)
+        self.supply.see(seconds, sample.readings, sample.odometry)
         if self._motion is None:
             self.findings = self._joints.findings
             return

@@ -9,11 +9,13 @@ thrust / (specific impulse · g), their eq. 2-5.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from fulmar_core.states.arrays import clip
 from fulmar_core.states.rotation import Array
 
 GRAVITY = 9.80665  # of the definition of specific impulse [m/s²]
+EMPTY = 0.1  # share of the full thrust below which a tank is empty: what is left would not stop a body in time [-]
 
 
 @dataclass(frozen=True)
@@ -58,6 +60,11 @@ class Tank:
         """Mass of what is in the full tank [kg]."""
         return self.volume / self.volume_per_kg
 
+    @property
+    def exhaust_speed(self) -> float:
+        """Impulse of a kilogram of what is in it [m/s]."""
+        return self.specific_impulse * GRAVITY
+
     def check_part_of(self, mass: float) -> None:
         """Refuse to be a part of a body of some mass that is no more than what is in it [kg].
 
@@ -70,6 +77,10 @@ class Tank:
                 "full tank is a part of it. Give the mass of the body with its tank full."
             )
 
+    def left(self, pressure: Any) -> Any:
+        """Mass of what is in it at some pressures [Pa], shape of these [kg]."""
+        return pressure * (self.volume / self._specific_energy)
+
     def gone(self, pressure: Array) -> Array:
         """Mass that a full tank has lost at some pressures [Pa], shape of these [kg]."""
         return (self.pressure - pressure) * (self.volume / self._specific_energy)
@@ -80,8 +91,12 @@ class Tank:
 
     def fall(self, thrust: Array) -> Array:
         """How fast the pressure falls under some thrusts [N], shape of these [Pa/s]."""
-        flow = thrust / (self.specific_impulse * GRAVITY) + self.leak
+        flow = thrust / self.exhaust_speed + self.leak
         return flow * (self._specific_energy / self.volume)
+
+    def is_empty(self, pressure: float) -> bool:
+        """Whether hardly any thrust is left at a pressure [Pa]."""
+        return pressure < EMPTY * self.regulated
 
     def lasts_s(self, pressure: float, thrust: float) -> float:
         """How long a thrust [N] lasts until it falls [s]."""

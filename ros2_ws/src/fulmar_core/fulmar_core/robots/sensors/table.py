@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 from fulmar_core.config.plausible_ranges import Plausible
-from fulmar_core.robots.sensors import air_data, imu, odometer, star_tracker, supply, surfaces, wheels
+from fulmar_core.robots.sensors import air_data, fuel, imu, odometer, star_tracker, supply, surfaces, wheels
 from fulmar_core.robots.sensors.kind import SensorKind
 from fulmar_core.robots.sensors.own_sensor import OwnSensorSpec, own_sensor_kind
 
@@ -19,6 +19,7 @@ SENSORS: dict[str, SensorKind] = {
     "air_data": air_data.KIND,
     "surfaces": surfaces.KIND,
     "supply": supply.KIND,
+    "fuel": fuel.KIND,
 }
 
 RANGES: tuple[Plausible, ...] = tuple(
