@@ -116,6 +116,16 @@ def test_the_placeholder_of_roboran_has_one_problem(fulmar):
     assert "torque about y (pitch)" in problem
 
 
+@pytest.mark.parametrize("name", ["cubesat_8_srb_layout", "cubesat_8_srb"])
+def test_the_cubesats_of_srb_have_one_problem(fulmar, name):
+    """Their nozzles turn the body about x and y alone, at 20 kg and 1 N as at 1 kg and 5 N."""
+    code, found = checked(fulmar, NEW / f"{name}.yaml")
+    assert (code, found["passed"], found["controllable"]) == (1, False, False)
+    assert (found["actuators"]["rank"], found["actuators"]["missing_axes"]) == (5, ["torque_z"])
+    (problem,) = found["problems"]
+    assert "rank 5 of 6: no command makes a torque about z (yaw) alone" in problem
+
+
 def test_an_inertia_that_no_body_has_is_one_problem(fulmar, tmp_path):
     path = altered(tmp_path, body__inertia=[0.05, 0.05, 0.2045])
     code, found = checked(fulmar, path)
