@@ -331,7 +331,8 @@ class ControllerNode(LifecycleNode):
             if inputs is not None:
                 began_ns = time.perf_counter_ns()
                 step = guard.act(inputs)
-                took_ns, command = time.perf_counter_ns() - began_ns, step.command[0]
+                took_ns = time.perf_counter_ns() - began_ns
+            command = guard.loop.previous[0]
         except TaskError as error:
             self._give_up(str(error), stamp)
             return

@@ -9,6 +9,7 @@ from fulmar_core.estimators.actuator_health.beliefs import Beliefs
 from fulmar_core.loop.guarded_loop import GuardedLoop
 from fulmar_core.robots.wire_check import BETWEEN, WIRE_WARNINGS
 from fulmar_core.safety.arbiter import Decision, Mode
+from fulmar_core.safety.keep_out import ENTERED, HAD_ENTERED, HAD_HELD
 from fulmar_ros.deadline import Deadlines, Spread
 from fulmar_ros.fallback import PolicySwap
 from fulmar_ros.health import Health
@@ -58,6 +59,7 @@ class ControllerStatus:
         """
         mission, switch = guard.mission, guard.switch
         refusal = guard.refusal if guard.refusal.reason else guard.too_far
+        held = guard.held
         standby, last_input_ns = switch.current, guard.flags.last_input_ns
         changed = (
             decision.mode,
@@ -75,6 +77,7 @@ class ControllerStatus:
             beliefs.open,
             len(beliefs.words),
             guard.flags.unconverged,
+            bool(held),
             guard.input_warning,
             self.contested,
             self._swap.requests,
@@ -86,7 +89,8 @@ class ControllerStatus:
         unconverged = guard.flags.unconverged
         level = {Mode.ACTIVE: "ok", Mode.FAULT: "error"}.get(decision.mode, "warn")
         level = "error" if unconverged or self.contested else level
-        doubtful = switch.fell_back or self.wire_problems or beliefs.words or self.inputs_refused[1]
+        level = "error" if ENTERED in held else level
+        doubtful = switch.fell_back or held or self.wire_problems or beliefs.words or self.inputs_refused[1]
         level = "warn" if level == "ok" and doubtful else level
         age_ms = (time.monotonic_ns() - last_input_ns) / 1e6 if last_input_ns else 0.0
         values = {
@@ -101,6 +105,7 @@ class ControllerStatus:
             "believed_open": ", ".join(beliefs.open),
             "beliefs": "; ".join(beliefs.words),
             "unconverged": unconverged,
+            "keep_out": held,
             "swap_requests": str(self._swap.requests),
             "epoch": str(guard.epoch),
             "goal_stamp_ns": str(mission.goal_stamp_ns),
@@ -123,7 +128,8 @@ class ControllerStatus:
             **deadlines.period_error_ms.percentiles("period_error_ms"),
         }
         warnings = BETWEEN.join([*self.wire_problems, *beliefs.words])
-        message = decision.reason or warnings or decision.mode.value
-        its = unconverged, self.contested, guard.input_warning
+        message = decision.reason or held or warnings or decision.mode.value
+        entered = HAD_ENTERED if ENTERED in held else HAD_HELD if held else ""
+        its = unconverged, entered, self.contested, guard.input_warning
         warned = [*beliefs.warnings, *(words for words in its if words)]
         health.publish(level, message, values, warnings=warned)

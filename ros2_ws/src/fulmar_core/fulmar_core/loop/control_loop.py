@@ -13,6 +13,7 @@ from fulmar_core.estimators.actuator_health.actuator_estimator import ActuatorEs
 from fulmar_core.estimators.actuator_health.applied import Applied, AppliedHistory
 from fulmar_core.robots.robot import Robot
 from fulmar_core.safety.command_gate import command_problem
+from fulmar_core.safety.keep_out import KeepOutGuard
 from fulmar_core.states.state import State
 from fulmar_core.tasks import Task
 from fulmar_core.tasks.goal import Goal
@@ -38,6 +39,7 @@ class ControlLoop:
         goal: Of all robots, leading shape (n,); None before there is one.
         previous: Command of the step before, after every limit, shape (n, m); where no controller chose one, the safe
             command, and from the next measurement on what actuators do by themselves.
+        keep_out: Takes over from a controller that would enter a keep-out volume; None where the task has none.
         answered_ns: Stamp of the measurement that this was the answer to; -1 before the first [ns].
         estimate: Of the controller's actuator estimator at the newest step; None without one.
     """
@@ -67,6 +69,8 @@ class ControlLoop:
         self.observer = Observer(robot, self.task)
         self.dt = robot.timing.substeps(controller.control_hz) * robot.timing.physics_dt
         self._pause_ns, self._applied = pause_ns, applied
+        volumes = self.task.keep_outs
+        self.keep_out = KeepOutGuard(robot, volumes, self.dt) if volumes else None
         self._safe = np.tile(np.asarray(robot.actuators.safe_command, dtype=float), (robots, 1))
         self.goal: Goal | None = None
         self._began_ns: int | None = None
@@ -99,6 +103,8 @@ class ControlLoop:
         if self._controller.observer is not None:
             self._controller.observer.reset()
         self._forget_estimates()
+        if self.keep_out is not None:
+            self.keep_out.reset()
 
     def step(self, measured: State, readings: Readings, stamp_ns: int) -> Step:
         """Do one control step; see `inputs` and `act`."""
@@ -152,15 +158,19 @@ class ControlLoop:
         action = np.asarray(chosen, dtype=float)
         fine = action.shape == self._safe.shape and np.isfinite(action).all()
         refusal = "" if fine else command_problem(action, self._safe.shape) or ""
-        command = self._safe
-        if not refusal:
-            command = slewed(self.robot.actuators.limited(action), inputs.previous, self.robot, self.dt)
+        wanted = command = self._safe if refusal else action
+        if self.keep_out is not None:
+            wanted = self.keep_out.guarded(command, inputs)
+        if not refusal or wanted is not command:
+            command = slewed(self.robot.actuators.limited(wanted), inputs.previous, self.robot, self.dt)
         self.previous, self.answered_ns, self._chosen = command, inputs.stamp_ns, not refusal
         return Step(inputs.observation, action, command, refusal)
 
-    def rest(self, stamp_ns: int) -> None:
-        """Answer a measurement with the safe command, without asking the controller [ns]."""
-        self.previous, self.answered_ns, self._chosen = self._safe, stamp_ns, False
+    def rest(self, stamp_ns: int, command: np.ndarray | None = None) -> None:
+        """Answer a measurement without asking the controller [ns]; with the safe command unless a guard has another."""
+        self.previous, self.answered_ns, self._chosen = self._safe, stamp_ns, command is not None
+        if command is not None:
+            self.previous = slewed(self.robot.actuators.limited(command), self.previous, self.robot, self.dt)
 
     def _advanced(self, state: State, stamp_ns: int) -> Goal:
         """The goal with those targets done that a measurement reaches."""

@@ -145,6 +145,14 @@ class GuardedLoop:
         return _strives(self.loop.controller)
 
     @property
+    def held(self) -> str:
+        """Why the keep-out guard acts in the controller's place, or that it came too late; empty if neither."""
+        guard = self.loop.keep_out
+        if guard is None or self.newest is None:
+            return ""
+        return guard.words(self._newest_state, [each.name for each in self.loop.task.structures])
+
+    @property
     def bearing_known(self) -> bool:
         """Whether the state of the air bearing has come, or there is none."""
         return self._bearing is not None
@@ -265,15 +273,17 @@ class GuardedLoop:
         """Begin a control step on a measurement: decide, and observe if the controller may act.
 
         Returns:
-            The decision, and the inputs for `act`; None for a step that is answered by the safe command.
+            The decision, and the inputs for `act`; None for a step that is answered by `ControlLoop.previous`: the safe
+            command, or that of the guard of keep-out volumes.
         """
         with self._lock:
             decision = self._arbitrate(now_ns)
             self._begin_anew()
             if decision.may_act and measurement is not None:
                 return decision, self._inputs(measurement)
+            brake = self._brake() if decision.may_brake and measurement is not None else None
         self._convergence.reset()
-        self.loop.rest(measurement.stamp_ns if measurement is not None else 0)
+        self.loop.rest(measurement.stamp_ns if measurement is not None else 0, brake)
         return decision, None
 
     def observe(self, measurement: Measurement) -> Inputs:
@@ -356,6 +366,13 @@ class GuardedLoop:
         )
         return self.loop.task.state_type.from_rigid(rigid)
 
+    def _brake(self) -> np.ndarray | None:
+        """The guard's command for a robot that may not act and would enter a volume within a minute, shape (1, m)."""
+        guard, state = self.loop.keep_out, self._newest_state
+        if guard is None:
+            return None
+        return guard.brake(state) if guard.holds(state)[0] or guard.drifts_in(state) else None
+
     def _follow_switch(self, before: Standby) -> bool:
         changed = self.switch.current is not before
         if changed:
@@ -402,10 +419,10 @@ class GuardedLoop:
         return outside(self.newest.state.position_in_world.tolist(), self._settings.area)
 
     def _beyond(self, goal: Goal) -> str:
-        """How a goal lies outside the area; empty if it does not, or is no place."""
+        """How a goal lies outside the area or within a keep-out volume; empty if it does not, or is no place."""
         if self.loop.task.goal_topic == "goal_velocity":
             return ""
-        problem = unreachable(
+        problem = self.loop.task.kept_out("the goal", goal.targets) or unreachable(
             "the goal", goal.targets.tolist(), self._settings.area, farthest_goal(self.loop.robot)
         )
         return problem and OUT_OF_BOUNDS + problem

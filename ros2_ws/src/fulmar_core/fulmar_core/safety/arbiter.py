@@ -44,15 +44,21 @@ class Flags:
 
 @dataclass(frozen=True, slots=True)
 class Decision:
-    """The mode, whether the controller's command may go out, and why not."""
+    """The mode, whether the controller's command may go out, and why not.
+
+    Attributes:
+        may_brake: Whether, where it may not, the guard of keep-out volumes may: the robot's place is known, and nothing
+            stops its actuators.
+    """
 
     mode: Mode
     may_act: bool
     reason: str
+    may_brake: bool = False
 
 
 def arbitrate(flags: Flags, now_ns: int) -> Decision:
-    """Decide for one instant of the steady clock [ns]; anything but ACTIVE means the safe command."""
+    """Decide for one instant of the steady clock [ns]; anything but ACTIVE means the safe command, or a guard's."""
     if flags.latched_fault:
         return Decision(Mode.FAULT, False, flags.latched_fault)
     if not flags.configured:
@@ -77,18 +83,19 @@ def arbitrate(flags: Flags, now_ns: int) -> Decision:
     if flags.input_problem:
         return Decision(Mode.ARMED, False, flags.input_problem)
     if flags.outside:
-        return Decision(Mode.ARMED, False, flags.outside)
+        return Decision(Mode.ARMED, False, flags.outside, may_brake=True)
     if flags.bearing_off:
         return Decision(Mode.ARMED, False, BEARING_OFF)
     if flags.unconverged:
-        return Decision(Mode.ARMED, False, flags.unconverged)
+        return Decision(Mode.ARMED, False, flags.unconverged, may_brake=True)
     if not flags.has_goal:
-        return Decision(Mode.ARMED, False, f"no {flags.lacking} yet")
+        return Decision(Mode.ARMED, False, f"no {flags.lacking} yet", may_brake=True)
     if not flags.goal_distance <= flags.geofence:  # so that a distance that is not a number is beyond it too
         return Decision(
             Mode.ARMED,
             False,
             f"goal is {flags.goal_distance:.1f} m away, {BEYOND_GEOFENCE} of {flags.geofence:g} m",
+            may_brake=True,
         )
     return Decision(Mode.ACTIVE, True, "")
 

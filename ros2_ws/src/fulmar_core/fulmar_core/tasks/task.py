@@ -7,6 +7,8 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Generic, Self
 
+import numpy as np
+
 from fulmar_core.config.errors import ConfigError
 from fulmar_core.config.paths import config_names
 from fulmar_core.dynamics.things import Thing
@@ -214,6 +216,24 @@ class Task(ABC, Generic[S]):
             within = volume.distance(side_by_side(*state.columns()[:3])) < 0.0
             touching = within if touching is None else touching | within
         return touching
+
+    def kept_out(self, what: str, places: Array) -> str:
+        """How the first of some places that does lies in a volume to keep out of; empty where none does.
+
+        Args:
+            what: What the places are, such as `the goal`.
+            places: x, y, z [m] and whatever follows, shape (k, 3 or more).
+        """
+        for structure in self.structures if len(places) else ():
+            deep = -np.asarray(structure.keep_out.distance(np.asarray(places, dtype=float)[:, :3]))
+            if (deep > 0.0).any():
+                first = int(np.argmax(deep > 0.0))
+                x, y, z = (float(number) for number in np.asarray(places)[first][:3])
+                return (
+                    f"{what} x = {x:g} m, y = {y:g} m, z = {z:g} m lies {deep[first]:.2f} m within the keep-out "
+                    f"volume of '{structure.name}'."
+                )
+        return ""
 
     def penalty(self, state: S, goal: Goal, robot: Robot) -> Array | None:
         """What a state costs a learner beside the reward, shape (...,); None: nothing."""

@@ -165,7 +165,9 @@ class _Rerun:
                 guard.switch.propose(self._successor(*message.value))
             guard.switch_controller()
             reasons[step], inputs = self._inputs(step)
-            if inputs is not None:
+            if inputs is None:
+                commands[step] = guard.loop.previous[0]  # the safe one, or that of the keep-out guard
+            else:
                 try:
                     done = guard.act(inputs)
                     guard.watch(inputs, done)
