@@ -27,7 +27,8 @@ def marker_of(shape: Shape, frames: Frames) -> Marker:
     marker.frame_locked = shape.in_body  # it moves with the body, without a message for each pose
     place = marker.pose.position
     place.x, place.y, place.z = shape.position
-    marker.pose.orientation.w = 1.0
+    turn = marker.pose.orientation
+    turn.x, turn.y, turn.z, turn.w = shape.quat
     marker.scale.x, marker.scale.y, marker.scale.z = shape.size
     marker.color.r, marker.color.g, marker.color.b, marker.color.a = shape.color
     marker.points = [Point(x=x, y=y, z=z) for x, y, z in shape.points]

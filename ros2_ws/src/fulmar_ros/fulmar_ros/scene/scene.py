@@ -16,6 +16,7 @@ from fulmar_ros.scene.by_kind import APPLIED
 from fulmar_ros.scene.goal_shapes import area_shapes, geofence_shapes, goal_shapes, obstacle_shapes
 from fulmar_ros.scene.robot_shapes import body_shapes
 from fulmar_ros.scene.shape import Shape
+from fulmar_ros.scene.structure_shapes import structure_shapes
 
 REMEMBERED = 200  # goals: velocities come up to a hundred ahead of their time
 STEP = 0.02  # share of full command by which what is applied has to change to be drawn anew
@@ -34,9 +35,9 @@ class Scene:
     """Keeps what was received of one robot, and says what changed since it was asked last."""
 
     def __init__(self, robot: Robot, task: Task, area: Sequence[float] = NO_AREA) -> None:
-        """Begin with the body and, where there is one, the area of the robot [m]."""
+        """Begin with the body, the things in space of the task and, where there is one, the area of the robot [m]."""
         self._robot, self._task = robot, task
-        self._fixed = [*body_shapes(robot), *area_shapes(area)]
+        self._fixed = [*body_shapes(robot), *area_shapes(area), *structure_shapes(task.structures)]
         self._goals: deque[tuple[int, np.ndarray]] = deque(maxlen=REMEMBERED)
         self._status: Mapping[str, str] = {}
         self._obstacles = np.zeros((0, 3))

@@ -31,6 +31,7 @@ class Shape:
         color: Of the whole shape.
         position: Of its middle [m].
         points: Of arrows and lines [m].
+        quat: How it is turned: x, y, z, w.
     """
 
     group: str
@@ -41,6 +42,7 @@ class Shape:
     color: Color
     position: Point = (0.0, 0.0, 0.0)
     points: tuple[Point, ...] = ()
+    quat: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 1.0)
 
     @property
     def key(self) -> tuple[str, int]:
