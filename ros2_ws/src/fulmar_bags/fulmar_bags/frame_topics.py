@@ -16,6 +16,7 @@ from fulmar_core.config.errors import BagError
 
 PACKED_ENDINGS = ("/compressedDepth", "/compressed")  # behind the name of the raw topic, the better one first
 PLAIN_ENDINGS = ("/image_raw", "/image_rect", "/image_color", "/image")  # that say nothing about a camera
+LOOKED_AT = 5  # messages that may be damaged before the first frame
 KINDS: tuple[Kind, ...] = ("colour", "depth", "segmentation")
 
 
@@ -79,7 +80,7 @@ def cameras(topics: Iterable[Topic], problems: list[str] | None = None) -> list[
 
 
 def _camera(topic: Topic) -> Camera:
-    first = read_frame(topic.data[0], topic.type, topic.name)
+    first = first_frame(topic)
     stamps = stamps_ns(topic)
     stamped = stamps is not None and bool(np.all(stamps > 0))
     taken = stamps if stamped and stamps is not None else np.array(topic.log_ns, dtype=np.int64)
@@ -87,6 +88,21 @@ def _camera(topic: Topic) -> Camera:
         order = np.argsort(taken, kind="stable")
         topic, taken = topic.chosen(order), taken[order]
     return Camera(topic, first, taken)
+
+
+def first_frame(topic: Topic) -> Frame:
+    """The first frame of a topic with messages; some of them may be damaged.
+
+    Raises:
+        BagError: That of the first message, where none of the first few can be read.
+    """
+    errors = []
+    for data in topic.data[:LOOKED_AT]:
+        try:
+            return read_frame(data, topic.type, topic.name)
+        except BagError as error:
+            errors.append(error)
+    raise errors[0]
 
 
 def _raw_name(name: str) -> str:
@@ -113,7 +129,7 @@ def describe_frames(topic: Topic) -> dict[str, Any] | None:
     if topic.type not in FRAME_TYPES or not len(topic):
         return None
     try:
-        first = read_frame(topic.data[0], topic.type, topic.name)
+        first = first_frame(topic)
     except BagError as error:
         return {"problem": str(error)}
     width, height = first.size

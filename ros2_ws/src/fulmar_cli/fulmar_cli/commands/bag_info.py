@@ -37,7 +37,7 @@ def info(bag: BagArgument, as_json: JsonOption = False, *, reading: BagReading) 
     Rates and gaps go by the stamps in the messages where they have any, else by when they were recorded. A gap is 2.5
     periods without a message; a stamp of 0, which means "not set", counts for none. Late is a message that came more
     than a period later than usual. Dropped are messages that the recorder counted and the file lacks, and
-    odometry that was answered but is not there.
+    odometry that was answered but is not there. Images of cameras have a line with their size, kind, rate and room.
 
     Exit code: 0 the whole bag was read, 1 part of it could not be, 2 nothing could.
     """
@@ -62,6 +62,8 @@ def _show(found: dict[str, Any]) -> None:
             write_line(
                 f"{topic['name']}: {topic['unstamped']} of {topic['count']} messages have a stamp of 0 (not set)"
             )
+    for line in (_frames(topic) for topic in found["topics"] if topic["frames"]):
+        write_line(line)
     if found["silent_topics"]:
         write_line(f"announced, without a message: {', '.join(found['silent_topics'])}")
     for fault in found["faults"]:
@@ -84,6 +86,18 @@ def _row(topic: dict[str, Any]) -> tuple[str, ...]:
         _number(topic["longest_gap_s"], "{:.3f}"),
         _number(topic["late"], "{}"),
         _number(topic["dropped"], "{}"),
+    )
+
+
+def _frames(topic: dict[str, Any]) -> str:
+    """Size, kind and rate of the images of a topic, and what they take on the disk."""
+    frames = topic["frames"]
+    if "problem" in frames:
+        return f"images that cannot be shown: {frames['problem']}"
+    reach = f", up to {frames['reach_m']:.3g} m" if frames["reach_m"] else ""
+    return (
+        f"{topic['name']}: {topic['count']} images of {frames['width']} × {frames['height']}, {frames['kind']}{reach}, "
+        f"{_number(topic['rate_hz'], '{:.2f}')} Hz, {topic['bytes'] / 1e6:.2f} MB, {frames['encoding'].strip()}"
     )
 
 
