@@ -12,7 +12,8 @@ from fulmar_bags.bag_reading import AS_IT_IS, BagReading
 from fulmar_bags.contents import Bag, open_bag
 from fulmar_bags.decode import NS, Odometries, Vectors, odometries
 from fulmar_bags.figures import controller_of
-from fulmar_bags.gathered import json_object
+from fulmar_bags.frame_messages import FRAME_TYPES
+from fulmar_bags.gathered import Topic, json_object
 from fulmar_bags.other_readings import NO_INERTIAS, NO_SERIES, Inertias, Series, gyroscope_s, inertias, series
 from fulmar_bags.wire_reader import Received, WireReader
 from fulmar_bags.writer import RUN_RECORD
@@ -167,6 +168,7 @@ class RunRecord:
     gyroscope_s: tuple[float, ...] = ()  # stamps of a satellite's inertial unit [s]
     inertia: Inertias = NO_INERTIAS  # that estimators published
     actions: Series = NO_SERIES  # of a controller of the user's own, before limits
+    images: tuple[Topic, ...] = ()  # topics of cameras; what is in them is read when it is looked at
 
     @property
     def actuation(self) -> Actuation:
@@ -264,6 +266,7 @@ def _record(bag: Bag, info: dict[str, Any]) -> RunRecord:
         gyroscope_s=gyroscope_s(reader),
         inertia=inertias(reader),
         actions=series(reader, ACTION, "effort") if is_own(str(info.get("controller", ""))) else NO_SERIES,
+        images=tuple(topic for topic in bag.topics.values() if topic.type in FRAME_TYPES and len(topic)),
     )
 
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, SubFigure
 
 from fulmar_bags.bag_reading import TWIST
 from fulmar_bags.contents import Bag
@@ -29,6 +29,7 @@ from fulmar_bags.decode import (
 from fulmar_bags.figures import describe
 from fulmar_bags.gathered import Topic
 from fulmar_core.robots.topics import SENSOR_WIRES
+from fulmar_evaluation.report.frame_plot import NS, Strip, draw_strip, frame_plot, strip_of
 from fulmar_evaluation.report.page import Part, Plot, cells, html_page, table
 from fulmar_evaluation.report.space_plot import SIDES
 from fulmar_evaluation.report.style import BODY_AXES, CONTROLLER_COLOURS, legend, quiet_grid
@@ -75,15 +76,18 @@ def write_bag_report(
         ConfigError: As `write_document` says.
     """
     topic = bag.odometry(odometry)
-    drawings, title = _drawings(bag, odometries(topic)), f"{bag.path.name}: {topic.name}"
+    seen = odometries(topic)
+    drawings, title = _drawings(bag, seen), f"{bag.path.name}: {topic.name}"
+    strip = strip_of(tuple(bag.topics.values()), seen.stamp_ns / NS, seen.pose[:, :3])
 
     def page(mark: str) -> str:
         parts: list[Part] = [f"<p>{escape(note)}</p>"] if note else []
+        parts += [frame_plot([("", strip)])] if strip else []
         parts += [Plot(each.title, each.caption, _sheet([each], WIDTH)) for each in drawings]
         return html_page(title, [*parts, *_rates(describe(bag)["topics"])], mark=mark)
 
     return write_document(
-        out, [bag.path], page=page, sheet=lambda: _sheet(drawings, WIDTH + 1.0, title), force=force
+        out, [bag.path], page=page, sheet=lambda: _sheet(drawings, WIDTH + 1.0, title, strip), force=force
     )
 
 
@@ -216,11 +220,16 @@ def _actuators(name: str, vectors: Vectors, time_s: np.ndarray) -> Drawing:
     return Drawing(f"What the actuators did: {name}", caption, 0.8 + 0.28 * len(vectors.names), draw)
 
 
-def _sheet(drawings: Sequence[Drawing], width: float, title: str = "") -> Figure:
-    """Drawings below one another; with a title over the sheet, each has its own."""
+def _sheet(drawings: Sequence[Drawing], width: float, title: str = "", strip: Strip | None = None) -> Figure:
+    """Drawings below one another, what cameras saw last; with a title over the sheet, each has its own."""
     heights = [drawing.height for drawing in drawings]
-    figure = Figure(figsize=(width, sum(heights)), layout="constrained")
-    axes = figure.subplots(len(drawings), 1, height_ratios=heights, squeeze=False)[:, 0]
+    rows = [sum(heights), *([strip.height] if strip else [])]
+    figure = Figure(figsize=(width, sum(rows)), layout="constrained")
+    upper: Figure | SubFigure = figure
+    if strip:
+        upper, lower = figure.subfigures(2, 1, height_ratios=rows)
+        draw_strip(lower, strip)
+    axes = upper.subplots(len(drawings), 1, height_ratios=heights, squeeze=False)[:, 0]
     for one, drawing in zip(axes, drawings, strict=True):
         drawing.draw(one)
         one.set_title(drawing.title if title else "")

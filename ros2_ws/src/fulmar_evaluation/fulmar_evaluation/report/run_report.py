@@ -15,11 +15,14 @@ from fulmar_core.states.spatial import SpatialState
 from fulmar_evaluation.report.by_kind import plots_of
 from fulmar_evaluation.report.control_plot import draw_latency
 from fulmar_evaluation.report.error_plot import draw_progress
+from fulmar_evaluation.report.frame_plot import WIDTH, Strip, draw_strip, frame_plot, strip_of
 from fulmar_evaluation.report.page import Part, cells, faint, html_page, table
 from fulmar_evaluation.report.run_figures import latency, strip_count, supply
 from fulmar_evaluation.report.run_view import View, evaluated, result_of, rule, table_rows, views
 from fulmar_evaluation.report.trajectory_plot import has_place
 from fulmar_evaluation.report.writer import write_document
+
+SHEET = 11.0  # width of everything on one sheet [inch]
 
 
 def write_report(
@@ -69,6 +72,7 @@ def _parts(runs: Sequence[View]) -> list[Part]:
     gauge = (supply,) if any(len(run.record.supply) for run in runs) else ()
     plots = (*shown.path, *shown.use, *gauge, latency) if evaluated(runs) else ()
     drawn = [plot(runs) for plot in plots]
+    seen = _strips(runs)
     return [
         *faint(_subtitle(runs)),
         f'<div class="results">{"".join(map(_result, runs))}</div>',
@@ -78,6 +82,7 @@ def _parts(runs: Sequence[View]) -> list[Part]:
         *(_beliefs(run) for run in runs if run.summary["beliefs"]),
         "<h2>In figures</h2>",
         _table(runs),
+        *([frame_plot(seen)] if seen else []),
         *(plot for plot in drawn if plot is not None),
         "<h2>Where this comes from</h2>",
         f"<dl>{''.join(map(_origin, runs))}</dl>",
@@ -150,14 +155,27 @@ def _origin(run: View) -> str:
     )
 
 
+def _strips(runs: Sequence[View]) -> list[tuple[str, Strip]]:
+    """What the cameras of the runs saw, each with the name of its run where there are several."""
+    found = []
+    for run in runs:
+        motion = run.record.motion
+        strip = strip_of(run.record.images, motion.stamp_s, motion.position)
+        found += [(run.label if len(runs) > 1 else "", strip)] if strip else []
+    return found
+
+
 def _overview(runs: Sequence[View], title: str) -> Figure:
     """All of it on one sheet."""
     plots = plots_of(runs)
     count, motion = strip_count(runs), plots.motion_rows
     high = 1.28 * max(count + motion + 1, plots.path_rows) if motion or plots.path_rows else 4.9
-    low = plots.use_height(runs)
-    figure = Figure(figsize=(11.0, high + low + 0.5), layout="constrained")
-    top, bottom = figure.subfigures(2, 1, height_ratios=(high, low))
+    low, seen = plots.use_height(runs), _strips(runs)
+    rows = [high, low, *(SHEET / WIDTH * strip.height for _, strip in seen)]
+    figure = Figure(figsize=(SHEET, sum(rows) + 0.5), layout="constrained")
+    top, bottom, *strips = figure.subfigures(len(rows), 1, height_ratios=rows)
+    for part, (_, strip) in zip(strips, seen, strict=True):
+        draw_strip(part, strip)
     near = motion and any(has_place(result) for _, result in evaluated(runs))
     left, right = top.subfigures(1, 2, width_ratios=(1.2 if near else 1.0, 1.0))
     plots.draw_path(left, runs)
