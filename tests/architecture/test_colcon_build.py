@@ -24,6 +24,7 @@ PROGRAMS = {
     "hardware_drivers/adapter_node": "hardware_drivers.adapter_node",
     "hardware_drivers/driver_node": "hardware_drivers.driver_node",
     "policy_server/controller_node": "policy_server.controller_node",
+    "sim_nodes/camera_node": "sim_nodes.camera_node",
     "sim_nodes/emulator_node": "sim_nodes.emulator_node",
     "sim_nodes/event_camera_node": "sim_nodes.event_camera_node",
     "sim_nodes/sim_node": "sim_nodes.sim_node",

@@ -16,7 +16,7 @@ from fulmar_bringup import launched_system
 
 ARGUMENTS = {
     "system", "robot", "task", "controller", "backend", "hardware", "policy", "goals", "adapter", "topic",
-    "emulate", "name", "markers",
+    "emulate", "name", "markers", "camera",
 }  # fmt: skip
 
 ARGUMENTS_HELP = launched_system.ARGUMENTS

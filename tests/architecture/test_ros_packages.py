@@ -120,6 +120,7 @@ def test_programs_are_those_that_systems_start(packages):
         ("hardware_drivers", "adapter_node"),
         ("hardware_drivers", "driver_node"),
         ("policy_server", "controller_node"),
+        ("sim_nodes", "camera_node"),
         ("sim_nodes", "emulator_node"),
         ("sim_nodes", "event_camera_node"),
         ("sim_nodes", "sim_node"),

@@ -12,7 +12,7 @@ import pytest
 from fulmar_bringup.controller_row import controller_spec
 from fulmar_bringup.estimator_row import estimator_specs
 from fulmar_bringup.launched_system import ARGUMENTS, list_nodes
-from fulmar_bringup.node_table import OPTIONS, node_rows, row_of
+from fulmar_bringup.node_table import OPTIONS, USUALLY_ON, node_rows, row_of
 from fulmar_bringup.plant_row import plant_spec
 from fulmar_bringup.recorder_row import recorder_spec
 from fulmar_bringup.run_plan import RunPlan
@@ -326,7 +326,7 @@ def test_measurements_without_noise_may_repeat_while_a_robot_stands(changes, rep
 
 @pytest.mark.parametrize("name", OPTIONS)
 def test_an_optional_node_is_a_row_an_option_of_two_commands_and_a_launch_argument(name):
-    for command, runs in ((run, False), (up, True)):
+    for command, runs in ((run, False), (up, name in USUALLY_ON)):
         assert inspect.signature(command).parameters[name].default is runs
     assert name in ARGUMENTS
     assert name not in system_rows(PLAN)

@@ -7,8 +7,9 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fulmar_bringup.camera_row import CAMERA
 from fulmar_bringup.goal_plan import is_endless, shown_path
-from fulmar_bringup.node_table import OPTIONS
+from fulmar_bringup.node_table import OPTIONS, USUALLY_ON
 from fulmar_bringup.system import System
 from fulmar_core.config.paths import config_path
 from fulmar_core.config.provenance import fulmar_version, git_revision
@@ -46,7 +47,7 @@ def run_info(plan: RunPlan) -> str:
     """The plan and what made it, as the JSON object that the recorder is given."""
     made_by = {"fulmar_version": fulmar_version(), "git_revision": git_revision()}
     own = {"name": plan.robot_name, "calibration": str(calibration_path() or "")}
-    extras = {name: name in plan.extras for name in OPTIONS}
+    extras = {name: name in plan.extras for name in OPTIONS if name in (*USUALLY_ON, *plan.extras)}
     plans = {key: value for key, value in asdict(replace(plan, mission=None)).items() if key not in NOT_KEPT}
     return json.dumps(plans | extras | own | _goal_path(plan.goals) | made_by)
 
@@ -87,6 +88,7 @@ def effective_system(plan: RunPlan) -> System:
         name=plan.robot_name,
         guards=plan.guards,
         recorder=plan.recording,
+        camera=CAMERA in plan.extras,
     )
 
 

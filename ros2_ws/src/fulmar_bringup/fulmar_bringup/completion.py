@@ -8,6 +8,7 @@ from typing import cast
 
 import numpy as np
 
+from fulmar_bringup.camera_row import CAMERA
 from fulmar_bringup.excitation_plan import excitation_of
 from fulmar_bringup.goal_plan import (
     check_file_places,
@@ -146,7 +147,9 @@ def _as_its_system(plan: RunPlan) -> RunPlan:
             recording = replace(recording, mode="whole")  # a run has one bag
         same = system is not None and (system.robot, system.task) == (plan.robot, plan.task)
         nodes = own_nodes(replace(system, name=plan.name)) if system is not None and same else ()
-        plan = replace(plan, recording=recording, nodes=nodes)
+        seen = (CAMERA,) if system is not None and same and system.camera else ()
+        extras = tuple(dict.fromkeys((*plan.extras, *seen)))
+        plan = replace(plan, recording=recording, nodes=nodes, extras=extras)
     if not plan.recording_mode:
         return plan
     if plan.recording_mode not in MODES:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 from fulmar_bringup.node_row import NodeRow, robot_spec
 from fulmar_bringup.node_spec import NodeSpec, Parameter
@@ -27,7 +28,11 @@ def camera_specs(plan: RunPlan) -> tuple[NodeSpec, ...]:
         return ()
     outputs = (EVENTS, EVENTS_2)[: len(load_robot(plan.robot).event_cameras)]
     parameters: dict[str, Parameter] = {"robot": plan.robot, "seed": plan.seed}
-    return (_row(plan, "event_camera", "sim_nodes.event_camera_node", parameters, (TRUTH,), (), outputs, ()),)
+    return (
+        chain_spec(
+            plan, "event_camera", "sim_nodes.event_camera_node", parameters, (TRUTH,), (), outputs, ()
+        ),
+    )
 
 
 def estimator_specs(plan: RunPlan) -> tuple[NodeSpec, ...]:
@@ -48,10 +53,10 @@ def _estimator_spec(plan: RunPlan, file: str, others: Sequence[NodeSpec]) -> Nod
     inputs, observed = tuple(kind.takes.values()), tuple(kind.takes_if_there.values())
     outputs = (*kind.publishes, *((kind.status,) if kind.status else ()))
     module = "fulmar_ros.estimator_node"
-    return _row(plan, kind.node, module, parameters, inputs, observed, outputs, others)
+    return chain_spec(plan, kind.node, module, parameters, inputs, observed, outputs, others)
 
 
-def _row(
+def chain_spec(
     plan: RunPlan,
     name: str,
     module: str,
@@ -60,8 +65,9 @@ def _row(
     sees: Sequence[Wire],
     publishes: Sequence[Wire],
     others: Sequence[NodeSpec],
+    **more: Any,
 ) -> NodeSpec:
-    """A row that takes part in lock step, after those of the others whose outputs it takes."""
+    """A row that takes part in lock step, after those of the others whose outputs it takes; `more` as in `NodeSpec`."""
     inputs, observed, outputs = (tuple(wire.name for wire in wires) for wires in (takes, sees, publishes))
     if plan.lockstep:
         parameters["lockstep"] = True
@@ -73,7 +79,9 @@ def _row(
         if upstream:
             parameters["upstream"] = upstream
         inputs, outputs = (*inputs, PERIOD.name), (*outputs, ANSWER.name)
-    return robot_spec(plan, name, module, parameters, inputs=inputs, observed=observed, outputs=outputs)
+    return robot_spec(
+        plan, name, module, parameters, inputs=inputs, observed=observed, outputs=outputs, **more
+    )
 
 
 NAMES = tuple(dict.fromkeys(kind.node for kind in KINDS.values()))

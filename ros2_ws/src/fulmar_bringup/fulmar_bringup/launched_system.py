@@ -11,8 +11,9 @@ from pathlib import Path
 from fulmar_bringup.bag_origin import attachments, run_info
 from fulmar_bringup.completion import completed
 from fulmar_bringup.node_spec import NodeSpec
-from fulmar_bringup.node_table import OPTIONS
+from fulmar_bringup.node_table import OPTIONS, USUALLY_ON
 from fulmar_bringup.plan_checks import checked
+from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.system_plan import USUAL, system_plan
 from fulmar_bringup.system_rows import system_rows
 from fulmar_core.config.errors import ConfigError
@@ -31,7 +32,10 @@ ARGUMENTS = {
     "topic": "topic that the adapter takes, in the place of the file's",
     "emulate": "true: with backend hardware, an emulator stands in for the device",
     "goals": "a file of configs/goals, without .yaml, that a node of its own publishes",
-    **{name: f"false: not this. {text}" for name, text in OPTIONS.items()},
+    **{
+        name: f"{'false: not this' if name in USUALLY_ON else 'true'}. {text}"
+        for name, text in OPTIONS.items()
+    },
 }
 
 
@@ -60,11 +64,16 @@ def list_nodes(**asked: str | None) -> tuple[NodeSpec, ...]:
         adapter=asked.get("adapter") or "",
         adapter_topic=asked.get("topic") or "",
         emulated=asked.get("emulate") == "true",
-        extras=tuple(name for name in OPTIONS if asked.get(name) != "false"),
     )
+    plan = replace(plan, extras=tuple(name for name in OPTIONS if _runs(asked.get(name), name, plan)))
     plan, wires = checked(completed(plan)), None
     if plan.emulated:
         wires = Path(tempfile.mkdtemp(prefix="fulmar_"))
         atexit.register(shutil.rmtree, wires, ignore_errors=True)  # with the launch itself
     record = {"info": run_info(plan), "files": attachments(plan)}
     return tuple(system_rows(plan, record=record, wires_folder=wires).values())
+
+
+def _runs(asked: str | None, name: str, plan: RunPlan) -> bool:
+    """Whether a node with an option runs: as is said, else as its system file has it or as is usual."""
+    return asked == "true" if asked is not None else name in (*USUALLY_ON, *plan.extras)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fulmar_bringup.camera_row import image_specs
 from fulmar_bringup.estimator_row import camera_specs, estimator_specs
 from fulmar_bringup.node_spec import NodeSpec
 from fulmar_bringup.run_plan import RunPlan
@@ -12,7 +13,7 @@ from hardware_drivers.hardware import load_hardware
 
 def between(plan: RunPlan) -> tuple[NodeSpec, ...]:
     """Cameras and estimators that Fulmar brings, each after those whose outputs are its inputs."""
-    return (*camera_specs(plan), *estimator_specs(plan))
+    return (*camera_specs(plan), *image_specs(plan), *estimator_specs(plan))
 
 
 def estimates_odometry(plan: RunPlan) -> bool:

@@ -15,14 +15,14 @@ from fulmar_bringup.node_spec import PARTS
 if TYPE_CHECKING:
     from fulmar_bringup.node_row import NodeRow
 
-# By names of modules. With a help text people switch the node by an option of this name. Such nodes run in standing
-# systems unless they are switched off, and in single runs where they are switched on.
+# By names of modules. With a help text people switch the node by an option of this name.
 TABLE = {
     "recorder": "",
     "emulator": "",
     "plant": "",
     "estop": "",
     "event_camera": "",
+    "camera": "Draw what the robot's camera sees, on `camera/image_raw` and others. See docs/cameras.md.",
     "estimator": "",
     "controller": "",
     "adapter": "",
@@ -31,6 +31,10 @@ TABLE = {
     "markers": "Draw goal, limits and thrust for RViz and Foxglove, on the topic `markers`. See `fulmar layout`.",
 }
 OPTIONS = {name: text for name, text in TABLE.items() if text}
+USUALLY_ON = (
+    "markers",
+)  # of these, what standing systems have unless it is switched off; all else is asked for
+IN_LOCKSTEP = ("camera",)  # of these, what answers each period of lock step
 
 
 @cache

@@ -14,6 +14,8 @@ import numpy as np
 from fulmar_bringup.emulation import check_emulated
 from fulmar_bringup.estimator_row import camera_specs
 from fulmar_bringup.node_spec import CONTROLLER, PARTS
+from fulmar_bringup.node_table import IN_LOCKSTEP
+from fulmar_bringup.renderer_check import check_renderer
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.system import Guards, default_hardware
 from fulmar_core.config.errors import BundleError, ConfigError, UnknownNameError
@@ -51,6 +53,7 @@ def checked(plan: RunPlan) -> RunPlan:
     """
     robot, task = load_robot(plan.robot), load_task(plan.task, plan.thing)
     _check_surroundings(plan, robot)
+    check_renderer(plan, robot)
     checked_rate(robot, plan.control_hz)
     _check_pace(plan)
     _check_device(plan)
@@ -87,9 +90,10 @@ def _check_pace(plan: RunPlan) -> None:
     """Refuse what no clock, and what lock step, cannot do; and a watchdog that would trip between any two commands."""
     if plan.lockstep and plan.rate != 1.0:
         raise ConfigError("--lockstep runs as fast as it goes; it takes no --rate.")
-    if plan.lockstep and plan.extras:
+    by_the_clock = [name for name in plan.extras if name not in IN_LOCKSTEP]
+    if plan.lockstep and by_the_clock:
         raise ConfigError(
-            f"--lockstep gives the same bytes each time; it takes no --{plan.extras[0]}, which goes by the clock."
+            f"--lockstep gives the same bytes each time; it takes no --{by_the_clock[0]}, which goes by the clock."
         )
     if plan.mocap_hz and plan.is_real:
         raise ConfigError("--mocap-hz simulates a motion capture; a real robot has its own. Leave it out.")

@@ -94,6 +94,7 @@ class System:
     guards: Guards = NONE
     recorder: Recording = Recording()
     nodes: tuple[OwnNode, ...] = ()  # beside plant, controller, recorder and guards
+    camera: bool = False  # a node draws what the camera of a simulated robot sees
 
     def __post_init__(self) -> None:
         """Refuse a rate that nothing could run at, and a name that ROS cannot take."""
@@ -115,10 +116,19 @@ def load_system(name: str) -> System:
 
 
 def modules_of(
-    controller: str, backend: str, *, guards: Guards = NONE, hardware: str = "", emulated: bool = False
+    controller: str,
+    backend: str,
+    *,
+    guards: Guards = NONE,
+    hardware: str = "",
+    emulated: bool = False,
+    camera: bool = False,
 ) -> tuple[str, ...]:
-    """Modules of extras that the nodes of a controller, a backend, its guards and a hardware file import."""
-    simulated = ("mujoco",) if backend == "mujoco" or emulated else (JSBSIM,) * is_jsbsim(backend)
+    """Modules of extras that the nodes of a controller, a backend, its guards, hardware file and camera import."""
+    simulated = (
+        *(("mujoco",) if backend == "mujoco" or emulated or camera else ()),
+        *(JSBSIM,) * is_jsbsim(backend),
+    )
     driven = load_hardware(hardware).needs if hardware else ()
     estimated = (module for file in guards.files for module in estimator_kind(file).needs)
     return (*controller_entry(controller).needs, *simulated, *driven, *estimated)

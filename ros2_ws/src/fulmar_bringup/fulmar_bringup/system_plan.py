@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from fulmar_bringup.camera_row import CAMERA
 from fulmar_bringup.own_row import own_nodes
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.system import NONE, System, load_system
@@ -40,6 +41,7 @@ def system_plan(system: str | None, **choices: str | None) -> RunPlan:
         guards=NONE if moved else chosen.guards,
         recording=chosen.recorder,
         nodes=own_nodes(chosen),
+        extras=(CAMERA,) if chosen.camera else (),
         standing=True,
     )
 

@@ -20,6 +20,8 @@ from fulmar_core.config.errors import ConfigError, did_you_mean
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.robots.topics import (
     ANSWER,
+    CAMERA_IMAGES,
+    CAMERA_INFO,
     CLOCK,
     EVENTS,
     EVENTS_2,
@@ -32,6 +34,8 @@ from fulmar_core.robots.topics import (
 from fulmar_core.tasks import load_task
 from hardware_drivers.hardware import load_hardware
 from policy_server.controllers import controller_entry
+
+STREAMS = tuple(wire.name for wire in (EVENTS, EVENTS_2, RATE, *CAMERA_IMAGES, CAMERA_INFO))
 
 
 def system_rows(
@@ -162,7 +166,7 @@ def _with_listeners(rows: list[NodeSpec], plan: RunPlan) -> list[NodeSpec]:
 
 def _streams(row: NodeSpec) -> tuple[str, ...]:
     """Outputs of a camera or a rate estimator, whose loss would hold up lock step; of any other row none."""
-    return tuple(topic for topic in row.outputs if topic in (EVENTS.name, EVENTS_2.name, RATE.name))
+    return tuple(topic for topic in row.outputs if topic in STREAMS)
 
 
 def _listeners(rows: Iterable[NodeSpec], topic: str) -> int:

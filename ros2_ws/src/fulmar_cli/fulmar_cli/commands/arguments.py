@@ -13,7 +13,7 @@ from typing import Annotated, Any, TypeVar
 import typer
 
 from fulmar_bringup.console import json_alone, warn
-from fulmar_bringup.node_table import OPTIONS
+from fulmar_bringup.node_table import OPTIONS, USUALLY_ON
 from fulmar_core.wires.robot_name import checked_name
 
 Value = TypeVar("Value")
@@ -122,7 +122,7 @@ def with_node_options(*, standing: bool) -> Callable[[Callable[..., None]], Call
     """Options of a command that switch the nodes of the table that people may; it gets their names as `extras`.
 
     Args:
-        standing: Whether they run unless they are switched off.
+        standing: Whether what is usual runs.
     """
 
     def made(command: Callable[..., None]) -> Callable[..., None]:
@@ -133,14 +133,16 @@ def with_node_options(*, standing: bool) -> Callable[[Callable[..., None]], Call
 
         signature = inspect.signature(command, eval_str=True)
         *own, last = (each for each in signature.parameters.values() if each.name != "extras")
-        kinds = {name: flag(f"--{name}/--no-{name}", text) for name, text in OPTIONS.items()}
-        more = [
-            last.replace(name=n, default=standing, annotation=Annotated[bool, k]) for n, k in kinds.items()
-        ]
+        on = {name: standing and name in USUALLY_ON for name in OPTIONS}
+        more = [last.replace(name=n, default=default, annotation=_switch(n)) for n, default in on.items()]
         vars(switched)["__signature__"] = signature.replace(parameters=[*own, *more, last])
         return switched
 
     return made
+
+
+def _switch(name: str) -> Any:
+    return Annotated[bool, flag(f"--{name}" + f"/--no-{name}" * (name in USUALLY_ON), OPTIONS[name])]
 
 
 def invoked_command() -> str:

@@ -109,7 +109,7 @@ def up(
     plan = replace(
         asked, policy=str(policy or ""), hardware=hardware or "", emulated=emulate, arm=arm, scenario=scenario,
         seed=seed, start=read_pose(start, "--start", asked.robot) or (), rate=rate, recording_mode=recording or "",
-        extras=extras, unattended=service, only=only or "",
+        extras=tuple(dict.fromkeys((*asked.extras, *extras))), unattended=service, only=only or "",
         guards=replace(asked.guards, estop=estop or asked.guards.estop), record=str(record or ""),
         command=cli.invoked_command(),
     )  # fmt: skip

@@ -87,6 +87,7 @@ def check_plan(plan: RunPlan, *, through: str = "ros") -> None:
             guards=plan.guards,
             hardware=plan.hardware,
             emulated=plan.emulated,
+            camera="camera" in plan.extras,
         ),
     )
 
