@@ -24,6 +24,7 @@ from fulmar_core.tasks.go_to_position import GoToPosition
 from fulmar_core.tasks.go_to_position_3d import GoToPosition3d
 from fulmar_core.tasks.go_to_position_with_obstacles import GoToPositionWithObstacles
 from fulmar_core.tasks.hold_flight import HoldAirspeed, HoldAttitude
+from fulmar_core.tasks.inspect import Inspect
 from fulmar_core.tasks.own_task import load_own_task
 from fulmar_core.tasks.point import Point
 from fulmar_core.tasks.push_block import PushBlock
@@ -53,6 +54,7 @@ ShippedTask = (  # what a file of `configs/tasks` can be
     | GoThroughPositions3d
     | GoThroughPoses3d
     | FollowPose3d
+    | Inspect
     | Point
     | FollowReference
     | HoldAttitude

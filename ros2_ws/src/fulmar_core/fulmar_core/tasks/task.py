@@ -160,6 +160,22 @@ class Task(ABC, Generic[S]):
         """
         raise ConfigError(f"task '{self.name}' has no height to choose. Leave --height out.")
 
+    def along(self, path: str) -> Self:
+        """The task along another path, by a name of `named_paths.NAMED`.
+
+        Raises:
+            ConfigError: It follows none, or there is no such path.
+        """
+        raise ConfigError(f"task '{self.name}' has no path to choose. Leave --path out.")
+
+    def episode_of(self, robot: Robot) -> float:
+        """Length of an episode of a robot, where it depends on the robot [s]."""
+        return self.episode_s
+
+    def pointing_error(self, state: S, robot: Robot) -> Array | None:
+        """Angle between the camera's axis and the way to what it looks at, shape (...,) [rad]; None: at nothing."""
+        return None
+
     def fitted(self, robot: Robot) -> Self:
         """The task for a robot: how near it has to come may depend on how well it knows its place."""
         return self

@@ -17,6 +17,7 @@ from fulmar_core.tasks.references import ReferencePath
 from fulmar_core.tasks.references.spacing import few, on_circle, positive, spread_along
 
 Place = tuple[float, float, float]  # x, y, z [m]
+TURNED = 0.7  # cosine of half the share of two circles in which their plane stands still [-]
 
 
 class SpaceCurve(ABC):
@@ -132,4 +133,37 @@ class Lifted(SpaceCurve):
         return np.array(turn(from_euler(*np.deg2rad(self.angles_deg)), (0.0, 0.0, 1.0)))
 
 
-SpacePath = Helix | TiltedCircle | Lifted
+@dataclass(frozen=True)
+class TwoCircles(SmoothCurve):
+    """Two rounds on one sphere, in planes that are turned about x to either side; from one to the other at x's ends."""
+
+    kind: Literal["two_circles"]
+    radius: float  # [m]
+    tilt_deg: float = 45.0  # of either plane [deg]
+    centre: Place = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        positive(radius=self.radius)
+        if not 0.0 < self.tilt_deg <= 45.0:
+            raise ValueError(f"'tilt_deg' = {self.tilt_deg:g} must be greater than 0 and at most 45.")
+
+    @property
+    def closed(self) -> bool:
+        """See `SpaceCurve.closed`."""
+        return True
+
+    def at(self, t: np.ndarray) -> np.ndarray:
+        """See `SmoothCurve.at`."""
+        share = (0.5 + np.cos(2.0 * math.pi * t) / (2.0 * TURNED)).clip(0.0, 1.0)
+        smooth = share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
+        tilt = math.radians(self.tilt_deg) * (2.0 * smooth - 1.0)
+        east, north = self.radius * on_circle(2.0 * t).T
+        return np.column_stack((east, north * np.cos(tilt), north * np.sin(tilt)))
+
+    @property
+    def up(self) -> np.ndarray:
+        """See `SpaceCurve.up`."""
+        return np.array([0.0, 0.0, 1.0])
+
+
+SpacePath = Helix | TiltedCircle | Lifted | TwoCircles

@@ -63,8 +63,11 @@ class MovingTarget:
 
     def pose(self, time_s: float) -> np.ndarray:
         """Where it is at a time, shape (7,): place [m], quaternion x, y, z, w."""
+        return self.pose_after(self.rounds(time_s))
+
+    def pose_after(self, rounds: float) -> np.ndarray:
+        """The same after so many rounds, or such a share of an open path."""
         points, count = self.points, len(self.points) - 1
-        rounds = self.rounds(time_s)
         share = rounds % 1.0 if self.path.closed else rounds
         whole = min(int(share * count), count - 1)
         part = share * count - whole
