@@ -26,6 +26,7 @@ from fulmar_core.states.counter_rng import Draws
 from fulmar_core.states.rotation import Array
 from fulmar_core.states.spatial import SpatialState
 from fulmar_core.tasks.goal import Goal
+from fulmar_core.tasks.goal_words import number
 from fulmar_core.tasks.moving_pose import MovingPose, of_one_sign
 from fulmar_core.tasks.references.named_paths import named_path
 from fulmar_core.tasks.references.planned_flight import (
@@ -77,6 +78,14 @@ class Inspect(MovingPose):
     def along(self, path: str) -> Self:
         """See `Task.along`."""
         return replace(self, path=path, training_paths=())
+
+    def farthest_start(self, *, training: bool) -> tuple[str, float]:
+        """See `Task.farthest_start`."""
+        return ("start.training_distance", self.start.training_distance) if training else ("", 0.0)
+
+    def said(self, goal: Goal) -> str:
+        """See `Task.said`."""
+        return f"the {self.path} about '{self.thing}', {number(self.spacing_s * (len(goal.targets) - 1))} s"
 
     def flight(self, robot: Robot, path: str = "") -> Flight:
         """What a robot flies; `path`: another one than the task's."""

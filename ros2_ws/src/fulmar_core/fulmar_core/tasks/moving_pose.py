@@ -23,6 +23,7 @@ from fulmar_core.states.attitude import (
 from fulmar_core.states.rotation import Array
 from fulmar_core.states.spatial import SpatialState, quat_of
 from fulmar_core.tasks.goal import Goal, no_obstacles
+from fulmar_core.tasks.goal_words import number
 from fulmar_core.tasks.space_terms import (
     ATTITUDE_TERMS,
     AXES,
@@ -108,6 +109,10 @@ class MovingPose(FileTask[SpatialState]):
     def __post_init__(self) -> None:
         if min(self.spacing_s, self.fine_distance, self.fine_angle) <= 0.0:
             raise ValueError("spacing_s, fine_distance and fine_angle must be greater than 0.")
+
+    def said(self, goal: Goal) -> str:
+        """See `Task.said`."""
+        return f"a path of {number(self.spacing_s * (len(goal.targets) - 1))} s ({self.title})"
 
     def goal_through(self, poses: Array, done: Array) -> Goal:
         """The goal of many worlds at its first pose; poses of shape (worlds, k, 7), `done` zeros of (worlds,)."""
