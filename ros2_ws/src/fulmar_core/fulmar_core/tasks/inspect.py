@@ -121,8 +121,8 @@ class Inspect(MovingPose):
         times = self.spacing_s * np.arange(1 + math.ceil(over_s / self.spacing_s))
         which = np.minimum((unit[:, 0] * len(paths)).astype(int), len(paths) - 1)
         targets = np.empty((draws.worlds, len(times), 7))
-        for number, flight in enumerate(flights):
-            mine = which == number
+        for index, flight in enumerate(flights):
+            mine = which == index
             begin = unit[mine, 1:2] * flight.closed
             targets[mine] = at_rounds(flight.table, begin + flight.rounds(times, once=not training))
         targets[..., 3:] /= np.linalg.norm(targets[..., 3:], axis=-1, keepdims=True)
