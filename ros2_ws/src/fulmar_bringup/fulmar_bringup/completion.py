@@ -40,7 +40,7 @@ from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.robots.topics import ODOMETRY
 from fulmar_core.safety.geofence import check_starts
-from fulmar_core.tasks import Task, load_task
+from fulmar_core.tasks import Task
 from fulmar_core.tasks.goal import PLACES
 from fulmar_core.tasks.goal_numbers import GOAL, START, whole_pose
 from fulmar_core.tasks.torque_profiles import DURATION_S
@@ -62,7 +62,7 @@ def completed(plan: RunPlan) -> RunPlan:
     plan = replace(plan, task=task_of(plan))
     robot = load_robot(plan.robot)
     _check_asked(plan, robot)
-    task = _asked_task(plan)
+    task = plan.asked_task
     plan = replace(
         plan, thing=task.thing, controller=plan.controller or usual_controller(robot, task, plan.policy)
     )
@@ -83,12 +83,6 @@ def completed(plan: RunPlan) -> RunPlan:
     # A controller of one's own may read the gyroscope too.
     check_scenario(robot, plan.scenario, estimated=bool(plan.guards.files) or is_own(plan.controller))
     return _with_goal(_as_its_system(plan), robot, task)
-
-
-def _asked_task(plan: RunPlan) -> Task:
-    """The task of a plan, at the height that was asked for."""
-    task = load_task(plan.task, plan.thing)
-    return task.at_height(plan.height) if plan.height else task
 
 
 def _check_asked(plan: RunPlan, robot: Robot) -> None:
@@ -175,7 +169,9 @@ def _with_goal(plan: RunPlan, robot: Robot, task: Task) -> RunPlan:
         check_starts(robot, task)
     mission, drawn = placed(replace(plan, goal=goal, start=start), file, task)
     start_drawn, start = not start, start or drawn
-    usual_s = DURATION_S if excitation else duration_of(file, robot, start) if file else task.episode_s
+    usual_s = (
+        DURATION_S if excitation else duration_of(file, robot, start) if file else task.episode_of(robot)
+    )
     return replace(
         plan,
         start=start,

@@ -13,7 +13,7 @@ from fulmar_bringup.node_spec import ENDS, RESTARTS, NodeSpec
 from fulmar_bringup.system import NONE, Guards
 from fulmar_core.config.recording import Recording
 from fulmar_core.robots.robot_file import load_robot
-from fulmar_core.tasks import load_task
+from fulmar_core.tasks import Task, load_task
 from fulmar_core.tasks.goal import Goal, PoseTuple
 from fulmar_core.tasks.goal_files import load_goals
 from fulmar_core.tasks.goal_words import attitude_words, number, pose_words
@@ -77,6 +77,7 @@ class How:
     control_hz: float = 0.0  # 0: as the system file, the policy or the robot have it [Hz]
     _: KW_ONLY
     scenario: str = "nominal"
+    along: str = ""  # path that the task follows, of `named_paths.NAMED`; empty: as the task has it
     thing: str = ""  # in space, of `configs/things`; empty: as the task has it
     seed: int = 0
     start: PoseTuple = ()  # as `State.NUMBERS`, or a place alone; empty: as the seed draws it [m, deg]
@@ -134,6 +135,17 @@ class RunPlan(Recorded, Guarded, How, Where, Who):
         return ENDS if self.lockstep else RESTARTS
 
     @property
+    def asked_task(self) -> Task:
+        """The task, with the thing, the path and the height that were asked for.
+
+        Raises:
+            ConfigError: As in `load_task`, or it has no such choice.
+        """
+        task = load_task(self.task, self.thing)
+        task = task.along(self.along) if self.along else task
+        return task.at_height(self.height) if self.height else task
+
+    @property
     def line(self) -> str:
         """What a complete plan was understood as, in one line: goal, task, start, controller, surroundings, length."""
         real = "in real time" if self.rate == 1.0 else f"at {self.rate:g} times real time"
@@ -147,7 +159,7 @@ class RunPlan(Recorded, Guarded, How, Where, Who):
 
     @property
     def _goal_words(self) -> str:
-        task = load_task(self.task)
+        task = self.asked_task
         if self.excitation:
             return f"torques of '{self.excitation}'"
         if self.goals:

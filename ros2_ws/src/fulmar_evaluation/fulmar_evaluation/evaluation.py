@@ -55,7 +55,9 @@ class Trial:
     def task(self) -> Task:
         """The task, with the length of its episodes."""
         plan = self.plan
-        return evaluated_task(plan.task, thing=plan.thing, episode_s=plan.duration_s, goals=plan.goals)
+        return evaluated_task(
+            plan.task, thing=plan.thing, along=plan.along, episode_s=plan.duration_s, goals=plan.goals
+        )
 
     def controller(self) -> Controller:
         """The controller, made anew."""

@@ -86,6 +86,23 @@ FIGURES = {
     "OT5_percent": Figure("within 5°", "%", "Share of the time with a heading error below 5°.", "more"),
     "OT2_percent": Figure("within 2°", "%", "Share of the time with a heading error below 2°.", "more"),
     "OT1_percent": Figure("within 1°", "%", "Share of the time with a heading error below 1°.", "more"),
+    "path_error_m": Figure(
+        "path error", "m", "Mean distance from a target that moves; its `max` is over all episodes.", "less",
+    ),
+    "path_error_most_m": Figure(
+        "largest path error", "m", "Largest distance from a target that moves.", "less",
+    ),
+    "pointing_error_deg": Figure(
+        "pointing error", "°", "Mean angle between the camera's axis and the way to the middle of the thing.", "less",
+    ),
+    "least_distance_m": Figure(
+        "least distance", "m",
+        "Least distance of the body's origin from the keep-out volume, negative within it; `min` is over all episodes.",
+        "more",
+    ),
+    "coverage": Figure(
+        "coverage", "-", "Share of the thing's outer surface that the camera has seen.", "more",
+    ),
     "ALV_m_s": Figure("mean speed", "m/s", "Mean speed over the episode."),
     "AAV_rad_s": Figure("mean turn rate", "rad/s", "Mean size of the turn rate over the episode."),
     "AAS": Figure("actuators in use", "-", "Mean share of actuators with a command other than zero.", "less"),

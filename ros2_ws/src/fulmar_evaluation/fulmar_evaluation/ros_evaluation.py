@@ -216,7 +216,9 @@ def _episodes(
     progress: Progress,
 ) -> Trajectories:
     robot, scenario = load_robot(plan.robot), load_scenario(plan.scenario)
-    task = evaluated_task(plan.task, thing=plan.thing, episode_s=plan.duration_s, goals=plan.goals)
+    task = evaluated_task(
+        plan.task, thing=plan.thing, along=plan.along, episode_s=plan.duration_s, goals=plan.goals
+    )
     control_dt = robot.timing.substeps(plan.control_hz) * robot.timing.physics_dt
     steps = episode_steps(task, control_dt)
     runs: list[Trajectories] = []

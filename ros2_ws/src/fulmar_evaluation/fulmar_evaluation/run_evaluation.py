@@ -66,6 +66,8 @@ class RunResult:
     @property
     def path_error_m(self) -> float | None:
         """Mean distance from the path [m]; None where none was to be followed."""
+        if self.task.moves:
+            return self.figure("path_error_m")
         if not len(self.path):
             return None
         axes = (self.run.x, self.run.y, self.run.z)[: self.path.shape[1]]
@@ -144,7 +146,7 @@ def evaluate_run(record: RunRecord) -> RunResult | None:
         targets=goals[-1].targets,
         time_s=time_s,
         samples=samples,
-        aims=goal.current,
+        aims=task.target_of(goal),
         things=things,
         run=run,
         figures={name: float(values[0]) for name, values in episode_metrics(run, task).items()},

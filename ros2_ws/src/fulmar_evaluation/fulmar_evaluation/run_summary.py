@@ -30,6 +30,7 @@ FIGURES = (
     "impulse_N_s",
     "fuel_used_kg",
 )  # of `metrics.episode_metrics`; None where the task does not ask
+BESIDE = ("path_error_most_m", "pointing_error_deg", "least_distance_m", "coverage")  # as `FIGURES`
 Spread = dict[str, float | None]
 
 
@@ -55,6 +56,7 @@ def summarise(record: RunRecord) -> dict[str, Any]:
         **{name: result.figure(name) if result else None for name in FIGURES},
         "collided": None if result is None else bool(result.figures["collided"]),
         "touched": result.robot.kind.obstacle if result and result.figures["collided"] else None,
+        **{name: result.figure(name) if result else None for name in BESIDE},
         "path_error_m": result.path_error_m if result else None,
         **_tracking(result),
         "goals_progress": result.progress if result else None,
@@ -261,6 +263,10 @@ FIGURE_TEXTS: dict[str, Callable[[Any], str]] = {
     "yaw_rate_error_deg_s": "turn rate {:.1f}°/s off".format,
     "rate_error_deg_s": "turn rate {:.1f}°/s off".format,
     "path_error_m": "path {:.3f} m off".format,
+    "path_error_most_m": "at most {:.3f} m".format,
+    "pointing_error_deg": lambda value: f"camera {degrees_text(value)} off",
+    "least_distance_m": "{:.2f} m from the keep-out volume at least".format,
+    "coverage": "{:.0%} of the surface seen".format,
     "tracking_error_m": "moving target {:.3f} m off".format,
     "tracking_error_deg": "its attitude {:.1f}° off".format,
     "goals_progress": str,

@@ -20,7 +20,7 @@ from fulmar_core.robots.jsbsim_models import JSBSIM, is_jsbsim
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.simulation.counts import check_episodes
 from fulmar_core.simulation.episode import episode_steps
-from fulmar_core.tasks import load_task
+from fulmar_core.tasks.path_task import evaluated_task
 from fulmar_core.worlds.by_kind import check_scenario
 from fulmar_core.worlds.scenario import check_delays, load_scenario
 from fulmar_evaluation.evaluation import (
@@ -51,6 +51,8 @@ def plan_trial(
     steps: int | None,
     worlds: int | None,
     bounds: int | None,
+    thing: str = "",
+    along: str = "",
 ) -> Trial:
     """Complete and check a trial before anything starts; None stands for a default.
 
@@ -69,6 +71,8 @@ def plan_trial(
         steps: The same, in control steps.
         worlds: Worlds of the batch.
         bounds: Episodes whose bound is computed.
+        thing: Thing in space, as in `load_task`.
+        along: Path, as in `Task.along`.
 
     Raises:
         ConfigError: Unknown name or impossible value.
@@ -77,13 +81,14 @@ def plan_trial(
     if through not in WAYS and not is_jsbsim(through):
         raise UnknownNameError("way", through, (*WAYS, JSBSIM))
     backend = through if is_jsbsim(through) else "mujoco"
-    check_names(robot, task, controller, backend)
+    the_task = evaluated_task(task, thing=thing, along=along)
+    check_names(robot, the_task, controller, backend)
     if controller_entry(controller).is_external:
         raise ConfigError(
             f"controller '{controller}' is a node of your own, which no evaluation can restart for each episode. "
             "Use `fulmar run`, or make it a class: docs/own-controller.md."
         )
-    the_robot, the_task = load_robot(robot), load_task(task)
+    the_robot = load_robot(robot)
     check_scenario(the_robot, scenario)
     check_delays(the_robot, load_scenario(scenario))
     hz = checked_rate(the_robot, control_hz or usual_hz(controller, the_robot, the_task, policy))
@@ -92,7 +97,7 @@ def plan_trial(
     if worlds is not None and through != "batch":
         raise ConfigError("--worlds belongs to --through batch.")
     control_dt = the_robot.timing.substeps(hz) * the_robot.timing.physics_dt
-    duration_s = episode_s or (steps * control_dt if steps else the_task.episode_s)
+    duration_s = episode_s or (steps * control_dt if steps else the_task.episode_of(the_robot))
     window_s = the_task.tolerance.hold_s
     if duration_s < window_s:
         raise ConfigError(
@@ -114,6 +119,8 @@ def plan_trial(
         task=task,
         controller=controller,
         backend=backend,
+        thing=the_task.thing,
+        along=along,
         control_hz=hz,
         policy=str(policy.absolute()) if policy else "",
         scenario=scenario,
@@ -142,6 +149,7 @@ def trial_figures(trial: Trial) -> dict[str, Any]:
     return {
         "robot": plan.robot,
         "task": plan.task,
+        **_among(trial),
         "controller": plan.controller,
         "through": trial.through,
         "scenario": plan.scenario,
@@ -152,6 +160,13 @@ def trial_figures(trial: Trial) -> dict[str, Any]:
         "wall_s": wall_s,
         "steps_per_s": figures["control_steps"] / wall_s,
     }
+
+
+def _among(trial: Trial) -> dict[str, str]:
+    """Names of the thing in space and of the path, where the task has them."""
+    task = trial.task
+    chosen = {"thing": task.thing, "path": str(getattr(task, "path", "") or "") if task.moves else ""}
+    return {key: name for key, name in chosen.items() if name}
 
 
 def print_figures(figures: dict[str, Any], output: Console) -> None:

@@ -17,6 +17,7 @@ from fulmar_cli.commands.arguments import (
     TaskArgument,
     option,
 )
+from fulmar_cli.commands.inspection import PathOption, ThingOption
 from fulmar_core.config.seeds import EVALUATION_SEED
 from fulmar_evaluation.figures import meanings
 
@@ -61,6 +62,8 @@ def evaluate(
         int | None,
         option("N", "Episodes, from the first on, whose bound on waypoints is computed; 256.", min=1),
     ] = None,
+    thing: ThingOption = None,
+    path: PathOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Evaluate a controller over many episodes and print every figure.
@@ -72,6 +75,8 @@ def evaluate(
 
     fulmar evaluate floating_platform go_to_pose --controller lqr --through ros
 
+    fulmar evaluate cubesat_8 inspect --controller pd --thing iss --path spiral --episodes 20
+
     fulmar evaluate turtlebot2 go_through_positions --through batch --steps 1000
     """
     from fulmar_cli.installation.extras import check_plan
@@ -82,7 +87,7 @@ def evaluate(
     trial = plan_trial(
         robot=robot, task=task, controller=controller, policy=policy, through=through, episodes=episodes,
         seed=seed, scenario=scenario, control_hz=control_hz, jobs=jobs, episode_s=episode_s, steps=steps,
-        worlds=worlds, bounds=bounds,
+        worlds=worlds, bounds=bounds, thing=thing or "", along=path or "",
     )  # fmt: skip
     check_plan(trial.plan, through=through)
     print_result(trial_figures(trial), lambda figures: print_figures(figures, output), as_json=as_json)

@@ -12,6 +12,7 @@ from fulmar_cli.commands import arguments as cli
 from fulmar_cli.commands import run_help as text
 from fulmar_cli.commands.arguments import flag, option
 from fulmar_cli.commands.folders import recorded
+from fulmar_cli.commands.inspection import PathOption, ThingOption
 from fulmar_cli.commands.values import read_area, read_goal, read_guards, read_numbers, read_pose
 
 
@@ -30,6 +31,8 @@ def run(
     goals: Annotated[str | None, option("NAME", text.GOALS_HELP)] = None,
     velocity: Annotated[str | None, option("V,V,DEG", text.VELOCITY_HELP)] = None,
     height: Annotated[float | None, option("M", text.HEIGHT_HELP, min=0.01)] = None,
+    thing: ThingOption = None,
+    path: PathOption = None,
     start: Annotated[str | None, option("x,y,deg", text.START_HELP)] = None,
     duration: Annotated[float | None, option("S", text.DURATION_HELP, min=0.1)] = None,
     lockstep: Annotated[bool, flag("--lockstep", "As fast as possible; one seed, the same bytes.")] = False,
@@ -86,6 +89,8 @@ def run(
 
     fulmar run spacecraft_16 --goal 1,0,-0.5,0,30,90 --lockstep
 
+    fulmar run cubesat_8 --task inspect --thing iss --path spiral --controller pd --lockstep
+
     fulmar run turtlebot2 --backend hardware --emulate --task go_to_position --seed 3
 
     fulmar run cubesat_wheels --goal 0,0,90 --lockstep
@@ -102,6 +107,7 @@ def run(
         robot, task or "", controller or "", backend, control_hz or 0.0, name=name or "", policy=str(policy or ""),
         hardware=hardware or "", emulated=emulate, arm=arm, goal=read_goal(goal, robot=robot), goals=goals or "",
         velocity=read_numbers(velocity, "--velocity", text.VELOCITY) or (), height=height or 0.0,
+        thing=thing or "", along=path or "",
         start=read_pose(start, "--start", robot) or (), duration_s=duration or 0.0, lockstep=lockstep, rate=rate,
         scenario=scenario, seed=seed, command=cli.invoked_command(), copies=copies, mocap_hz=mocap_hz,
         record=str(record or ""), recording_mode=recording or "",

@@ -7,6 +7,7 @@ from true states.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -34,6 +35,13 @@ __all__ = [
     "summarise",
     "summary",
 ]
+
+
+# Of some figures what the worst moment of all episodes had: name, key, figure that it is the extreme of, and which.
+EXTREMES: dict[str, tuple[str, str, Callable[[np.ndarray], Any]]] = {
+    "path_error_m": ("max", "path_error_most_m", np.max),
+    "least_distance_m": ("min", "least_distance_m", np.min),
+}
 
 
 def successes(run: Trajectories, task: Task) -> np.ndarray:
@@ -88,6 +96,7 @@ def episode_metrics(run: Trajectories, task: Task) -> dict[str, np.ndarray]:
     if not counts and _asked(turned):
         for degrees in (5, 2, 1):
             figures[f"OT{degrees}_percent"] = 100.0 * _mean(np.rad2deg(turned) < degrees)
+    figures |= _beside(run, task)
     figures["ALV_m_s"] = _mean(run.speed)
     figures["AAV_rad_s"] = _mean(np.abs(run.yaw_rate))
     figures["AAS"] = _mean(run.actuators_in_use)
@@ -100,6 +109,20 @@ def episode_metrics(run: Trajectories, task: Task) -> dict[str, np.ndarray]:
     figures["collided"] = np.any(run.touching, axis=1).astype(float)
     figures["left_the_geofence"] = np.any(run.outside, axis=1).astype(float)
     figures["thesis_success"] = _thesis_successes(run, task).astype(float)
+    return figures
+
+
+def _beside(run: Trajectories, task: Task) -> dict[str, np.ndarray]:
+    """Figures of targets that move, and of things in space."""
+    figures = {}
+    if task.moves:
+        figures["path_error_m"] = _mean(run.position_error)
+        figures["path_error_most_m"] = np.max(run.position_error, axis=1)
+    if run.keep_out_distance is not None:
+        figures["least_distance_m"] = np.min(run.keep_out_distance, axis=1)
+    if run.pointing_error is not None and _asked(run.pointing_error):
+        figures["pointing_error_deg"] = np.rad2deg(_mean(run.pointing_error))
+        figures["coverage"] = np.full(len(run.x), np.nan)
     return figures
 
 
@@ -117,7 +140,7 @@ def summarise(succeeded: np.ndarray, figures: dict[str, np.ndarray]) -> dict[str
 
     Returns:
         Number of episodes and success rate; mean, median and 95th percentile of every figure. A figure that no episode
-        has (the time to a target that was never reached) is None.
+        has (the time to a target that was never reached) is None. Those of `EXTREMES` have their worst value, too.
     """
     statistics: dict[str, Any] = {"episodes": len(succeeded), "success_rate": float(np.mean(succeeded))}
     for name, values in figures.items():
@@ -128,6 +151,11 @@ def summarise(succeeded: np.ndarray, figures: dict[str, np.ndarray]) -> dict[str
             "median": float(np.median(known)) if known.size else None,
             "p95": float(np.percentile(known, 95)) if known.size else None,
         }
+    for name, (worst, of, which) in EXTREMES.items():
+        if name in statistics:
+            known = np.asarray(figures[of], dtype=float)
+            known = known[np.isfinite(known)]
+            statistics[name][worst] = float(which(known)) if known.size else None
     return statistics
 
 

@@ -41,6 +41,13 @@ class Trajectories:
     # Of robots whose fuel is a part of their body alone:
     thrust: np.ndarray | None = None  # (episodes, steps) of all nozzles at the regulated pressure [N]
     exhaust_speed: float = 0.0  # impulse of a kilogram of fuel [m/s]
+    # Beside a thing in space alone:
+    keep_out_distance: np.ndarray | None = None  # (episodes, steps) outside of volumes to keep out of [m]
+    pointing_error: np.ndarray | None = None  # (episodes, steps) of the camera's axis [rad]
+    qx: np.ndarray | None = None  # (episodes, steps) attitude, with the next three
+    qy: np.ndarray | None = None
+    qz: np.ndarray | None = None
+    qw: np.ndarray | None = None
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -76,6 +83,14 @@ COLUMNS = tuple(
 )
 IN_SPACE = ("z", "attitude_error", "rate_error")  # columns that robots in the plane have not
 OF_FUEL = ("thrust",)  # columns that robots without fuel in their mass have not
+BESIDE = (
+    "keep_out_distance",
+    "pointing_error",
+    "qx",
+    "qy",
+    "qz",
+    "qw",
+)  # that are known beside a thing in space
 
 
 class TrajectoryLog:
@@ -84,10 +99,13 @@ class TrajectoryLog:
     def __init__(self, robot: Robot, task: Task, control_dt: float) -> None:
         """Begin empty; `control_dt` in seconds."""
         self._robot, self._task, self._control_dt = robot, task, control_dt
-        in_space = "z" in task.state_type.COLUMNS
         tank = robot.actuators.tank
         self._exhaust_speed = tank.exhaust_speed if tank is not None and tank.weighs else 0.0
-        left_out = (*(() if in_space else IN_SPACE), *(() if self._exhaust_speed else OF_FUEL))
+        left_out = (
+            *(() if "z" in task.state_type.COLUMNS else IN_SPACE),
+            *(() if self._exhaust_speed else OF_FUEL),
+            *(() if task.structures else BESIDE),
+        )
         self._names = tuple(name for name in COLUMNS if name not in left_out)
         self._columns: dict[str, list[np.ndarray]] = {name: [] for name in self._names}
 
@@ -143,6 +161,7 @@ def _step_columns(robot: Robot, task: Task, state: State, goal: Goal) -> dict[st
     away = task.distance_from_goal(state, goal)
     far = none if away is None else np.asarray(away > robot.limits.geofence)
     return {
+        **(_beside(robot, task, state) if task.structures else {}),
         **state.logged(),
         "position_error": unasked if errors.position is None else errors.position,
         "heading_error": unasked if errors.heading is None else errors.heading,
@@ -153,6 +172,18 @@ def _step_columns(robot: Robot, task: Task, state: State, goal: Goal) -> dict[st
         "goals": goal.done,
         "touching": none if touching is None else touching,
         "outside": far,
+    }
+
+
+def _beside(robot: Robot, task: Task, state: State) -> dict[str, np.ndarray]:
+    """Columns of `BESIDE`."""
+    x, y, z, *quat = state.columns()[:7]
+    place = np.stack((x, y, z), axis=-1)
+    pointing = task.pointing_error(state, robot)
+    return {
+        "keep_out_distance": np.min([volume.distance(place) for volume in task.keep_outs], axis=0),
+        "pointing_error": np.asarray(np.nan) if pointing is None else pointing,
+        **dict(zip(BESIDE[2:], quat, strict=True)),
     }
 
 

@@ -81,12 +81,15 @@ def path_task(task: TrackVelocities, file: FollowedPath) -> FollowPath:
     return FollowPath(**values, path=file.planner(), lead_s=file.lead_s)
 
 
-def evaluated_task(name: str, *, thing: str = "", episode_s: float = 0.0, goals: str = "") -> Task:
+def evaluated_task(
+    name: str, *, thing: str = "", along: str = "", episode_s: float = 0.0, goals: str = ""
+) -> Task:
     """The task that evaluates episodes.
 
     Args:
         name: As in `load_task`.
         thing: Same.
+        along: As in `Task.along`; empty: as the task has it.
         episode_s: Length of an episode; 0: the task's own [s].
         goals: Goal file whose path is followed; empty: none.
 
@@ -94,6 +97,7 @@ def evaluated_task(name: str, *, thing: str = "", episode_s: float = 0.0, goals:
         ConfigError: Unknown name, a goal file that is no endless path, or a task that tracks no velocities.
     """
     task = load_task(name, thing)
+    task = task.along(along) if along else task
     if episode_s:
         task = cast(Task, dataclasses.replace(cast(Any, task), episode_s=episode_s))  # all are dataclasses
     if not goals:
