@@ -91,11 +91,15 @@ class CameraNode(Node):
         wires = {thing.wire: thing.name for thing in task.things if thing.name in blocks}
         self._topics = {TRUTH.name: self.resolve_topic_name(TRUTH.name)}
         self._topics |= {name: self.resolve_topic_name(wire.name) for wire, name in wires.items()}
-        newest = {"reliable": True, "depth": EVERYTHING, "lossless": True} if settings.lockstep else {}
+        newest = (
+            partial(subscriber_qos, reliable=True, depth=EVERYTHING, lossless=True)
+            if settings.lockstep
+            else subscriber_qos
+        )
         for wire, name in wires.items():
             receive = partial(self._on_block, name)
-            self.create_subscription(PoseStamped, wire.name, receive, subscriber_qos(wire, **newest))
-        self.create_subscription(Odometry, TRUTH.name, self._on_truth, subscriber_qos(TRUTH, **newest))
+            self.create_subscription(PoseStamped, wire.name, receive, newest(wire))
+        self.create_subscription(Odometry, TRUTH.name, self._on_truth, newest(TRUTH))
         self._health = Health(self, f"{name_of(self, robot)}: camera")
         self.create_timer(HEALTH_S, self._report, clock=Clock(clock_type=ClockType.STEADY_TIME))
         if settings.lockstep:

@@ -10,8 +10,8 @@ import numpy as np
 
 from fulmar_bags.contents import Bag, span_ns
 from fulmar_bags.decode import messages, stamps_ns
-from fulmar_bags.fuel import fuel_of
 from fulmar_bags.frame_topics import describe_frames
+from fulmar_bags.fuel import fuel_of
 from fulmar_bags.gathered import Topic, json_object
 from fulmar_bags.stored_bytes import lengths_of
 from fulmar_core.config.errors import ConfigError

@@ -102,7 +102,7 @@ def episode_metrics(run: Trajectories, task: Task) -> dict[str, np.ndarray]:
     figures["AAS"] = _mean(run.actuators_in_use)
     figures["effort"] = _mean(run.effort)
     if run.thrust is not None:
-        figures["impulse_N_s"] = run.control_dt * np.sum(run.thrust, axis=1, dtype=np.float64)
+        figures["impulse_N_s"] = np.asarray(run.control_dt * np.sum(run.thrust, axis=1, dtype=np.float64))
         figures["fuel_used_kg"] = figures["impulse_N_s"] / run.exhaust_speed
     figures["control_variation"] = _mean(run.variation)
     figures["control_deviation"] = np.mean(np.std(run.shares, axis=1, dtype=np.float64), axis=-1)

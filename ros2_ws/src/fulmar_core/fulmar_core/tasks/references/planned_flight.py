@@ -52,7 +52,7 @@ class Flight:
         # The last pose of a closed path is its first again, which the target would begin anew.
         ends[-1] -= 1e-12 if self.target.path.closed else 0.0
         poses = np.stack([self.target.pose_after(share) for share in ends])
-        body = product(quat_of(poses), tuple(np.asarray(conjugate(self.looks))))  # type: ignore[arg-type]
+        body = product(quat_of(poses), tuple(np.asarray(conjugate(self.looks))))
         return np.concatenate((poses[:, :3], np.stack(body, axis=-1)), axis=-1)
 
     @property
@@ -118,9 +118,9 @@ class Flight:
         times = np.arange(0.0, self.duration_s + step_s, step_s)
         quat = quat_of(at_rounds(self.table, self.rounds(times, once=True)))
         before, after = tuple(q[:-1] for q in quat), tuple(q[1:] for q in quat)
-        rates = np.stack(logarithm(product(conjugate(before), after)), axis=-1) / step_s  # type: ignore[arg-type]
+        rates = np.stack(logarithm(product(conjugate(before), after)), axis=-1) / step_s
         changes = np.linalg.norm(np.diff(rates, axis=0), axis=-1) / step_s
-        fastest = float(angle_between(before, after).max()) / step_s  # type: ignore[arg-type]
+        fastest = float(angle_between(before, after).max()) / step_s
         return fastest, float(changes.max()) if len(changes) else 0.0
 
 
