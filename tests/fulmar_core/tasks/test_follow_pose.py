@@ -10,7 +10,8 @@ from fulmar_core.states.attitude import conjugate, logarithm, product
 from fulmar_core.states.counter_rng import Draws
 from fulmar_core.states.spatial import SpatialState, quat_of
 from fulmar_core.tasks import load_task
-from fulmar_core.tasks.moving_pose import of_one_sign
+from fulmar_core.tasks.references.named_paths import NAMED
+from fulmar_core.tasks.references.planned_flight import of_one_sign
 
 WORLDS, LONG_S = 32, 90.0
 
@@ -124,3 +125,20 @@ def test_laws_stay_with_a_walk_by_what_the_reference_says_of_its_motion(law):
     )
     assert run.position_error[:, -50:].max() < 0.02
     assert np.degrees(run.attitude_error[:, -50:].max()) < 2.0
+
+
+@pytest.mark.parametrize("path", NAMED)
+def test_in_the_place_of_the_walk_it_follows_any_path_with_x_along_it(path):
+    task, robot = load_task("follow_pose_3d").along(path), load_robot("cubesat_8")
+    task.check(robot)
+    draws = Draws(3, np.arange(4), np.zeros(4, dtype=int))
+    start, goal = task.draw(draws, robot, training=False)
+    first = goal.targets[:, 0, :3]
+    assert np.linalg.norm(np.stack(start.position, axis=-1) - first, axis=-1).max() < 3.01
+    pose, motion, _ = followed(task, goal, np.arange(7.0, task.episode_of(robot) - 7.0, 0.7))
+    x, y, z, w = quat_of(pose)
+    ahead = np.stack((1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)), axis=-1)
+    way = motion[..., :3] / np.linalg.norm(motion[..., :3], axis=-1, keepdims=True)
+    assert np.sum(ahead * way, axis=-1).min() > np.cos(np.radians(6.0))
+    speed = task.flight(robot).target.speed
+    np.testing.assert_allclose(np.linalg.norm(motion[..., :3], axis=-1), speed, rtol=0.05)

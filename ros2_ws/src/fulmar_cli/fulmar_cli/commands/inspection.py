@@ -17,6 +17,8 @@ ThingOption = Annotated[
 PathOption = Annotated[
     str | None,
     option(
-        "NAME", "Path of inspect: circle, spiral, capsule, rectangle, lemniscate, lissajous, line.", "--path"
+        "NAME",
+        "Path of inspect or follow_pose_3d: circle, spiral, capsule, rectangle, lemniscate, lissajous, line.",
+        "--path",
     ),
 ]

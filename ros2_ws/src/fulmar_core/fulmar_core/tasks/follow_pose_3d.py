@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal
+import math
+from dataclasses import dataclass, replace
+from typing import Literal, Self
 
 import numpy as np
 
@@ -11,13 +12,16 @@ from fulmar_core.robots.robot import Robot
 from fulmar_core.states.arrays import array_namespace
 from fulmar_core.states.attitude import from_euler, product, uniform_attitude, uniform_direction
 from fulmar_core.states.counter_rng import Draws
-from fulmar_core.states.rotation import Array
 from fulmar_core.states.spatial import SpatialState
 from fulmar_core.tasks.goal import Goal
+from fulmar_core.tasks.goal_words import number
 from fulmar_core.tasks.moving_pose import MovingPose
+from fulmar_core.tasks.references.named_paths import named_path
+from fulmar_core.tasks.references.planned_flight import LOOKS_AHEAD, Flight, Pace, planned_flight, poses_along
 from fulmar_core.tasks.terms import Range
 
 STEP_S = 0.1  # of the walk [s]
+USUAL_PACE = Pace(speed=0.2)
 
 
 @dataclass(frozen=True)
@@ -101,16 +105,63 @@ class PursuitStart:
 
 @dataclass(frozen=True, kw_only=True)
 class FollowPose3d(MovingPose):
-    """Follow a random walk, all of which comes on `goal_path` when it begins."""
+    """Follow a random walk, or one round of a path with x along it; all of it comes on `goal_path` when it begins."""
 
     kind: Literal["follow_pose_3d"]
     start: PursuitStart
     walk: Walk
+    path: str = ""  # one of `named_paths.NAMED`, about the origin; empty: the walk
+    radius: float = 1.8  # of a path, to its nearest place [m]
+    pace: Pace = USUAL_PACE  # of a path
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if abs(self.spacing_s / STEP_S - round(self.spacing_s / STEP_S)) > 1e-6:
             raise ValueError(f"'spacing_s' must be a multiple of {STEP_S:g} s.")
+        if self.radius <= 0.0:
+            raise ValueError("'radius' must be greater than 0.")
+        if self.path:
+            named_path(self.path, self.radius)
+
+    def along(self, path: str) -> Self:
+        """See `Task.along`."""
+        return replace(self, path=path)
+
+    def said(self, goal: Goal) -> str:
+        """See `Task.said`."""
+        long_s = number(self.spacing_s * (len(goal.targets) - 1))
+        return f"the {self.path}, {long_s} s" if self.path else f"a random walk of {long_s} s"
+
+    def flight(self, robot: Robot) -> Flight:
+        """The path that a robot flies."""
+        return planned_flight(
+            self.path, self.radius, self.pace,
+            facing="along_path", looks=LOOKS_AHEAD, can=robot.performance,
+        )  # fmt: skip
+
+    def episode_of(self, robot: Robot) -> float:
+        """See `Task.episode_of`: of a path, one whole round."""
+        step = robot.timing.control_s
+        return step * math.ceil(self.flight(robot).duration_s / step) if self.path else self.episode_s
+
+    def check(self, robot: Robot) -> None:
+        """See `Task.check`, and of a path `Flight.check`."""
+        super().check(robot)
+        if self.path:
+            self.flight(robot).check(robot, self.keep_outs, f"the {self.path}")
+
+    def _poses(self, draws: Draws, robot: Robot, *, training: bool) -> np.ndarray:
+        """What the target does in some worlds, shape (worlds, k, 7)."""
+        over_s = self.episode_s + 1.0
+        if not self.path:
+            return self.walk.draw(
+                draws, over_s=over_s, spacing_s=self.spacing_s, most=robot.performance.speed
+            )
+        flight = self.flight(robot)
+        over_s = over_s if training else flight.duration_s
+        times = self.spacing_s * np.arange(1 + math.ceil(over_s / self.spacing_s))
+        begin = np.asarray(draws.uniform(0.0, 1.0))
+        return poses_along((flight,), np.zeros(len(begin), dtype=int), begin, times, once=not training)
 
     def draw(self, draws: Draws, robot: Robot, *, training: bool) -> tuple[SpatialState, Goal]:
         """Draw a start at rest, and a walk that is longer than the episode."""
@@ -118,10 +169,8 @@ class FollowPose3d(MovingPose):
         distance, numbers = draws.uniform(low, high), draws.uniform(0.0, 1.0, 5)
         aside = uniform_direction(numbers[:, 0], numbers[:, 1])
         quat = uniform_attitude(*(numbers[:, i] for i in range(2, 5)), tilt_deg=robot.kind.tilt_deg)
-        poses = self.walk.draw(
-            draws, over_s=self.episode_s + 1.0, spacing_s=self.spacing_s, most=robot.performance.speed
-        )
+        poses = self._poses(draws, robot, training=training)
         xp = array_namespace(distance)
-        x, y, z = (distance * part for part in aside)
-        targets: Array = xp.asarray(poses)
-        return SpatialState.at_rest((x, y, z), quat), self.goal_through(targets, xp.zeros_like(distance))
+        goal = self.goal_through(xp.asarray(poses), xp.zeros_like(distance))
+        x, y, z = (goal.targets[:, 0, i] + distance * part for i, part in enumerate(aside))
+        return SpatialState.at_rest((x, y, z), quat), goal

@@ -27,15 +27,15 @@ from fulmar_core.states.rotation import Array
 from fulmar_core.states.spatial import SpatialState
 from fulmar_core.tasks.goal import Goal
 from fulmar_core.tasks.goal_words import number
-from fulmar_core.tasks.moving_pose import MovingPose, of_one_sign
+from fulmar_core.tasks.moving_pose import MovingPose
 from fulmar_core.tasks.references.named_paths import named_path
 from fulmar_core.tasks.references.planned_flight import (
     LOOKS_AHEAD,
     Flight,
     Pace,
     Quat,
-    at_rounds,
     planned_flight,
+    poses_along,
 )
 
 
@@ -89,10 +89,10 @@ class Inspect(MovingPose):
 
     def flight(self, robot: Robot, path: str = "") -> Flight:
         """What a robot flies; `path`: another one than the task's."""
-        can, middle = robot.performance, self.structures[0]
+        middle = self.structures[0]
         return planned_flight(
             path or self.path, self.radius * middle.half_size, self.pace,
-            facing="point", looks=looks_of(robot), most=can.speed, sustains=can.turning_acceleration,
+            facing="point", looks=looks_of(robot), can=robot.performance,
         )  # fmt: skip
 
     def episode_of(self, robot: Robot) -> float:
@@ -120,14 +120,9 @@ class Inspect(MovingPose):
         over_s = self.episode_s + 1.0 if training else flights[0].duration_s
         times = self.spacing_s * np.arange(1 + math.ceil(over_s / self.spacing_s))
         which = np.minimum((unit[:, 0] * len(paths)).astype(int), len(paths) - 1)
-        targets = np.empty((draws.worlds, len(times), 7))
-        for index, flight in enumerate(flights):
-            mine = which == index
-            begin = unit[mine, 1:2] * flight.closed
-            targets[mine] = at_rounds(flight.table, begin + flight.rounds(times, once=not training))
-        targets[..., 3:] /= np.linalg.norm(targets[..., 3:], axis=-1, keepdims=True)
+        targets = poses_along(flights, which, unit[:, 1], times, once=not training)
         xp = array_namespace(numbers)
-        goal = self.goal_through(xp.asarray(of_one_sign(targets)), xp.zeros_like(numbers[:, 0]))
+        goal = self.goal_through(xp.asarray(targets), xp.zeros_like(numbers[:, 0]))
         return self._start(numbers, goal.targets[:, 0], training=training), goal
 
     def _start(self, numbers: Array, first: Array, *, training: bool) -> SpatialState:

@@ -24,6 +24,7 @@ from fulmar_core.states.rotation import Array
 from fulmar_core.states.spatial import SpatialState, quat_of
 from fulmar_core.tasks.goal import Goal, no_obstacles
 from fulmar_core.tasks.goal_words import number
+from fulmar_core.tasks.references.planned_flight import of_one_sign
 from fulmar_core.tasks.space_terms import (
     ATTITUDE_TERMS,
     AXES,
@@ -116,7 +117,10 @@ class MovingPose(FileTask[SpatialState]):
 
     def goal_through(self, poses: Array, done: Array) -> Goal:
         """The goal of many worlds at its first pose; poses of shape (worlds, k, 7), `done` zeros of (worlds,)."""
-        return self.begun(Goal(poses, done, no_obstacles(len(done))), None)
+        xp = array_namespace(poses)
+        return self.begun(
+            Goal(xp.asarray(of_one_sign(np.asarray(poses))), done, no_obstacles(len(done))), None
+        )
 
     def begun(self, goal: Goal, state: SpatialState | None) -> Goal:
         """The target at its first pose; see `Task.begun`."""
@@ -242,17 +246,6 @@ def turning(quat: Array, change: Array) -> Array:
     """
     x, y, z, _ = product(conjugate(_quat(quat)), _quat(change))
     return 2.0 * array_namespace(quat).stack((x, y, z), axis=-1)
-
-
-def of_one_sign(poses: np.ndarray) -> np.ndarray:
-    """Poses along a path, shape (..., k, 7), whose quaternions nowhere jump to their negative."""
-    after, before = poses[..., 1:, 3:], poses[..., :-1, 3:]
-    flips = np.where(np.sum(after * before, axis=-1) < 0.0, -1.0, 1.0)
-    if np.all(flips > 0.0):
-        return poses
-    found = np.array(poses)
-    found[..., 1:, 3:] *= np.cumprod(flips, axis=-1)[..., None].astype(poses.dtype)
-    return found
 
 
 def _vector(columns: Array) -> Vector:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from fulmar_core.config.errors import ConfigError
-from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.robot import Performance, Robot
 from fulmar_core.states.attitude import angle_between, conjugate, logarithm, product
 from fulmar_core.states.spatial import quat_of
 from fulmar_core.tasks.references.moving_target import Facing, MovingTarget
@@ -19,6 +20,7 @@ from fulmar_core.worlds.structures import KeepOut
 FINE = 1200  # poses of one round that others lie between in a straight line
 ORIGIN = (0.0, 0.0, 0.0)
 LOOKS_AHEAD = (0.0, 0.0, 0.0, 1.0)  # attitude of what looks along the body's x axis
+STEADY = 0.9  # of the turn rate, that a path may ask for where the body looks along it [-]
 TURNING = 0.5  # of what the torque gives, that a path may ask for [-]
 Quat = tuple[float, float, float, float]
 
@@ -53,7 +55,7 @@ class Flight:
         ends[-1] -= 1e-12 if self.target.path.closed else 0.0
         poses = np.stack([self.target.pose_after(share) for share in ends])
         body = product(quat_of(poses), tuple(np.asarray(conjugate(self.looks))))
-        return np.concatenate((poses[:, :3], np.stack(body, axis=-1)), axis=-1)
+        return of_one_sign(np.concatenate((poses[:, :3], np.stack(body, axis=-1)), axis=-1))
 
     @property
     def closed(self) -> bool:
@@ -124,6 +126,17 @@ class Flight:
         return fastest, float(changes.max()) if len(changes) else 0.0
 
 
+def of_one_sign(poses: np.ndarray) -> np.ndarray:
+    """Poses along a path, shape (..., k, 7), whose quaternions nowhere jump to their negative."""
+    after, before = poses[..., 1:, 3:], poses[..., :-1, 3:]
+    flips = np.where(np.sum(after * before, axis=-1) < 0.0, -1.0, 1.0)
+    if np.all(flips > 0.0):
+        return poses
+    found = np.array(poses)
+    found[..., 1:, 3:] *= np.cumprod(flips, axis=-1)[..., None].astype(poses.dtype)
+    return found
+
+
 def at_rounds(table: np.ndarray, rounds: np.ndarray) -> np.ndarray:
     """Poses of a `Flight.table` after some rounds, shape (..., 7); of more than one the next begins."""
     share = np.where(rounds > 1.0, rounds % 1.0, rounds) * FINE
@@ -132,14 +145,39 @@ def at_rounds(table: np.ndarray, rounds: np.ndarray) -> np.ndarray:
     return np.asarray((1.0 - part) * table[before] + part * table[before + 1])
 
 
+def poses_along(
+    flights: Sequence[Flight], which: np.ndarray, begin: np.ndarray, times: np.ndarray, *, once: bool
+) -> np.ndarray:
+    """Poses that some worlds follow.
+
+    Args:
+        flights: Some, of one robot.
+        which: Number of that of each world, shape (n,).
+        begin: Share of a closed path at which each begins, shape (n,).
+        times: Since then, shape (k,) [s].
+        once: A closed path ends after one round.
+
+    Returns:
+        Shape (n, k, 7).
+    """
+    poses = np.empty((len(which), len(times), 7))
+    for index, flight in enumerate(flights):
+        mine = which == index
+        poses[mine] = at_rounds(
+            flight.table, begin[mine, None] * flight.closed + flight.rounds(times, once=once)
+        )
+    poses[..., 3:] /= np.linalg.norm(poses[..., 3:], axis=-1, keepdims=True)
+    return poses
+
+
 @functools.lru_cache(maxsize=64)
 def planned_flight(
-    path: str, nearest: float, pace: Pace, *, facing: Facing, looks: Quat, most: float, sustains: float
+    path: str, nearest: float, pace: Pace, *, facing: Facing, looks: Quat, can: Performance
 ) -> Flight:
     """The flight of a named path.
 
     Its speed is min(pace.speed, √(share · a · R)) with the acceleration a that the robot sustains and the radius R of
-    the tightest bend.
+    the tightest bend; of a body that looks along it also no more than 0.9 of the turn rate there.
 
     Args:
         path: One of `named_paths.NAMED`.
@@ -147,8 +185,7 @@ def planned_flight(
         pace: How fast it is flown.
         facing: As of `MovingTarget`; a point is the origin.
         looks: As of `Flight`.
-        most: No faster than this [m/s].
-        sustains: Acceleration that the robot has in every direction [m/s²].
+        can: Of the robot: speed, acceleration and turn rate.
 
     Raises:
         UnknownNameError: There is no such path.
@@ -160,5 +197,8 @@ def planned_flight(
         return MovingTarget(curve, speed, facing, (0.0, 0.0, 0.0), 1, point, pace.ease_s)
 
     bend = flown(1.0).acceleration()
-    by_bend = math.sqrt(pace.share * sustains / bend) if bend > 1e-9 else math.inf
-    return Flight(path, flown(pace.fixed or min(pace.speed, most, by_bend)), looks)
+    most = min(pace.speed, can.speed)
+    if bend > 1e-9:
+        most = min(most, math.sqrt(pace.share * can.turning_acceleration / bend))
+        most = min(most, STEADY * can.yaw_rate / bend) if facing == "along_path" else most
+    return Flight(path, flown(pace.fixed or most), looks)
