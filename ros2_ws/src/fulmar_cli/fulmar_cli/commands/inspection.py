@@ -18,7 +18,7 @@ PathOption = Annotated[
     str | None,
     option(
         "NAME",
-        "Path of inspect or follow_pose_3d: circle, spiral, capsule, rectangle, lemniscate, lissajous, line.",
+        "Path of inspect or follow_pose_3d: circle, spiral, lissajous and so on.",
         "--path",
     ),
 ]
