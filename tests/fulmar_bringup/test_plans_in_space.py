@@ -12,6 +12,7 @@ from fulmar_bringup.plant_row import plant_spec
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.task_choice import check_heading, default_task, goal_note, task_of_goals
 from fulmar_core.config.errors import ConfigError
+from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.states.spatial import SpatialState
 
 
@@ -257,3 +258,15 @@ def test_a_target_that_bends_or_turns_harder_than_the_robot_sustains_is_refused(
         ConfigError, match=r"turn by 43 deg/s, and tasks of 'spacecraft_16' ask for 34.4 deg/s"
     ):
         plan(**request, control_hz=25.0, lockstep=True)
+
+
+def test_a_plan_of_an_inspection_has_its_path_its_thing_and_the_time_of_one_whole_round(plan):
+    inspect = {"robot": "cubesat_8", "task": "inspect", "controller": "pd"}
+    request = plan(**inspect, thing="venus_express", along="capsule", seed=3)
+    assert "goal: the capsule about 'venus_express', " in request.line
+    task = request.asked_task
+    assert request.duration_s == task.episode_of(load_robot("cubesat_8")) != task.episode_s
+    assert request.mission.targets.shape[0] * task.spacing_s >= request.duration_s
+    assert controller_spec(request).parameters["thing"] == "venus_express"
+    written = SpatialState.written(request.mission.targets[0])
+    assert request.start == pytest.approx(written, abs=1e-3)
