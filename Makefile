@@ -1,4 +1,4 @@
-# `make help` shows what can be asked for. Nothing here is installed outside `.venv` and `.venv-peers`.
+# `make help` shows what can be asked for. Nothing here is installed outside `.venv`, `.venv-peers` and `.venv-dreamer`.
 
 SHELL := bash
 .SHELLFLAGS := -eu -o pipefail -c
@@ -12,18 +12,23 @@ VENV := .venv
 BIN := $(VENV)/bin
 # Outside programs that tests compare with: what they need may contradict our own locks.
 PEERS := .venv-peers
+# DreamerV3 by sheeprl, which `fulmar train --algorithm dreamer` runs: what it needs contradicts our own lock.
+DREAMER := .venv-dreamer
 RUN_LOCK := requirements.lock
 DEV_LOCK := requirements-dev.lock
 PEERS_LOCK := requirements-peers.lock
+DREAMER_LOCK := requirements-dreamer.lock
 # Of the images that are not made from the run lock.
 ROBOT_LOCK := docker/requirements-robot.lock
 TRAIN_LOCK := docker/requirements-train.lock
 # Lies beside what it builds, so that the wheel has it too.
 MESSAGES_LOCK := ros2_ws/src/fulmar_bringup/fulmar_bringup/tf2_msgs/requirements.lock
-# Of .venv after an install on x86-64 [MiB], measured by `du -s --block-size=1M .venv`; the last one of .venv-peers.
+# Of .venv after an install on x86-64 [MiB], measured by `du -s --block-size=1M .venv`; the last two of
+# .venv-peers and .venv-dreamer.
 RUN_SIZE := 884
 DEV_SIZE := 7386
 PEERS_SIZE := 8838
+DREAMER_SIZE := 6209
 
 # A sourced ROS shell puts its own packages before those of .venv; the two must not mix.
 unexport PYTHONPATH
@@ -39,8 +44,9 @@ STARS_LOCK := ros2_ws/src/fulmar_bringup/fulmar_bringup/stars/requirements.lock
 STARS_STAMP := $(VENV)/.stars-$(firstword $(shell cksum < $(STARS_LOCK)))
 # Elsewhere ROS does not come as wheels, and its own tf2_msgs comes with it.
 HAS_ROS_WHEELS := $(filter Linux-x86_64,$(shell uname -s)-$(shell uname -m))
-# Nothing of ours is installed beside the peers, so their lock alone counts.
+# Nothing of ours is installed in these, so their locks alone count.
 PEERS_STAMP := $(PEERS)/.peers-$(firstword $(shell cksum < $(PEERS_LOCK)))
+DREAMER_STAMP := $(DREAMER)/.dreamer-$(firstword $(shell cksum < $(DREAMER_LOCK)))
 
 # Turns pip's long log into one line that counts: on a terminal it rewrites itself, in a log every tenth is kept.
 # Errors go past it unchanged. Arguments: lock, size [MiB], environment.
@@ -61,6 +67,13 @@ PYTHONUNBUFFERED=1 $(3)/bin/python -m pip install --disable-pip-version-check --
 		Building) printf '\n  building %s\n' "$$rest" ;; \
 		Installing) printf '\n  unpacking, this takes a moment\n' ;; \
 	esac; done; }
+endef
+
+# The same in an environment where nothing of ours is: the pip of the lock comes first. Same arguments.
+define install_apart
+$(3)/bin/python -m pip install --disable-pip-version-check --no-input --quiet --require-hashes \
+	-r <(awk '/^pip==/, !/\\$$/' $(1)); \
+$(call install_lock,$(1),$(2),$(3))
 endef
 
 # hatchling and editables are in both locks, so that this step needs neither network nor build isolation.
@@ -90,7 +103,10 @@ dev: $(DEV_STAMP) $(if $(HAS_ROS_WHEELS),$(TF_STAMP)) $(STARS_STAMP) ## Install 
 .PHONY: peers
 peers: $(PEERS_STAMP) ## Install the outside programs that tests compare with, into .venv-peers (8.6 GiB)
 
-$(VENV)/bin/python $(PEERS)/bin/python:
+.PHONY: dreamer
+dreamer: $(DREAMER_STAMP) ## Install DreamerV3, which learns policies, into .venv-dreamer (6.1 GiB)
+
+$(VENV)/bin/python $(PEERS)/bin/python $(DREAMER)/bin/python:
 	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 14))' || { \
 		echo "'$(PYTHON)' is $$($(PYTHON) --version 2>&1 || true), but Fulmar needs Python 3.11, 3.12, 3.13 or 3.14." >&2; \
 		echo "Name one that you have: make $(or $(MAKECMDGOALS),setup) PYTHON=python3.12" >&2; exit 1; }
@@ -124,12 +140,16 @@ $(STARS_STAMP): | $(RUN_STAMP)
 	@touch $@
 
 $(PEERS_STAMP): | $(PEERS)/bin/python
-	@$(PEERS)/bin/python -m pip install --disable-pip-version-check --no-input --quiet --require-hashes \
-		-r <(awk '/^pip==/, !/\\$$/' $(PEERS_LOCK))
-	@$(call install_lock,$(PEERS_LOCK),$(PEERS_SIZE),$(PEERS))
+	@$(call install_apart,$(PEERS_LOCK),$(PEERS_SIZE),$(PEERS))
 	@rm -f $(PEERS)/.peers-*
 	@touch $@
 	@echo "Ready: $(PEERS), with the outside programs that tests compare with"
+
+$(DREAMER_STAMP): | $(DREAMER)/bin/python
+	@$(call install_apart,$(DREAMER_LOCK),$(DREAMER_SIZE),$(DREAMER))
+	@rm -f $(DREAMER)/.dreamer-*
+	@touch $@
+	@echo "Ready: $(DREAMER), for fulmar train --algorithm dreamer"
 
 .PHONY: demo
 demo: setup ## Run the floating platform with a policy, then with an LQR, over ROS 2
@@ -177,7 +197,7 @@ test: dev ## Run the tests, without those that take over 1.5 s of processor time
 	@$(call run_tests,-m "not slow")
 
 .PHONY: test-all
-test-all: dev peers ## Run every test
+test-all: dev peers dreamer ## Run every test
 	@$(call run_tests,)
 
 .PHONY: mutants
@@ -229,10 +249,13 @@ lock: $(DEV_STAMP) ## Make the locks anew (UPGRADE=1 takes the newest versions)
 	$(compile) pyproject.toml --extra ros --extra sim --extra policy --extra bags --extra view --extra train --group build \
 		--output-file $(TRAIN_LOCK)
 	$(compile) $(if $(UPGRADE),--upgrade) --group peers --output-file $(PEERS_LOCK)
+	cp $(DEV_LOCK) $(DREAMER_LOCK) # likewise
+	$(compile) --group dreamer --output-file $(DREAMER_LOCK)
 	$(compile) $(if $(UPGRADE),--upgrade) --group messages --constraint $(RUN_LOCK) --output-file $(MESSAGES_LOCK)
 
 .PHONY: clean
-clean: ## Remove what was built and cached; .venv, .venv-peers and runs/ stay
+clean: ## Remove what was built and cached; .venv, .venv-peers, .venv-dreamer and runs/ stay
 	rm -rf build dist ros2_ws/build ros2_ws/install ros2_ws/log
 	rm -rf .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
-	find . -name __pycache__ -not -path './$(VENV)/*' -not -path './$(PEERS)/*' -prune -exec rm -rf {} +
+	find . -name __pycache__ -not -path './$(VENV)/*' -not -path './$(PEERS)/*' \
+		-not -path './$(DREAMER)/*' -prune -exec rm -rf {} +

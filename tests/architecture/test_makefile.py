@@ -16,6 +16,7 @@ TARGETS = {
     "tf",
     "dev",
     "peers",
+    "dreamer",
     "demo",
     "freeze",
     "freeze-check",
@@ -51,7 +52,12 @@ esac
 @pytest.fixture
 def make(repository, tmp_path):
     """Function that runs make in a folder with the set-up files only, without a real Python."""
-    locks = ("requirements.lock", "requirements-dev.lock", "requirements-peers.lock")
+    locks = (
+        "requirements.lock",
+        "requirements-dev.lock",
+        "requirements-peers.lock",
+        "requirements-dreamer.lock",
+    )
     for name in ("Makefile", "pyproject.toml", *locks):
         shutil.copy(repository / name, tmp_path)
     (tmp_path / MESSAGES_LOCK).parent.mkdir(parents=True)
@@ -113,24 +119,26 @@ def test_a_development_setup_includes_the_run_time_setup(make, tmp_path):
     assert installs(tmp_path) == ["requirements-dev.lock"]
 
 
-def test_the_peers_get_an_environment_and_a_pip_of_their_own_once(make, tmp_path):
-    assert make("peers").returncode == make("peers").returncode == 0
+@pytest.mark.parametrize("target", ["peers", "dreamer"])
+def test_what_contradicts_our_lock_gets_an_environment_and_a_pip_of_its_own_once(make, tmp_path, target):
+    assert make(target).returncode == make(target).returncode == 0
     asked = (tmp_path / "calls.log").read_text()
-    assert asked.count("-m venv .venv-peers") == 1
+    assert asked.count(f"-m venv .venv-{target}") == 1
     assert "--require-hashes" in asked
     first, second = installs(tmp_path)
     assert first.startswith("/dev/fd/"), "the pip of the lock comes first"
-    assert second == "requirements-peers.lock"
+    assert second == f"requirements-{target}.lock"
     assert not (tmp_path / ".venv").exists()
-    with (tmp_path / "requirements-peers.lock").open("a") as lock:
+    with (tmp_path / second).open("a") as lock:
         lock.write("# another version\n")
-    assert make("peers").returncode == 0
+    assert make(target).returncode == 0
     assert installs(tmp_path)[2:] == [first, second]
 
 
-def test_every_test_needs_the_peers_and_the_quick_ones_do_not(make):
-    assert "requirements-peers.lock" in make("--dry-run", "test-all").stdout
-    assert "requirements-peers.lock" not in make("--dry-run", "test").stdout
+@pytest.mark.parametrize("lock", ["requirements-peers.lock", "requirements-dreamer.lock"])
+def test_every_test_needs_the_peers_and_dreamer_and_the_quick_ones_do_not(make, lock):
+    assert lock in make("--dry-run", "test-all").stdout
+    assert lock not in make("--dry-run", "test").stdout
 
 
 def test_a_failed_installation_is_repeated(make, tmp_path):
@@ -141,7 +149,9 @@ def test_a_failed_installation_is_repeated(make, tmp_path):
     assert make("-q", "setup").returncode != 0
 
 
-@pytest.mark.parametrize(("target", "size"), [("setup", 884), ("dev", 7386), ("peers", 8838)])
+@pytest.mark.parametrize(
+    ("target", "size"), [("setup", 884), ("dev", 7386), ("peers", 8838), ("dreamer", 6209)]
+)
 @pytest.mark.parametrize("free", [100, 90_000])
 def test_size_and_free_disk_are_printed_before_an_installation(make, tmp_path, target, size, free):
     disk = tmp_path / "bin" / "df"
@@ -150,7 +160,7 @@ def test_size_and_free_disk_are_printed_before_an_installation(make, tmp_path, t
     disk.chmod(0o755)
     result = make(target, f"PATH={disk.parent}:{os.environ['PATH']}")
     assert result.returncode == 0
-    folder = ".venv-peers" if target == "peers" else ".venv"
+    folder = f".venv-{target}" if target in ("peers", "dreamer") else ".venv"
     line = f"{folder} takes {size} MiB; {free} MiB are free on this disk."
     assert result.stdout.index(line) < result.stdout.index("Ready")
     assert ("make room" in result.stderr) == (free < size)
