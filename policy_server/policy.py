@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -26,11 +25,12 @@ from fulmar_core.loop.policy_bundle import (
 )
 from fulmar_core.robots.robot import Robot
 from fulmar_core.tasks import Task
-from fulmar_core.tasks.observation import Observer
+from fulmar_core.tasks.observation import Observer, slewed
 from policy_server.inference import open_network
 
 # Of the logits: float32 sums in another order on another processor differ by about 1e-6.
 GOLDEN_TOLERANCE = 1e-4
+COMMAND_TOLERANCE = 1e-6  # of full command, within which a command is the one that was chosen
 
 
 class Policy:
@@ -73,12 +73,14 @@ class Policy:
         self.observer: StateObserver[Any] | None = None
         self._session = _open(bundle)
         self._memory: np.ndarray | None = None
+        self._robot = robot
+        self._expected: np.ndarray | None = None  # of the last command, after the robot's own limits
         _check_shapes(self._session, self.passport, folder)
         _check_golden(self._session, bundle)
 
     def reset(self) -> None:
         """Clear the memory, if the network has one."""
-        self._memory = None
+        self._memory = self._expected = None
 
     def act(self, inputs: Inputs) -> np.ndarray:
         """Choose actuators; see `Controller.act`."""
@@ -87,16 +89,36 @@ class Policy:
         if self.passport.memory:
             if self._memory is None or len(self._memory) != len(batch):
                 self._memory = np.zeros((len(batch), self.passport.memory), dtype=np.float32)
+                self._expected = None
+            memory = self._corrected(self._memory, inputs.previous)
             command, self._memory = self._session.run(
-                ["command", "next_memory"], {"observation": batch, "memory": self._memory}
+                ["command", "next_memory"], {"observation": batch, "memory": memory}
             )
+            if self.passport.remembers_command:
+                limited = self._robot.actuators.limited(np.asarray(command, dtype=float))
+                self._expected = slewed(limited, inputs.previous, self._robot, inputs.dt)
         else:
             (command,) = self._session.run(["command"], {"observation": batch})
         return np.asarray(command)
 
+    def _corrected(self, memory: np.ndarray, previous: np.ndarray) -> np.ndarray:
+        """Memory of what was commanded, where it was not what the network chose: a guard or an operator stepped in.
+
+        The limits of the robot alone change nothing: the network learned with its own choice before them.
+        """
+        if self._expected is None:
+            return memory
+        scale = np.asarray(self.passport.command_scale)
+        other = np.abs(previous - self._expected) > COMMAND_TOLERANCE * scale
+        if not other.any():
+            return memory
+        memory = memory.copy()
+        memory[:, -len(scale) :][other] = (previous / scale)[other]
+        return memory
+
     def metadata(self) -> dict[str, Any]:
         """The passport, with the name of the controller."""
-        return {"controller": self.name, **asdict(self.passport)}
+        return {"controller": self.name, **self.passport.plain()}
 
 
 def _open(bundle: Bundle) -> onnxruntime.InferenceSession:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -73,7 +73,7 @@ def test_commands_are_zeros_and_ones_for_one_robot_and_for_many():
 
 def test_the_metadata_is_the_passport():
     metadata = load(SHIPPED).metadata()
-    assert metadata == {"controller": "policy", **asdict(read_passport(SHIPPED))}
+    assert metadata == {"controller": "policy", **read_passport(SHIPPED).plain()}
     json.dumps(metadata, allow_nan=False)
 
 

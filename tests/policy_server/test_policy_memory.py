@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from dataclasses import replace
 
@@ -9,9 +10,8 @@ import numpy as np
 import pytest
 
 from fulmar_core.config.errors import BundleError
-from fulmar_core.loop.policy_bundle import (
-    read_golden,
-)
+from fulmar_core.loop.policy_bundle import PASSPORT, read_golden, read_passport
+from fulmar_core.tasks.observation import Observer
 from policy_server.policy import Policy
 from tests.policy_server.bundles import (
     ROLLING,
@@ -67,3 +67,48 @@ def test_golden_vectors_of_a_network_with_memory_are_compared_too(remembering, n
     reseal(remembering, golden=replace(golden, **{name: getattr(golden, name) + np.float32(0.01)}))
     with pytest.raises(BundleError, match="golden vectors"):
         Policy(remembering, ROLLING, ROLLING_TASK)
+
+
+def seeing(shares):
+    """Inputs after a command, as shares of full ones."""
+    previous = np.asarray(ROLLING.actuators.scale) * np.asarray(shares)
+    seen = inputs_seeing(np.zeros(len(Observer(ROLLING, ROLLING_TASK).names)))
+    return replace(seen, previous=previous[None], dt=1.0)
+
+
+def test_a_memory_of_the_last_command_holds_what_was_commanded_instead_of_it(remembering):
+    reseal(remembering, remembers_command=True)
+    policy = Policy(remembering, ROLLING, ROLLING_TASK)
+    scale = np.asarray(ROLLING.actuators.scale)
+    policy.act(seeing([0.0, 0.0]))  # it answers with its memory, zeros
+    assert policy.act(seeing([0.0, 0.0]))[0] == pytest.approx(0.25 * scale)
+    stopped = policy.act(seeing([0.1, 0.25]))[0]  # somebody braked one wheel
+    assert stopped == pytest.approx([0.1 * scale[0], 0.5 * scale[1]])
+
+
+def test_a_memory_without_commands_is_left_alone(remembering):
+    policy = Policy(remembering, ROLLING, ROLLING_TASK)
+    policy.act(seeing([0.0, 0.0]))
+    assert policy.act(seeing([0.9, 0.9]))[0] == pytest.approx(0.25 * np.asarray(ROLLING.actuators.scale))
+
+
+def test_limits_of_the_robot_leave_the_memory_as_the_network_chose(remembering):
+    reseal(remembering, remembers_command=True)
+    policy = Policy(remembering, ROLLING, ROLLING_TASK)
+    for _ in range(7):  # its memory grows beyond full command
+        policy.act(seeing([0.0, 0.0]) if policy._expected is None else after(policy))
+    assert policy._memory[0] == pytest.approx([1.75, 1.75])
+
+
+def after(policy):
+    """Inputs after the command that the robot's limits made of the policy's own."""
+    return replace(seeing([0.0, 0.0]), previous=policy._expected)
+
+
+def test_a_passport_without_the_key_remembers_no_command(remembering):
+    text = json.loads((remembering / PASSPORT).read_text())
+    assert "remembers_command" not in text
+    assert not read_passport(remembering).remembers_command
+    reseal(remembering, remembers_command=True)
+    assert json.loads((remembering / PASSPORT).read_text())["remembers_command"] is True
+    assert read_passport(remembering).remembers_command

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
@@ -20,7 +19,7 @@ def show(folder: FolderArgument, as_json: JsonOption = False) -> None:
     """Show the passport of a bundle."""
     from fulmar_core.loop.policy_bundle import read_passport
 
-    passport = asdict(read_passport(folder))
+    passport = read_passport(folder).plain()
     if as_json:
         print_json(passport)
         return

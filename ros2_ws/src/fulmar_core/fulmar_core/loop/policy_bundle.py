@@ -41,6 +41,9 @@ MOST_OFFERED = 3  # bundles, in place of one that does not exist
 MAX_BYTES = WEIGHTS_BYTES  # a file beyond this is no policy of ours, and is not read
 
 Action = Literal["on_off", "continuous"]
+LATER: dict[str, Any] = {
+    "remembers_command": False
+}  # keys that came after format 2, and what is without them
 
 
 @dataclass(frozen=True)
@@ -60,15 +63,23 @@ class Passport:
     golden_sha256: str
     training: dict[str, Any] = field(default_factory=dict)  # how it was made, for people
     sha256: str = ""  # of all the above
+    # Whether the memory ends with the last command, as shares of full command: where the robot was then commanded
+    # otherwise, that takes its place.
+    remembers_command: bool = False
 
     def sealed(self) -> Passport:
         """The same passport with its own hash filled in."""
         values = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "sha256"}
         return Passport(**values, sha256=self.expected_sha256())
 
+    def plain(self) -> dict[str, Any]:
+        """What `passport.json` holds; what came later is left out at its default, so that older passports stay."""
+        values = asdict(self)
+        return {key: value for key, value in values.items() if key not in LATER or value != LATER[key]}
+
     def expected_sha256(self) -> str:
         """Hash of everything but the hash itself."""
-        values = asdict(self)
+        values = self.plain()
         del values["sha256"]
         return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()
 
@@ -138,7 +149,7 @@ def write_bundle(folder: Path, network: bytes, golden: Golden, passport: Passpor
         "sha256": "",
     }
     sealed = _passport_of(values, folder / PASSPORT).sealed()
-    text = json.dumps(asdict(sealed), indent=2) + "\n"
+    text = json.dumps(sealed.plain(), indent=2) + "\n"
     write_whole(
         {
             folder / NETWORK: network,
@@ -292,11 +303,12 @@ def _passport_of(values: Any, path: Path) -> Passport:
     for name in values:
         if name not in known:
             raise BundleError(f"{path}: unknown key '{name}'.{did_you_mean(name, known)}")
+    values = LATER | values
     missing = known - values.keys()
     if missing:
         raise BundleError(f"{path}: lacks the key '{min(missing)}'. Export the policy again.")
     for name, kinds in _KINDS.items():
-        if not isinstance(values[name], kinds) or isinstance(values[name], bool):
+        if not isinstance(values[name], kinds) or isinstance(values[name], bool) != (kinds is bool):
             raise BundleError(
                 f"{path}: '{name}' is {values[name]!r}, which is of the wrong type. Export the policy again."
             )
@@ -324,6 +336,7 @@ _KINDS: dict[str, type | tuple[type, ...]] = {
     "golden_sha256": str,
     "training": dict,
     "sha256": str,
+    "remembers_command": bool,
 }
 
 
