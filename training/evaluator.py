@@ -14,11 +14,12 @@ from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.simulation.metrics import summary
 from fulmar_core.tasks import Task, load_task
 from fulmar_core.worlds.scenario import Scenario, load_scenario
-from training.network import DeployedNetwork, NetworkController, load_network
+from training.network import NetworkController, load_network
+from training.policy_network import PolicyNetwork
 from training.run_folder import NETWORK_FILE, read_run_record, write_run_record
 
 EPISODES = 256  # of each scenario
-Evaluator = Callable[[DeployedNetwork], tuple[float, float]]  # success rate and score
+Evaluator = Callable[[PolicyNetwork], tuple[float, float]]  # success rate and score
 
 # Weights of further metrics in the score, where a task has them: precision, then economy.
 _WEIGHTS = {
@@ -46,7 +47,7 @@ def held_out_evaluator(robot: Robot, task: Task, scenario: Scenario) -> Evaluato
     """Evaluator in the training scenario and in the nominal one: a network may be good at either alone."""
     worlds = dict.fromkeys((scenario, load_scenario("nominal")))
 
-    def evaluate(network: DeployedNetwork) -> tuple[float, float]:
+    def evaluate(network: PolicyNetwork) -> tuple[float, float]:
         controller = NetworkController(network, robot, task, robot.timing.control_hz)
         figures = [
             summary(

@@ -25,6 +25,7 @@ from fulmar_core.tasks.observation import Observer
 from fulmar_core.worlds.scenario import load_scenario
 from training.golden_limits import with_limits
 from training.network import DeployedNetwork, NetworkController, load_network
+from training.policy_network import PolicyNetwork
 from training.run_folder import NETWORK_FILE, read_run_record
 from training.session import polite_interrupt
 
@@ -65,6 +66,7 @@ def export(run: Path, out: Path) -> Passport:
         action=action_of(robot),
         command_scale=plan.command_scale,
         memory=plan.memory,
+        remembers_command=network.remembers_command,
         network_sha256="",
         golden_sha256="",
         training={
@@ -102,7 +104,7 @@ def _mujoco_result(record: dict[str, Any]) -> dict[str, Any]:
     return {"mujoco": main | means}
 
 
-def _to_onnx(network: DeployedNetwork) -> bytes:
+def _to_onnx(network: PolicyNetwork) -> bytes:
     memory = network.plan.memory
     example = [torch.zeros(2, network.plan.inputs), *([torch.zeros(2, memory)] if memory else [])]
     worlds = torch.export.Dim("worlds")
@@ -148,7 +150,7 @@ def _strip_metadata(model: onnx.ModelProto) -> None:
         part.doc_string = ""
 
 
-def _golden(network: DeployedNetwork, robot: Robot, task: Task) -> Golden:
+def _golden(network: PolicyNetwork, robot: Robot, task: Task) -> Golden:
     """Golden vectors of held-out episodes at their start, a few commands later, and at limits.
 
     With a fallback policy, every other robot has an uncontrollable set of dead valves.
@@ -169,7 +171,7 @@ def _golden(network: DeployedNetwork, robot: Robot, task: Task) -> Golden:
         inputs = loop.inputs(simulation.measured, {}, round(1e9 * number * loop.dt))
         seen = with_disturbances(loop.observer, inputs) if network.plan.disturbances else inputs.observation
         seen = seen.astype(np.float32)
-        if network.fallback is not None:
+        if isinstance(network, DeployedNetwork) and network.fallback is not None:
             losses = network.losses.numpy()
             valves = seen[::2, -losses.shape[1] :]
             valves[:] = 1.0 - np.resize(losses, valves.shape)
@@ -178,4 +180,11 @@ def _golden(network: DeployedNetwork, robot: Robot, task: Task) -> Golden:
         simulation.move(loop.take(inputs, command).command)
         memory = after
     golden = Golden(*(np.concatenate(both) for both in zip(moments[0], moments[-1], strict=True)))
-    return with_limits(golden, network.infer, robot.actuators.scale, action_of(robot))
+    golden = with_limits(golden, network.infer, robot.actuators.scale, action_of(robot))
+    clear = network.clear(golden.observations, golden.memories)
+    if not clear.any():
+        raise ConfigError(
+            "every golden vector of the network is so near a tie that another processor may answer otherwise: it has "
+            "not learned yet. Train for longer."
+        )
+    return Golden(**{name: rows[clear] for name, rows in vars(golden).items() if rows is not None})

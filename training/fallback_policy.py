@@ -68,4 +68,6 @@ def load_fallback(run: Path, robot: Robot, settings: TrainingSettings) -> Fallba
     losses = np.zeros((len(lost), len(robot.actuators.names)), dtype=np.float32)
     for row, which in zip(losses, lost, strict=True):
         row[list(which)] = 1.0
-    return FallbackPolicy(load_network(run / NETWORK_FILE), losses)
+    network = load_network(run / NETWORK_FILE)
+    assert isinstance(network, DeployedNetwork)
+    return FallbackPolicy(network, losses)

@@ -18,10 +18,11 @@ from fulmar_core.controllers.disturbance_inputs import ESTIMATOR, with_disturban
 from fulmar_core.controllers.wrench_choice import WRENCH, WrenchChoice
 from fulmar_core.robots.robot import Robot
 from fulmar_core.simulation.symmetry import Mirror
-from fulmar_core.states.rotation import Array
 from fulmar_core.tasks import Task
 from fulmar_core.tasks.observation import Observer
+from training.dreamer.network import DreamerNetwork, DreamerPlan
 from training.incremental_actions import KINDS, incremental_shares
+from training.policy_network import PolicyNetwork
 
 Decision = Literal["threshold", "clamp", "squash", "choose", "increment"]
 
@@ -56,9 +57,10 @@ class NetworkPlan:
         return self.decision in ("threshold", "choose")
 
 
-class DeployedNetwork(nn.Module):
+class DeployedNetwork(PolicyNetwork):
     """Observation in, command and raw outputs out; what `export` writes to ONNX."""
 
+    plan: NetworkPlan
     mean: torch.Tensor
     scale: torch.Tensor
     command_scale: torch.Tensor
@@ -192,31 +194,13 @@ class DeployedNetwork(nn.Module):
         share = torch.tanh(raw) if self.plan.decision == "squash" else torch.clamp(raw, -1.0, 1.0)
         return share * self.command_scale
 
-    def infer(
-        self, observation: Array, memory: np.ndarray | None = None
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Command, raw outputs and next memory as NumPy.
 
-        Args:
-            observation: Shape (worlds, n).
-            memory: Shape (worlds, `plan.memory`); zeros by default.
-        """
-        seen = torch.as_tensor(np.asarray(observation, dtype=np.float32))
-        with torch.inference_mode():
-            if not self.plan.memory:
-                command, raw = self(seen)
-                return command.numpy(), raw.numpy(), np.zeros((len(seen), 0), np.float32)
-            before = torch.zeros(len(seen), self.plan.memory) if memory is None else torch.as_tensor(memory)
-            command, raw, after = self(seen, before)
-        return command.numpy(), raw.numpy(), after.numpy()
-
-
-def save_network(network: DeployedNetwork, path: Path) -> None:
+def save_network(network: PolicyNetwork, path: Path) -> None:
     """Write plan, weights and statistics."""
     torch.save({"plan": asdict(network.plan), "state": network.state_dict()}, path)
 
 
-def load_network(path: Path) -> DeployedNetwork:
+def load_network(path: Path) -> PolicyNetwork:
     """Read what `save_network` wrote; tensors and numbers only, no pickled code.
 
     Raises:
@@ -224,7 +208,7 @@ def load_network(path: Path) -> DeployedNetwork:
     """
     try:
         content = torch.load(path, weights_only=True)
-        network = DeployedNetwork(_plan_of(content["plan"]))
+        network = _network_of(content["plan"])
         network.load_state_dict(content["state"])
     except (
         OSError,
@@ -241,6 +225,12 @@ def load_network(path: Path) -> DeployedNetwork:
     return network
 
 
+def _network_of(plain: dict[str, Any]) -> PolicyNetwork:
+    if "classes" in plain:
+        return DreamerNetwork(DreamerPlan(**plain))
+    return DeployedNetwork(_plan_of(plain))
+
+
 def _plan_of(plain: dict[str, Any]) -> NetworkPlan:
     within = plain.get("fallback")
     return NetworkPlan(**plain | {"fallback": _plan_of(within) if within else None})
@@ -251,7 +241,7 @@ class NetworkController:
 
     name = "policy"
 
-    def __init__(self, network: DeployedNetwork, robot: Robot, task: Task, control_hz: float) -> None:
+    def __init__(self, network: PolicyNetwork, robot: Robot, task: Task, control_hz: float) -> None:
         """Wrap a network; rate in Hz."""
         self._network = network
         self._observer = Observer(robot, task)
