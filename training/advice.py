@@ -59,7 +59,7 @@ def advice(run: Path, record: dict[str, Any], success: float) -> list[str]:
 
     Args:
         run: Run folder.
-        record: Its record, with `robot`, `task`, `steps` and `wall_s`.
+        record: Its record, with `robot`, `task`, `steps` and `wall_s`, and `algorithm` where it is not PPO.
         success: Its success rate in MuJoCo, or where it was not evaluated there on held-out episodes.
     """
     usual = usual_training(record["robot"], record["task"])
@@ -69,7 +69,9 @@ def advice(run: Path, record: dict[str, Any], success: float) -> list[str]:
     lines = [
         f"the task is not learned yet: {success:.3f} of the episodes succeed, {enough:.3f} or more are expected"
     ]
-    if usual is None:
+    if record.get("algorithm", "ppo") != "ppo":
+        usual = None  # the steps of the shipped policies, all of PPO, say nothing of another algorithm
+    elif usual is None:
         lines.append(
             f"usual: no policy is shipped for {load_robot(record['robot']).kind.plural} to compare with"
         )

@@ -14,6 +14,7 @@ from fulmar_core.robots.calibration import calibration_path
 from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.tasks import Task, load_task
+from training.dreamer.train import train_dreamer
 from training.fallback_policy import FallbackPolicy, fallback_settings, load_fallback
 from training.progress import Watcher, progress_file
 from training.run_folder import (
@@ -24,7 +25,7 @@ from training.run_folder import (
     read_run_record,
     write_run_record,
 )
-from training.settings import TrainingSettings
+from training.settings import Dreamer, TrainingSettings
 from training.train import begin_run, check_seed, train
 
 
@@ -110,6 +111,8 @@ def learn(job: Job, watcher: Watcher) -> dict[str, Any]:
 def _train(
     job: Job, robot: Robot, task: Task, watcher: Watcher, fallback: FallbackPolicy | None = None
 ) -> dict[str, Any]:
+    if isinstance(job.settings.algorithm, Dreamer):
+        return train_dreamer(job, robot, task, watcher)
     return train(
         robot,
         task,

@@ -12,11 +12,12 @@ from fulmar_core.config.provenance import git_revision
 from fulmar_core.robots.robot_file import load_robot, use_calibration
 from fulmar_core.simulation.counts import check_count, check_episodes
 from fulmar_core.tasks import load_task
+from training.dreamer.apart import dreamer_python
 from training.executors import Executor, LocalExecutor
 from training.jobs import Job
 from training.ray_executor import RayExecutor
 from training.run_folder import CALIBRATION_FILE, SETTINGS_FILE, read_start, write_start
-from training.settings import StopAtSuccess, load_training_settings
+from training.settings import Dreamer, StopAtSuccess, load_training_settings
 from training.train import check_seed
 
 
@@ -68,6 +69,8 @@ def job_of(request: TrainingRequest) -> Job:
     if request.control_hz is not None:
         settings = replace(settings, control_hz=request.control_hz)
         settings.learner_of(load_robot(job.robot))  # rejects a rate that the robot cannot keep
+    if isinstance(settings.algorithm, Dreamer):
+        _check_dreamer(request)
     robot = load_robot(job.robot)
     hz = settings.control_hz or robot.timing.control_hz
     check_count("--seeds", request.seeds)
@@ -109,6 +112,17 @@ def _check_options(request: TrainingRequest) -> None:
         raise ConfigError(
             "--ray, --executor ray and --address are for campaigns: give --seeds N, or leave them out."
         )
+
+
+def _check_dreamer(request: TrainingRequest) -> None:
+    """Reject what DreamerV3 in its own environment cannot do, and a missing environment."""
+    if request.wandb:
+        raise ConfigError(
+            "--wandb does not take the curves of dreamer: they are in tensorboard/ of the run folder."
+        )
+    if request.executor == "ray" or request.address:
+        raise ConfigError("--ray does not run dreamer, whose environment is on this machine. Leave it out.")
+    dreamer_python()
 
 
 def _new(request: TrainingRequest) -> dict[str, Any]:

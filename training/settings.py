@@ -130,7 +130,40 @@ class Td3(OffPolicy):
     action_noise: float  # standard deviation of the exploration, as a share of full command [-]
 
 
-Algorithm = Ppo | RecurrentPpo | Sac | Td3
+@dataclass(frozen=True, kw_only=True)
+class Dreamer:
+    """Hyper-parameters of DreamerV3 (Hafner et al., arXiv 2301.04104), which sheeprl computes; see `make dreamer`.
+
+    An update is one gradient step of world model, actor and critic.
+    """
+
+    kind: Literal["dreamer"] = "dreamer"
+    recurrent: int  # numbers of the deterministic state
+    groups: int  # variables of the discrete state
+    classes: int  # of each
+    dense: int  # units of each hidden layer
+    layers: int  # hidden layers of encoder, decoder, actor and critic
+    minibatch: int  # sequences of a gradient step
+    sequence: int  # control steps of each
+    horizon: int  # control steps that are imagined
+    replay_ratio: float  # gradient steps for each control step
+    first_steps: int  # control steps with random actions
+    buffer: int  # control steps remembered
+    learning_rate: float  # of the world model
+    actor_rate: float  # learning rate of actor and critic
+    gamma: float
+
+    def __post_init__(self) -> None:
+        at_least_1(
+            recurrent=self.recurrent, groups=self.groups, classes=self.classes, dense=self.dense,
+            layers=self.layers, minibatch=self.minibatch, sequence=self.sequence, horizon=self.horizon,
+            buffer=self.buffer, first_steps=self.first_steps,
+        )  # fmt: skip
+        positive(replay_ratio=self.replay_ratio, learning_rate=self.learning_rate, actor_rate=self.actor_rate)
+        shares(gamma=self.gamma)
+
+
+Algorithm = Ppo | RecurrentPpo | Sac | Td3 | Dreamer
 
 
 @dataclass(frozen=True)
@@ -236,6 +269,12 @@ class TrainingSettings:
                 "'incremental_actions' are for ppo, without 'cloning_updates', 'disturbance_inputs' and "
                 "'action_space: wrench'."
             )
+        special = self.disturbance_inputs or wrench or self.mirror or self.compiled
+        if isinstance(algorithm, Dreamer) and special:
+            raise ValueError(
+                "'disturbance_inputs', 'action_space: wrench', 'mirror' and 'compiled' are not for dreamer, whose "
+                "worlds are Gymnasium's."
+            )
         if isinstance(algorithm, OnPolicy) and (self.worlds * algorithm.steps) % algorithm.minibatch:
             raise ValueError(
                 f"worlds · steps = {self.worlds * algorithm.steps} must be a multiple of 'minibatch'."
@@ -306,7 +345,7 @@ def load_training_settings(robot: Robot, task: Task, name: str | None = None) ->
         raise ConfigError(
             f"{unknown[1]}: '{unknown[2]}' has a new name: write {RENAMED[unknown[2]]}."
         ) from error
-    if robot.actuators.binary and isinstance(settings.algorithm, OffPolicy):
+    if robot.actuators.binary and isinstance(settings.algorithm, OffPolicy | Dreamer):
         raise ConfigError(
             f"{path}: {settings.algorithm.kind} needs actuators that move by degrees, those of '{robot.name}' are "
             "on/off. Use ppo or recurrent_ppo."

@@ -12,9 +12,11 @@ from packaging.utils import canonicalize_name
 from packaging.version import Version
 
 from fulmar_cli.installation.installed_as import EXTRAS_OF_SETUP
+from training.dreamer.apart import SHEEPRL
 
 RUN_LOCK, DEV_LOCK, PEERS_LOCK = "requirements.lock", "requirements-dev.lock", "requirements-peers.lock"
-LOCKS = [RUN_LOCK, DEV_LOCK, PEERS_LOCK]
+DREAMER_LOCK = "requirements-dreamer.lock"
+LOCKS = [RUN_LOCK, DEV_LOCK, PEERS_LOCK, DREAMER_LOCK]
 PYTHONS = ["3.11", "3.12", "3.13", "3.14"]
 RUN_EXTRAS = ["ros", "sim", "policy", "bags", "hardware", "view"]
 DEV_EXTRAS = ["events", "jsbsim", "datasets", "gym", "train", "cluster", "wandb"]
@@ -22,6 +24,7 @@ INSTALLED = [
     (RUN_LOCK, RUN_EXTRAS, ["build"]),
     (DEV_LOCK, [*RUN_EXTRAS, *DEV_EXTRAS], ["build", "dev"]),
     (PEERS_LOCK, None, ["peers"]),
+    (DREAMER_LOCK, None, ["dreamer"]),
 ]
 
 
@@ -175,3 +178,12 @@ def test_the_peers_may_contradict_our_own_lock_and_bring_a_pip_that_can_install_
     assert peers["torch"] != dev["torch"]
     assert Version(peers["pip"]) >= Version("23.3")
     assert "fulmar" not in peers
+
+
+@pytest.mark.parametrize("python", PYTHONS)
+def test_dreamer_learns_with_our_torch_and_contradicts_our_lock_in_pillow_alone(locks, python):
+    dreamer, dev = versions(locks[DREAMER_LOCK], python), versions(locks[DEV_LOCK], python)
+    # As soon as they agree, one environment is enough.
+    assert {name for name in dreamer.keys() & dev.keys() if dreamer[name] != dev[name]} == {"pillow"}
+    assert dreamer["sheeprl"] == SHEEPRL
+    assert "fulmar" not in dreamer

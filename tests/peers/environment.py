@@ -1,4 +1,4 @@
-"""The environment of the outside programs that tests compare with, made by `make peers`."""
+"""Environments of outside programs that tests compare with, made by `make peers` and `make dreamer`."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-PEERS = ".venv-peers"
+PEERS, DREAMER = ".venv-peers", ".venv-dreamer"
 
 
-def run_peer(repository: Path, script: Path, *arguments: object, home: Path) -> str:
+def run_peer(repository: Path, script: Path, *arguments: object, home: Path, environment: str = PEERS) -> str:
     """Run a script with the Python of the peers; a test fails where they are missing or the script does.
 
     Args:
@@ -19,20 +19,22 @@ def run_peer(repository: Path, script: Path, *arguments: object, home: Path) -> 
         script: What to run; it cannot import anything of ours.
         arguments: Its arguments.
         home: Folder for whatever a peer keeps between two runs.
+        environment: Folder of its Python; `make` has a target of that name.
 
     Returns:
         What the script wrote to standard output.
     """
-    python = repository / PEERS / "bin" / "python"
+    python, target = repository / environment / "bin" / "python", environment.removeprefix(".venv-")
     if not python.is_file():
         pytest.fail(
-            f"{PEERS}/bin/python is missing, and nothing can be compared. Run: make peers", pytrace=False
+            f"{environment}/bin/python is missing, and nothing can be compared. Run: make {target}",
+            pytrace=False,
         )
-    environment = {**os.environ, "HOME": str(home), "HF_HOME": str(home), "HF_HUB_OFFLINE": "1"}
-    environment.pop("PYTHONPATH", None)
+    variables = {**os.environ, "HOME": str(home), "HF_HOME": str(home), "HF_HUB_OFFLINE": "1"}
+    variables.pop("PYTHONPATH", None)
     done = subprocess.run(
         [python, script, *map(str, arguments)],
-        env=environment,
+        env=variables,
         capture_output=True,
         text=True,
         timeout=240,
@@ -40,6 +42,7 @@ def run_peer(repository: Path, script: Path, *arguments: object, home: Path) -> 
     )
     if done.returncode:
         pytest.fail(
-            f"{script.name} failed with {PEERS}. Is it up to date? Run: make peers\n{done.stderr}", False
+            f"{script.name} failed with {environment}. Is it up to date? Run: make {target}\n{done.stderr}",
+            False,
         )
     return done.stdout

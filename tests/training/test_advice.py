@@ -52,3 +52,9 @@ def test_a_damaged_shipped_bundle_spoils_no_training(monkeypatch):
 
     monkeypatch.setattr(advice, "read_passport", damaged)
     assert usual_training("spacecraft_16", "go_to_pose_3d") is None
+
+
+def test_what_ppo_needed_is_not_asked_of_another_algorithm():
+    said = advice.advice(RUN, SLOW | {"algorithm": "dreamer"}, 0.1)
+    assert not any(line.startswith("usual:") for line in said)
+    assert "to go on: fulmar train --resume runs/mine --time-limit 240" in said

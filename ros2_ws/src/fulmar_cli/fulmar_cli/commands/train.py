@@ -125,8 +125,8 @@ def _learn_once(job: Job, *, resumes: bool, as_json: bool) -> None:
         found = {"run": str(job.out), "steps": steps, "wall_s": wall_s, "mujoco": figures, "usual": usual}
         print_json(found)
         return
-    rate = figures["success_rate"]
-    learned = {"robot": job.robot, "task": job.task, "steps": steps, "wall_s": wall_s}
+    rate, kind = figures["success_rate"], job.settings.algorithm.kind
+    learned = {"robot": job.robot, "task": job.task, "steps": steps, "wall_s": wall_s, "algorithm": kind}
     write_line(f"success {rate:.3f} of {job.episodes} episodes in MuJoCo; run folder {job.out}")
     for line in advice(job.out, learned, rate):
         write_line(line)
