@@ -53,6 +53,7 @@ class History:
     """The run so far, also across an interruption."""
 
     elapsed_s: float = 0.0  # wall-clock of earlier parts [s]
+    cpu_s: float = 0.0  # processor time of the same [s]
     steps: int = 0  # control steps of all worlds
     updates: int = 0  # gradient steps
     checks: list[dict[str, Any]] = field(default_factory=list)
@@ -88,8 +89,8 @@ class Session:
         self.interrupted = self._ending = False
         self.cfg: Any = None
         self._agent: tuple[Any, Any] | None = None
-        self._began = time.monotonic()
-        self._before_s = self.history.elapsed_s
+        self._began, self._cpu_began = time.monotonic(), time.process_time()
+        self._before_s, self._cpu_before_s = self.history.elapsed_s, self.history.cpu_s
         limit = request.time_limit_s or self.settings.time_limit_s
         self._check_every = self.settings.evaluate_every_s / limit
         self._next_check = self._after(self._progress())
@@ -131,6 +132,7 @@ class Session:
     def _between_steps(self) -> None:
         history = self.history
         history.elapsed_s = self.elapsed_s
+        history.cpu_s = self._cpu_before_s + time.process_time() - self._cpu_began
         progress, stopped = self._progress(), self.stopped.is_set()
         share = {"share": progress, "elapsed_s": history.elapsed_s, "steps": history.steps}
         self._report("advance", share)
@@ -273,6 +275,7 @@ def learn(session: Session) -> dict[str, Any]:
         "steps": history.steps,
         "updates": history.updates,
         "wall_s": round(session.elapsed_s, 1),
+        "cpu_s": round(history.cpu_s, 2),
         "steps_per_s": round(history.steps / max(session.elapsed_s, 1e-9)),
         "interrupted": session.interrupted,
         "best": history.best,
