@@ -136,6 +136,12 @@ def _count_problem(driver: Driver, actuators: Actuators) -> str:
         return "'wiring' is for wheels and propellers; thrusters have an 'order'."
     if order is not None and len(order) != count:
         return f"'order' has {len(order)} entries, the robot has {count} thrusters."
+    if (
+        isinstance(driver, (GpioValves, ValveTopic))
+        and actuators.kind == "thrusters"
+        and not actuators.binary
+    ):
+        return f"driver '{driver.kind}' only opens and closes, and these valves open by degrees. Use 'pwm_valves'."
     if isinstance(driver, GpioValves) and len(driver.lines) != count:
         return f"'lines' has {len(driver.lines)} entries, the robot has {count} thrusters."
     return ""

@@ -14,6 +14,7 @@ from hardware_drivers.settings import (
     Driver,
     GpioValves,
     OwnDriver,
+    PwmValves,
     XPlane,
 )
 
@@ -36,6 +37,8 @@ def check_presence(driver: Driver, port: str = "") -> None:
     """
     if isinstance(driver, GpioValves):
         _check_chip(port or driver.port, driver.every_line)
+    elif isinstance(driver, PwmValves):
+        _check_pwm(port or driver.port)
     elif isinstance(driver, XPlane):
         from hardware_drivers.xplane_link import XPlaneLink
 
@@ -47,6 +50,14 @@ def check_presence(driver: Driver, port: str = "") -> None:
             _check_host(address)
         elif not address.startswith(UDP):
             _check_serial(address.split(",")[0])
+
+
+def _check_pwm(path: str) -> None:
+    if not Path(path).is_dir():
+        chips = _known("PWM chips", sorted(glob("/sys/class/pwm/*")))
+        raise DeviceError(
+            f"{path}: there is no such PWM chip. {chips} Name its folder with `port:` in the hardware file."
+        )
 
 
 def _check_serial(path: str) -> None:

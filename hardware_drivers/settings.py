@@ -118,6 +118,30 @@ class GpioValves(DriverFacts):
 
 
 @dataclass(frozen=True)
+class PwmValves(DriverFacts):
+    """Valves that open by degrees, on channels of a PWM chip of Linux, active high."""
+
+    kind: Literal["pwm_valves"]
+    port: str  # folder of the chip, such as /sys/class/pwm/pwmchip0
+    channels: tuple[int, ...]  # in the order of the wiring
+    order: ValveOrder  # which thruster, counted from 0, each of these channels opens
+    frequency_hz: float = 100.0  # of the pulses: well above what the valve follows
+
+    fits = ("thrusters",)
+    emulator = "pwm_valves"
+    seen_from_outside = True
+    made_by = "hardware_drivers.pwm_driver:PwmValveDriver"
+    moves_on = "VALVES"  # the chip's channels go on as they are
+
+    def __post_init__(self) -> None:
+        if len(set(self.channels)) != len(self.channels) or min(self.channels, default=-1) < 0:
+            raise ValueError("each valve needs a channel of its own, 0 or more.")
+        check_order(self.order, len(self.channels))
+        if not 1.0 <= self.frequency_hz <= 1e5:
+            raise ValueError("frequency_hz must be from 1 to 100000 Hz.")
+
+
+@dataclass(frozen=True)
 class ValveTopic(DriverFacts):
     """A valve node of another stack: an array of zeros and ones, the bearing first."""
 
@@ -351,6 +375,7 @@ class OwnDriver(DriverFacts):
 
 Driver = (
     GpioValves
+    | PwmValves
     | ValveTopic
     | Kobuki
     | VelocityTopic

@@ -40,6 +40,7 @@ from sim_nodes.emulators.device import EmulatedDevice, Link, PtyLink, TcpLink
 from sim_nodes.emulators.kingfisher import KingfisherEmulator
 from sim_nodes.emulators.kobuki import KobukiEmulator
 from sim_nodes.emulators.outputs import BASE_TIMEOUT_S, NO_TIMEOUT_S, TopicDevice, ValveBank, ValveNode
+from sim_nodes.emulators.pwm import PwmBank
 from sim_nodes.emulators.wiring import STRAIGHT, Wiring
 from sim_nodes.emulators.xplane import XPlaneEmulator
 from sim_nodes.mock_backend import MockBackend
@@ -48,7 +49,8 @@ from sim_nodes.on_air import OnAir
 
 XPLANE = "xplane"
 DEVICES = (
-    "valves", "kobuki", "kingfisher", "ardupilot", XPLANE, "valve_topic", "velocity_topic", "thrust_topic",
+    "valves", "pwm_valves", "kobuki", "kingfisher", "ardupilot", XPLANE,
+    "valve_topic", "velocity_topic", "thrust_topic",
 )  # fmt: skip
 NONE = -1  # an empty list has no type in ROS
 CATCH_UP = 25  # ticks at most after a pause of the process; simulated time loses the rest
@@ -61,6 +63,7 @@ class EmulatorSettings(PlantSettings):
     device: str = ""  # one of DEVICES
     link: str = ""  # path of the pseudo-terminal or the chip to make, tcp:<port>, udp:<port>, or a topic
     order: tuple[int, ...] = (0, 1, 2, 3, 4, 5, 6, 7)  # which thruster each valve line opens
+    channels: tuple[int, ...] = (0, 1, 2, 3, 4, 5, 6, 7)  # of a PWM chip, in the order of its wires
     active_low: bool = True
     bearing: bool = True  # valves have an air bearing beside them
     supply: bool = False  # a valve shuts off the supply of the others
@@ -225,6 +228,8 @@ def make_emulator(robot: Robot, backend: MujocoBackend, settings: EmulatorSettin
             bearing=settings.bearing,
             supply=settings.supply,
         )
+    if settings.device == "pwm_valves":
+        return PwmBank(Path(settings.link), channels=settings.channels, order=settings.order)
     if settings.device == "valve_topic":
         return ValveNode(settings.link, settings.order, inverted=settings.inverted)
     if settings.device == "velocity_topic":

@@ -16,6 +16,7 @@ from hardware_drivers.settings import (
     Kobuki,
     MavlinkBoat,
     OwnDriver,
+    PwmValves,
     ThrustTopic,
     ValveTopic,
     VelocityTopic,
@@ -74,6 +75,11 @@ def emulation_of(hardware: Hardware, folder: Path) -> Emulation:
             "supply": driver.supply is not None,
         }
         return Emulation(driver.emulator, str(pins), f"file://{pins}", more)
+    if isinstance(driver, PwmValves):
+        chip = str(folder / "pwmchip")
+        return Emulation(
+            driver.emulator, chip, chip, {"order": list(driver.order), "channels": list(driver.channels)}
+        )
     if isinstance(driver, XPlane):
         number = _free_port(socket.SOCK_DGRAM)
         return Emulation(driver.emulator, f"udp:{number}", f"udp://127.0.0.1:{number}")
