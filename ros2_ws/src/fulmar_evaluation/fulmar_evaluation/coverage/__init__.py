@@ -1,0 +1,1 @@
+"""How much of a thing's surface a camera has seen."""
