@@ -84,13 +84,13 @@ def test_a_camera_mounted_aside_is_turned_to_the_thing_instead_of_the_bodys_x_ax
     np.testing.assert_allclose(left, -pose[:3] / np.linalg.norm(pose[:3]), atol=1e-3)
 
 
-def test_in_training_every_path_comes_and_goes_on_until_the_episode_ends():
+def test_in_training_every_path_comes_and_some_end_within_the_episode():
     _, goal = drawn(TASK, worlds=64, training=True)
     assert goal.targets.shape[1] * TASK.spacing_s > TASK.episode_s
     late = TASK.reference_of(TASK.advance(goal, None, np.asarray(80.0)))
-    line = TASK.flight(ROBOT, "line").duration_s
     moves = np.linalg.norm(late.motion[:, :3], axis=1) > 0.01
-    assert line < 80.0 and 0.7 < moves.mean() < 1.0  # a line has its end
+    assert TASK.flight(ROBOT, "line").duration_s < 80.0 < TASK.flight(ROBOT, "spiral").duration_s
+    assert 0.4 < moves.mean() < 0.9
 
 
 @pytest.mark.parametrize(

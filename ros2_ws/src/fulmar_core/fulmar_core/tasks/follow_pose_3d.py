@@ -161,7 +161,7 @@ class FollowPose3d(MovingPose):
         over_s = over_s if training else flight.duration_s
         times = self.spacing_s * np.arange(1 + math.ceil(over_s / self.spacing_s))
         begin = np.asarray(draws.uniform(0.0, 1.0))
-        return poses_along((flight,), np.zeros(len(begin), dtype=int), begin, times, once=not training)
+        return poses_along((flight,), np.zeros(len(begin), dtype=int), begin, times)
 
     def draw(self, draws: Draws, robot: Robot, *, training: bool) -> tuple[SpatialState, Goal]:
         """Draw a start at rest, and a walk that is longer than the episode."""

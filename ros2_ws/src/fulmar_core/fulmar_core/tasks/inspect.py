@@ -56,7 +56,7 @@ class Inspect(MovingPose):
     """Follow one whole round of a path about a thing at the origin, with the camera's axis on its middle.
 
     The body turns about that axis nowhere. Closed paths begin anywhere on them, as the seed draws it. In training
-    every path of `training_paths` is drawn alike, and goes on until the episode ends.
+    every path of `training_paths` is drawn alike; many end within an episode.
     """
 
     kind: Literal["inspect"]
@@ -120,7 +120,7 @@ class Inspect(MovingPose):
         over_s = self.episode_s + 1.0 if training else flights[0].duration_s
         times = self.spacing_s * np.arange(1 + math.ceil(over_s / self.spacing_s))
         which = np.minimum((unit[:, 0] * len(paths)).astype(int), len(paths) - 1)
-        targets = poses_along(flights, which, unit[:, 1], times, once=not training)
+        targets = poses_along(flights, which, unit[:, 1], times)
         xp = array_namespace(numbers)
         goal = self.goal_through(xp.asarray(targets), xp.zeros_like(numbers[:, 0]))
         return self._start(numbers, goal.targets[:, 0], training=training), goal

@@ -67,13 +67,9 @@ class Flight:
         """Of one whole round, or of an open path, with getting up to speed and to rest [s]."""
         return self.target.round_s + self.target.ease_s
 
-    def rounds(self, times: np.ndarray, *, once: bool) -> np.ndarray:
-        """Rounds that lie behind at some times, shape (k,); `once`: it ends after one, as an open path does."""
-        if once or not self.closed:
-            return np.array([self.target.rounds(time) for time in times])
-        eased = np.minimum(times, self.target.ease_s)
-        eased = np.array([self.target.rounds(time) for time in eased])
-        return eased + np.maximum(times - self.target.ease_s, 0.0) / self.target.round_s
+    def rounds(self, times: np.ndarray) -> np.ndarray:
+        """Rounds that lie behind at some times, shape (k,); no more than one."""
+        return np.array([self.target.rounds(time) for time in times])
 
     def check(self, robot: Robot, keep_outs: tuple[KeepOut, ...], what: str) -> None:
         """Refuse it before anything moves where the robot cannot fly it.
@@ -118,7 +114,7 @@ class Flight:
     def _turning(self, step_s: float = 0.5) -> tuple[float, float]:
         """Largest turn rate [rad/s] and its largest change [rad/s²], from poses half a second apart."""
         times = np.arange(0.0, self.duration_s + step_s, step_s)
-        quat = quat_of(at_rounds(self.table, self.rounds(times, once=True)))
+        quat = quat_of(at_rounds(self.table, self.rounds(times)))
         before, after = tuple(q[:-1] for q in quat), tuple(q[1:] for q in quat)
         rates = np.stack(logarithm(product(conjugate(before), after)), axis=-1) / step_s
         changes = np.linalg.norm(np.diff(rates, axis=0), axis=-1) / step_s
@@ -146,7 +142,7 @@ def at_rounds(table: np.ndarray, rounds: np.ndarray) -> np.ndarray:
 
 
 def poses_along(
-    flights: Sequence[Flight], which: np.ndarray, begin: np.ndarray, times: np.ndarray, *, once: bool
+    flights: Sequence[Flight], which: np.ndarray, begin: np.ndarray, times: np.ndarray
 ) -> np.ndarray:
     """Poses that some worlds follow.
 
@@ -155,7 +151,6 @@ def poses_along(
         which: Number of that of each world, shape (n,).
         begin: Share of a closed path at which each begins, shape (n,).
         times: Since then, shape (k,) [s].
-        once: A closed path ends after one round.
 
     Returns:
         Shape (n, k, 7).
@@ -163,9 +158,7 @@ def poses_along(
     poses = np.empty((len(which), len(times), 7))
     for index, flight in enumerate(flights):
         mine = which == index
-        poses[mine] = at_rounds(
-            flight.table, begin[mine, None] * flight.closed + flight.rounds(times, once=once)
-        )
+        poses[mine] = at_rounds(flight.table, begin[mine, None] * flight.closed + flight.rounds(times))
     poses[..., 3:] /= np.linalg.norm(poses[..., 3:], axis=-1, keepdims=True)
     return poses
 
