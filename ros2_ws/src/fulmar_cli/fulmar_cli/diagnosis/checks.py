@@ -14,6 +14,7 @@ from fulmar_cli.diagnosis.installation import (
     check_extra,
     check_policies,
     check_python,
+    check_renderer,
     check_tf,
 )
 from fulmar_cli.diagnosis.machine import (
@@ -61,6 +62,7 @@ def diagnose(purpose: str | None = None, name: str | None = None) -> list[Findin
         check_python,
         *(partial(check_extra, extra) for extra in extras if not (fault and extra == "ros")),
         check_tf,
+        *(() if hardware else (check_renderer,)),
         check_configuration,
         check_policies,
         *(() if domain_problem(environment) else (partial(check_discovery, environment, hardware=hardware),)),

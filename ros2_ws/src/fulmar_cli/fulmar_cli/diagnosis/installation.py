@@ -10,7 +10,7 @@ from importlib.util import find_spec
 from fulmar_cli.diagnosis.check_result import Finding
 from fulmar_cli.installation.extras import EXTRAS
 from fulmar_cli.installation.installed_as import install_command, repair_command
-from fulmar_core.config.errors import FulmarError
+from fulmar_core.config.errors import ConfigError, FulmarError
 from fulmar_core.config.paths import config_directories, config_names
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.tasks import load_task
@@ -58,6 +58,24 @@ def check_tf() -> Finding:
         )
         return Finding("tf2_msgs", "advice", found, "fulmar install-tf")
     return Finding("tf2_msgs", "ok", "installed")
+
+
+def check_renderer() -> Finding:
+    """Whether cameras of simulated robots can be drawn, and by what."""
+    if find_spec("mujoco") is None:
+        return Finding("renderer of cameras", "advice", "needs mujoco", install_command(["sim"], ["mujoco"]))
+    from sim_nodes.camera.opengl import check_variable, find_platform
+
+    try:
+        return Finding("renderer of cameras", "ok", find_platform())
+    except ConfigError as error:
+        found = str(error)
+    try:
+        check_variable()
+    except ConfigError:
+        return Finding("renderer of cameras", "wrong", found, "unset MUJOCO_GL")
+    said, _, fix = found.partition(" Run: ")
+    return Finding("renderer of cameras", "advice", said, fix or "unset MUJOCO_GL")
 
 
 def check_configuration() -> Finding:
