@@ -123,6 +123,7 @@ class FaultEnvironment:
     answers_pass: bool = False  # the robot's commands pass through an injector of their own
     by_goal_node: bool = False  # a goal node publishes goals from a file
     drawn: bool = False  # a node draws for viewers
+    filmed: bool = False  # a node draws what the robot's camera sees
     by_hand: bool = False  # a node for teleoperation runs, and nobody touches it yet
     scenario: str = "nominal"
     emulated: bool = False  # a driver drives an emulated device
@@ -210,7 +211,7 @@ def plan_of(name: str, record: Path, about: FaultEnvironment = USUAL) -> RunPlan
         scenario=about.scenario,
         goals=_goals_file(record.parent, robot, task) if about.by_goal_node else "",
         emulated=about.emulated,
-        extras=("markers",) if about.drawn else (),
+        extras=tuple(name for name, runs in (("markers", about.drawn), ("camera", about.filmed)) if runs),
         guards=about.guards_of(robot),
         record=str(record),
         command="fulmar faults",

@@ -10,6 +10,7 @@ from functools import partial
 import psutil
 
 from fulmar_core.estimators.kinds import default_estimator, load_estimator
+from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.topics import MOCAP
 from fulmar_evaluation.faults.fault import (
     STAYS_S,
@@ -182,6 +183,10 @@ def _problem(live: LiveSystem, since_s: float) -> HealthStatus | None:
     return next((status for status in statuses if status.level != "ok"), None)
 
 
+def _without_camera(robot: Robot) -> str:
+    return "" if robot.sensors.camera is not None else f"'{robot.name}' has no camera"
+
+
 PROCESS_FAULTS = (
     *killed_and_stopped(_controller, "controller_killed", "controller_hangs", launchers=LAUNCHERS),
     *killed_and_stopped(_plant, "plant_killed", "plant_hangs", launchers=LAUNCHERS),
@@ -199,6 +204,10 @@ PROCESS_FAULTS = (
     *killed_and_stopped(
         partial(helper_lost, name="markers"), "markers_killed", "markers_hang",
         about=FaultEnvironment(drawn=True), launchers=LAUNCHERS,
+    ),
+    *killed_and_stopped(
+        partial(helper_lost, name="camera"), "camera_killed", "camera_hangs",
+        about=FaultEnvironment(filmed=True), why_not=_without_camera, launchers=LAUNCHERS,
     ),
     *killed_and_stopped(
         _estimator, "estimator_killed", "estimator_hangs",

@@ -96,7 +96,9 @@ def modules_for(robot: str, faults: list[Fault]) -> tuple[str, ...]:
     for about in (fault.about for fault in faults):
         backend, hardware = ("hardware", default_hardware(robot)) if about.emulated else ("mujoco", "")
         guards = about.guards_of(load_robot(robot))
-        modules = modules_of("policy", backend, guards=guards, hardware=hardware, emulated=about.emulated)
+        modules = modules_of(
+            "policy", backend, guards=guards, hardware=hardware, emulated=about.emulated, camera=about.filmed
+        )
         needed |= dict.fromkeys(modules)
     return tuple(needed)
 
