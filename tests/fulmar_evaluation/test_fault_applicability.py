@@ -59,6 +59,8 @@ OF_PARTS = {
     "wheel_dead": {"cubesat_wheels", "turtlebot2"},
     "propeller_lost": {"kingfisher", "airship_v7"},
     "supply_pressure_falls": {"floating_platform", "spacecraft_16", "cubesat_8"},
+    "camera_killed": {"cubesat_8", "int_ball2"},
+    "camera_hangs": {"cubesat_8", "int_ball2"},
     "tank_empty": {"floating_platform", "spacecraft_16", "cubesat_8"},
 }
 
