@@ -128,8 +128,11 @@ def _value() -> str:
     return os.environ.get(VARIABLE, "").strip().lower()
 
 
-def _one_line(error: Exception) -> str:
-    return " ".join(str(error).split()) or type(error).__name__
+def _one_line(error: BaseException) -> str:
+    """What went wrong: its first sentence; without a library PyOpenGL has None in its place, and asks that."""
+    if isinstance(error, AttributeError) and "NoneType" in str(error):
+        return "its library is not installed"
+    return " ".join(str(error).split()).partition(". ")[0].rstrip(".") or type(error).__name__
 
 
 def _draw(platform: str) -> None:
@@ -145,4 +148,4 @@ if __name__ == "__main__":
     try:
         _draw(sys.argv[1])
     except Exception as error:  # noqa: BLE001 - whatever it is, it is the answer
-        sys.exit(_one_line(error))
+        sys.exit(_one_line(error.__cause__ or error))

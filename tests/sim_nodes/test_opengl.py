@@ -45,7 +45,7 @@ def test_without_a_driver_the_packages_are_named(monkeypatch, tmp_path):
     monkeypatch.setenv("MUJOCO_GL", "egl")
     monkeypatch.setenv("__EGL_VENDOR_LIBRARY_DIRS", str(tmp_path))  # where the driver of Mesa is looked for
     words = refusal()
-    assert words.startswith("no renderer for cameras (egl: ")
+    assert words.startswith("no renderer for cameras (egl: ") and words.count("no renderer") == 1
     assert words.endswith("Run: sudo apt-get install libegl1 libgl1-mesa-dri")
 
 
@@ -79,7 +79,7 @@ def test_what_ends_a_context_is_one_line(monkeypatch):
 
     monkeypatch.setattr(opengl, "import_module", broken)
     with (
-        pytest.raises(ConfigError, match=r"no attribute 'glGetError'.*libosmesa6"),
+        pytest.raises(ConfigError, match=r"osmesa: its library is not installed.*libosmesa6"),
         opengl.context("osmesa", 8, 8),
     ):
         pass
