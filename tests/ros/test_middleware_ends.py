@@ -47,7 +47,8 @@ NODES = {
     "estop": ("fulmar_ros.estop_node", ROBOT),
     "markers": ("fulmar_ros.markers_node", {**ROBOT, "task": "go_to_pose"}),
     "teleop": ("fulmar_ros.teleop_node", {**ROBOT, "keyboard": "false"}),
-    "camera": ("sim_nodes.event_camera_node", {"robot": "cubesat_wheels"}),
+    "camera": ("sim_nodes.camera_node", {"robot": "cubesat_8"}),
+    "event camera": ("sim_nodes.event_camera_node", {"robot": "cubesat_wheels"}),
 }
 QUICK = ("controller",)
 
