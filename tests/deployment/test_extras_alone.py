@@ -32,7 +32,7 @@ WORKS = {
     "hardware": "import filterpy.kalman, serial, gpiod, hardware_drivers.mavlink_driver",
     "view": "check robot jetbot --plot plot.png",
     "run": MUJOCO,
-    "datasets": "import pyarrow.parquet",
+    "datasets": "import pyarrow.parquet, av",
     "train": "import training.learners, training.export",
     "cluster": "import ray",
     "wandb": "import wandb",
