@@ -13,13 +13,17 @@ from typer.testing import CliRunner
 
 from fulmar_bags.contents import open_bag
 from fulmar_bags.decode import joint_vectors, odometries
+from fulmar_bags.frame_codecs import read_image
+from fulmar_bags.frame_messages import COMPRESSED, IMAGE
 from fulmar_bags.lerobot import _table
 from fulmar_bags.writer import BagWriter
 from fulmar_cli.main import app
 from fulmar_core.config.errors import BagError
 from fulmar_core.config.paths import OWN_FOLDERS, config_path
 from fulmar_core.robots.topics import ACTION, COMMAND, OBSERVATION, ODOMETRY
+from tests.bags_with_frames import packed_messages, with_images
 from tests.foreign_bag import write_foreign
+from tests.frames import COLOUR, DEPTH, IDS, compressed, raw, scene
 from tests.fulmar_cli.bag_commands import BAGS, POLICY, answer, ask
 from tests.fulmar_cli.test_bag_diff import SCAN, bag_of, scan
 
@@ -174,3 +178,71 @@ def test_a_dataset_holds_an_episode_for_each_bag_and_a_frame_for_each_step(tmp_p
         tmp_path / "mixed",
     )
     assert "another kind" in str(refused.exception)
+
+
+CAMERA = "/floating_platform"
+
+
+def dataset_of(tmp_path, messages, *bags, hz=5.0):
+    sources = [
+        with_images(open_bag(bag), tmp_path / f"bag_{i}", messages, hz=hz) for i, bag in enumerate(bags)
+    ]
+    done = CliRunner().invoke(
+        app, ["bag", "export", *map(str, sources), "--to", "lerobot", "--out", str(tmp_path / "set")]
+    )
+    return done, tmp_path / "set"
+
+
+def film_of(dataset, key="observation.images.camera"):
+    import av
+
+    with av.open(str(dataset / f"videos/{key}/chunk-000/file-000.mp4")) as film:
+        return [frame.to_ndarray(format="rgb24") for frame in film.decode(video=0)]
+
+
+def test_a_dataset_takes_the_images_of_each_step_along(tmp_path):
+    done, dataset = dataset_of(tmp_path, packed_messages(20, CAMERA, hz=5.0), POLICY)
+    assert done.exit_code == 0, done.exception
+    assert "depth is in millimetres up to 32.767 m" in done.output
+    features = info_of(dataset)["features"]
+    colour, depth, ids = (f"observation.images.camera{more}" for more in ("", "_depth", "_segmentation"))
+    assert (features[colour]["dtype"], features[colour]["shape"]) == ("video", [48, 64, 3])
+    assert features[colour]["info"]["video.codec"] == "h264"
+    film, row = film_of(dataset), episodes_of(dataset)
+    assert len(film) == row["length"][0] == 100
+    assert row[f"videos/{colour}/to_timestamp"] == [20.0]
+    table = parquet.read_table(dataset / "data/chunk-000/file-000.parquet").to_pydict()
+    for step in (0, 7, 50):
+        pixels = scene(min(step, 19))
+        assert np.abs(film[step] - pixels[COLOUR].astype(float)).mean() < 8.0
+        np.testing.assert_array_equal(read_image(table[ids][step]["bytes"]), pixels[IDS])
+        whole = read_image(table[depth][step]["bytes"])
+        np.testing.assert_allclose(
+            whole, np.where(pixels[IDS] > 0, 1000.0 * pixels[DEPTH], 0.0), rtol=1e-3, atol=0.5
+        )
+    stats = json.loads((dataset / "meta/stats.json").read_text())
+    assert np.shape(stats[colour]["mean"]) == (3, 1, 1)
+    assert stats[depth]["count"] == [100]
+
+
+def test_steps_before_the_first_image_are_left_out_and_a_torn_image_is_as_the_one_before(tmp_path):
+    topic = f"{CAMERA}/{COLOUR}/compressed"
+    images = packed_messages(20, CAMERA, hz=5.0)[topic][1][4:]
+    images[3] = compressed(b"torn", "jpeg", 1.0 + 7 / 5.0)
+    done, dataset = dataset_of(tmp_path, {topic: (COMPRESSED, images)}, POLICY)
+    assert "bag 1: 4 steps before the first image are left out." in done.output
+    film = film_of(dataset)
+    assert len(film) == 96
+    np.testing.assert_allclose(film[3].astype(float), film[2], atol=12.0)
+
+
+def test_bags_with_other_cameras_are_exported_apart_and_images_that_cannot_be_read_are_named(tmp_path):
+    plain = raw(np.zeros((4, 4), np.uint8), "bayer_rggb8")
+    done, dataset = dataset_of(tmp_path, {f"{CAMERA}/rear/image_raw": (IMAGE, [plain])}, POLICY)
+    assert "left out: /floating_platform/rear/image_raw: encoding 'bayer_rggb8'" in done.output
+    assert not (dataset / "videos").exists()
+    with_them = with_images(open_bag(POLICY), tmp_path / "with", packed_messages(3, CAMERA))
+    done = export(with_them, POLICY, "--to", "lerobot", "--out", tmp_path / "other")
+    assert "bag 2 has no camera, the first one observation.images.camera (colour, 64 × 48)" in str(
+        done.exception
+    )

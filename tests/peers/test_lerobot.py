@@ -13,6 +13,8 @@ from fulmar_bags.contents import open_bag
 from fulmar_bags.decode import joint_vectors
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.robots.topics import ACTION, OBSERVATION
+from tests.bags_with_frames import packed_messages, with_images
+from tests.frames import COLOUR, DEPTH, IDS, scene
 from tests.fulmar_cli.bag_commands import BAGS, LQR, POLICY, answer
 from tests.peers.environment import run_peer
 
@@ -62,6 +64,33 @@ def test_lerobot_loads_an_exported_dataset_with_the_values_of_its_bags(pytestcon
     np.testing.assert_allclose(
         reported["stats"]["q90"], np.quantile(actions, 0.9, axis=0), rtol=1e-6, atol=1e-7
     )
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(300)
+def test_lerobot_shows_the_images_that_a_dataset_has_with_each_step(pytestconfig, tmp_path):
+    bags = []
+    for name, source in (("policy", POLICY), ("lqr", LQR)):
+        messages = packed_messages(20, "/floating_platform", hz=5.0)
+        bags.append(with_images(open_bag(source), tmp_path / name, messages, hz=5.0))
+    answer("export", *bags, "--to", "lerobot", "--out", tmp_path / "set")
+    reported = json.loads(run_peer(pytestconfig.rootpath, SCRIPT, tmp_path / "set", home=tmp_path / "home"))
+    colour, depth, ids = (
+        f"observation.images.{name}" for name in ("camera", "camera_depth", "camera_segmentation")
+    )
+    assert reported["video_keys"] == [colour]
+    length = reported["episodes"][0][1]
+    for place, index in enumerate(reported["looked_at"]):
+        pixels = scene(min(index % length, 19))
+        shade = np.array(reported["images"][colour][place]).transpose(1, 2, 0)
+        assert np.abs(255.0 * shade - pixels[COLOUR]).mean() < 8.0
+        np.testing.assert_array_equal(np.array(reported["images"][ids][place])[0], pixels[IDS])
+        whole = np.array(reported["images"][depth][place])[0]
+        there = np.isfinite(pixels[DEPTH])
+        np.testing.assert_array_equal(whole > 0, there)
+        np.testing.assert_allclose(whole[there], 1000.0 * pixels[DEPTH][there], rtol=1e-3, atol=0.5)
+    assert np.shape(reported["image_stats"][colour]) == (3, 1, 1)
+    assert 0.0 < np.max(reported["image_stats"][colour]) < 1.0
 
 
 def layout_of(dataset: Path) -> dict[str, object]:

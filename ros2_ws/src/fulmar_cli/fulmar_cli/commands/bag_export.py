@@ -37,8 +37,8 @@ def export(
     """Write what is in a bag as CSV, as NumPy arrays, or as a dataset to learn from.
 
     The dataset follows version 3.0 of LeRobot's format: `meta/info.json`, `meta/stats.json`, tasks, episodes and frames
-    as parquet, with `observation.state` and `action` as the controller received and sent them. It needs the extra
-    'datasets'.
+    as parquet, with `observation.state` and `action` as the controller received and sent them. Images of cameras go
+    along: colours as video, depth and segmentation as 16-bit PNG. It needs the extra 'datasets'.
     """
     from fulmar_bags.tables import write_csv, write_npz
 
@@ -57,6 +57,7 @@ def export(
     else:
         from fulmar_bags.control_steps import control_steps_of
         from fulmar_bags.lerobot import write_lerobot
+        from fulmar_bags.lerobot_images import seen_in
         from fulmar_evaluation.rerun.embedded_configs import knowing_what_it_carries
 
         for bag in opened:
@@ -67,7 +68,8 @@ def export(
         with knowing_what_it_carries(*opened):
             records = [control_steps_of(bag) for bag in opened]
             titles = [record.task.title for record in records]
-            folder, notes = write_lerobot(records, titles, out or beside / "lerobot")
+            seen = [seen_in(bag) for bag in opened]
+            folder, notes = write_lerobot(records, titles, out or beside / "lerobot", seen)
         files, left_out = [folder], []
         warn(notes)
     warn(f"left out: {line}" for line in left_out)
