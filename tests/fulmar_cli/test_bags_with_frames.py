@@ -2,42 +2,19 @@
 
 from __future__ import annotations
 
+import csv
+
 import numpy as np
 import pytest
 
-from fulmar_bags.frame_codecs import compressed_depth, jpeg
-from fulmar_bags.frame_messages import COMPRESSED, IMAGE, packed
-from tests.frames import COLOUR, DEPTH, ENCODINGS, IDS, compressed, raw, scene, write_messages
-from tests.fulmar_cli.bag_commands import answer, ask
-
-COUNT = 20
-
-
-def packed_messages(count=COUNT, robot="/robot"):
-    """What a recorder keeps of a camera, by topic."""
-    found: dict[str, tuple[str, list[bytes]]] = {}
-    for number in range(count):
-        for name, pixels in scene(number).items():
-            for topic, data in packed(raw(pixels, ENCODINGS[name], 1.0 + 0.1 * number), f"{robot}/{name}"):
-                found.setdefault(topic, (COMPRESSED, []))[1].append(data)
-    return found
-
-
-def theirs():
-    """Topics of other programs: raw colours, depth to 10 m as image_transport packs it, and a raw pattern."""
-    pixels = [scene(number) for number in range(COUNT)]
-    depth = [compressed_depth(each[DEPTH], depth_max=10.0) for each in pixels]
-    return {
-        "/front/image_color": (
-            IMAGE,
-            [raw(each[COLOUR], "bgr8", 1.0 + 0.1 * i) for i, each in enumerate(pixels)],
-        ),
-        "/front/depth/compressedDepth": (
-            COMPRESSED,
-            [compressed(data, "32FC1; compressedDepth png", 1.0 + 0.1 * i) for i, data in enumerate(depth)],
-        ),
-        "/rear/image_raw": (IMAGE, [raw(each[COLOUR][:, :, 0], "bayer_rggb8") for each in pixels]),
-    }
+from fulmar_bags.contents import open_bag
+from fulmar_bags.decode import odometries
+from fulmar_bags.frame_codecs import jpeg, read_image
+from fulmar_bags.frame_messages import COMPRESSED, IMAGE
+from fulmar_core.robots.topics import ODOMETRY
+from tests.bags_with_frames import COUNT, packed_messages, theirs, with_images
+from tests.frames import COLOUR, DEPTH, IDS, compressed, raw, read_back, scene, write_messages
+from tests.fulmar_cli.bag_commands import LQR, answer, ask
 
 
 def frames_of(bag):
@@ -101,7 +78,8 @@ def test_bags_with_images_are_compared_by_their_bytes(tmp_path):
 def test_tables_name_the_images_that_they_leave_out(tmp_path, form):
     bag = write_messages(tmp_path / "bag", packed_messages(3))
     left_out = answer("export", bag, "--to", form, "--out", tmp_path / "out")["left_out"]
-    assert any(f"/robot/{COLOUR}/compressed: data" in line for line in left_out)
+    [line] = [line for line in left_out if line.startswith(f"/robot/{COLOUR}/compressed: data")]
+    assert line.endswith("Use --to frames.")
 
 
 def test_raw_images_of_one_size_are_arrays_in_numpy(tmp_path):
@@ -111,3 +89,55 @@ def test_raw_images_of_one_size_are_arrays_in_numpy(tmp_path):
     answer("export", bag, "--to", "npz", "--out", tmp_path / "out.npz")
     found = np.load(tmp_path / "out.npz")["it/data"].reshape(3, 48, 64, 3)
     np.testing.assert_array_equal(found[2], scene(2)[COLOUR])
+
+
+def rows_of(folder):
+    with (folder / "frames.csv").open() as stream:
+        return list(csv.DictReader(stream))
+
+
+def test_images_are_exported_as_files_with_the_time_and_the_place_of_each(tmp_path):
+    bag = with_images(open_bag(LQR), tmp_path / "bag", packed_messages(4, "/floating_platform"))
+    found = answer("export", bag, "--to", "frames", "--out", tmp_path / "out")
+    assert (found["files"], found["left_out"]) == ([str(tmp_path / "out" / "frames.csv")], [])
+    rows = rows_of(tmp_path / "out")
+    assert [row["camera"] for row in rows] == [
+        name for name in ("camera", "camera_depth", "camera_segmentation") for _ in range(4)
+    ]
+    seen = odometries(open_bag(bag).of(ODOMETRY))
+    for number, row in enumerate(rows[:4]):
+        assert int(row["stamp_ns"]) == 1_000_000_000 + number * 100_000_000
+        nearest = int(np.argmin(np.abs(seen.stamp_ns - int(row["stamp_ns"]))))
+        assert [float(row[key]) for key in ("x", "y", "qw")] == seen.pose[nearest, [0, 1, 6]].tolist()
+    files = {row["file"]: read_image((tmp_path / "out" / row["file"]).read_bytes()) for row in rows}
+    np.testing.assert_array_equal(files["camera_segmentation/000003.png"], scene(3)[IDS])
+    depth = scene(2)[DEPTH]
+    there = np.isfinite(depth)
+    whole = files["camera_depth/000002.png"]
+    np.testing.assert_array_equal(whole > 0, there)
+    np.testing.assert_allclose(whole[there], 1000.0 * depth[there], rtol=1e-3, atol=0.5)
+    jpeg_file = (tmp_path / "out" / "camera/000001.jpg").read_bytes()
+    message = open_bag(bag).topics[f"/floating_platform/{COLOUR}/compressed"].data[1]
+    assert jpeg_file == bytes(read_back(message).data)
+
+
+def test_images_of_others_are_exported_and_what_cannot_be_read_or_is_damaged_is_named(tmp_path):
+    messages = theirs()
+    images = [compressed(data, "jpeg") for data in (jpeg(scene()[COLOUR]), b"torn")]
+    messages["/left/compressed"] = (COMPRESSED, images)
+    bag = write_messages(tmp_path / "bag", messages)
+    left_out = answer("export", bag, "--to", "frames", "--out", tmp_path / "out")["left_out"]
+    assert "encoding 'bayer_rggb8'" in left_out[0]
+    assert left_out[1:] == ["/left/compressed: 1 images are damaged."]
+    rows = rows_of(tmp_path / "out")
+    assert {row["camera"] for row in rows} == {"front", "front_depth", "left"}
+    assert {row["x"] for row in rows} == {""}
+    np.testing.assert_array_equal(
+        read_image((tmp_path / "out/front/000005.png").read_bytes()), scene(5)[COLOUR][:, :, ::-1]
+    )
+
+
+def test_a_bag_without_images_has_none_to_export(tmp_path):
+    done = ask("export", LQR, "--to", "frames", "--out", tmp_path / "out")
+    assert "holds no image to export" in str(done.exception)
+    assert not (tmp_path / "out").exists()

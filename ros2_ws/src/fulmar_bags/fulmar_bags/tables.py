@@ -14,6 +14,7 @@ import numpy as np
 from fulmar_bags.column_store import ColumnStore
 from fulmar_bags.contents import Bag
 from fulmar_bags.decode import has_header, stamp_of, timed_messages
+from fulmar_bags.frame_messages import FRAME_TYPES
 from fulmar_bags.gathered import Topic
 from fulmar_core.config.errors import BagError
 
@@ -100,7 +101,8 @@ def _write_table(topic: Topic, path: Path, left_out: list[str]) -> Path:
         names, long = _columns_of(rows_of(topic))
         count = _filled(topic, path, names, long)
     if long:
-        left_out.append(f"{topic.name}: {', '.join(long)}: too long for a table. Use --to npz.")
+        better = "frames" if topic.type in FRAME_TYPES else "npz"
+        left_out.append(f"{topic.name}: {', '.join(long)}: too long for a table. Use --to {better}.")
     _note_unreadable(topic, count or 0, left_out)
     return path
 
@@ -157,7 +159,8 @@ def write_npz(bag: Bag, path: Path) -> tuple[Path, list[str]]:
                     store.add({"log_ns": log, "stamp_ns": stamp, **row})
                 _note_unreadable(topic, store.count, left_out)
                 uneven = store.write(archive, topic.name.strip("/"))
-                left_out += [f"{topic.name}: {column}: its length changes." for column in uneven]
+                better = " Use --to frames." if topic.type in FRAME_TYPES else ""
+                left_out += [f"{topic.name}: {column}: its length changes.{better}" for column in uneven]
     return path, left_out
 
 

@@ -12,7 +12,7 @@ from fulmar_cli.commands.bag_reading import with_bag_options
 from fulmar_cli.commands.damage import finish, open_and_warn
 from fulmar_core.config.errors import BagError, ConfigError, UnknownNameError
 
-FORMATS = ("csv", "npz", "lerobot")
+FORMATS = ("csv", "npz", "lerobot", "frames")
 
 
 @with_bag_options()
@@ -21,9 +21,10 @@ def export(
     to: Annotated[
         str,
         option(
-            "csv|npz|lerobot",
+            "csv|npz|lerobot|frames",
             "csv: a table for each topic. npz: NumPy arrays, one for each field. lerobot: a dataset, one episode "
-            "for each bag, one frame for each control step.",
+            "for each bag, one frame for each control step. frames: the images of cameras as JPEG and PNG, with a "
+            "table of when and where each was taken.",
             "--to",
         ),
     ] = "csv",
@@ -34,7 +35,7 @@ def export(
     *,
     reading: BagReading,
 ) -> None:
-    """Write what is in a bag as CSV, as NumPy arrays, or as a dataset to learn from.
+    """Write what is in a bag as CSV, as NumPy arrays, as images, or as a dataset to learn from.
 
     The dataset follows version 3.0 of LeRobot's format: `meta/info.json`, `meta/stats.json`, tasks, episodes and frames
     as parquet, with `observation.state` and `action` as the controller received and sent them. Images of cameras go
@@ -53,6 +54,11 @@ def export(
     elif to == "npz":
         path = out or beside / f"{beside.resolve().name}.npz"
         file, left_out = write_npz(opened[0], path.with_suffix(".npz"))
+        files = [file]
+    elif to == "frames":
+        from fulmar_bags.frame_files import write_frames
+
+        file, left_out = write_frames(opened[0], out or beside / "frames")
         files = [file]
     else:
         from fulmar_bags.control_steps import control_steps_of
