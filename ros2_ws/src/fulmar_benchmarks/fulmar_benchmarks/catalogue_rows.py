@@ -186,7 +186,9 @@ AVIST = Row(
     """Evaluate a cubesat at the tasks of RL-AVIST, by laws and by policies.
 
     Every controller at every task in MuJoCo (part `tasks`), and the policy that follows a moving pose through live
-    nodes in lock step, in at most 64 episodes (part `live`). A bundle that does not exist leaves its cells empty and
+    nodes in lock step, in at most 64 episodes (part `live`). Part `learners` teaches PPO, TD3, SAC and DreamerV3 (after
+    `make dreamer`) to follow a pose, each with as many samples and as much processor time; four hours as it is, and
+    asked for by name. A bundle that does not exist leaves its cells empty and
     says how to make it. The thesis, §6.2, prints no numbers; what its code sets stands in `published`. DIR keeps
     results for the same code, configuration and controller, so an interrupted benchmark continues where it stopped.
     DIR/index.html is the report, DIR/avist.json the figures.
@@ -194,6 +196,8 @@ AVIST = Row(
     Try:
 
     fulmar benchmark avist --parts tasks --tasks go_to_pose_3d --controllers lqr,pd --json
+
+    fulmar benchmark avist --parts learners --learners ppo,td3 --cpu-s 300 --samples 50000
     """,
     (
         Selector("robot", "NAME", "A body that floats free.", "cubesat_8"),
@@ -201,12 +205,21 @@ AVIST = Row(
                  family="task", known="fulmar_benchmarks.avist.targets:TASKS"),
         Selector("controllers", "K,...", "Out of lqr, pd and policy, or all.", "all",
                  family="controller", known="fulmar_benchmarks.avist.targets:CONTROLLERS"),
-        Selector("parts", "P,...", "Out of tasks and live, or all.", "all",
-                 family="part", known="fulmar_benchmarks.avist.targets:PARTS"),
+        Selector("parts", "P,...", "Out of tasks, live and learners; without learners by default.", None,
+                 family="part", known="fulmar_benchmarks.avist.targets:ALL_PARTS",
+                 usual="fulmar_benchmarks.avist.targets:PARTS"),
+        Selector("learners", "L,...", "Out of ppo, td3, sac and dreamer, or all.", "all",
+                 family="learner", known="fulmar_benchmarks.avist.learners:LEARNERS"),
+        Selector("seeds", "N", "Of each learner, from 1 on.", 2, int, 1),
+        Selector("samples", "N", "Control steps at which learners are compared.", 12_000, int, 1),
+        Selector("cpu_s", "S", "Processor time of each learner and seed.", 1800.0, float, 1.0),
         POLICIES,
         Selector("episodes", "N", "Of each controller at each task.", 256, int, 1),
     ),
-    needs=lambda choice: ("mujoco", *(("onnxruntime",) * ("policy" in choice.controllers))),
+    needs=lambda choice: (
+        "mujoco", *(("onnxruntime",) * ("policy" in choice.controllers)),
+        *(("torch", "stable_baselines3") * ("learners" in choice.parts)),
+    ),
     measures="evaluating",
 )  # fmt: skip
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
+from fulmar_benchmarks.avist import learners
 from fulmar_benchmarks.avist.targets import (
     CONTROLLERS,
     FOLLOW,
@@ -24,6 +25,9 @@ from fulmar_benchmarks.shape import Benchmark, Cell, Check, Figures, Found
 from fulmar_benchmarks.tables import Entry, Row, Shown, Table, display_name, number, tone_of
 from fulmar_benchmarks.unit import costs, said_of, where_of
 from policy_server.controllers import policies_directory
+
+if TYPE_CHECKING:
+    from fulmar_evaluation.report.page import Part
 
 HEADS = (
     "success",
@@ -98,8 +102,17 @@ class Avist(Benchmark):
         )  # fmt: skip
 
     def cells(self) -> list[Cell]:
-        """Trials."""
-        return list(self._trials.values())
+        """Trials, and learners."""
+        return [*self._trials.values(), *self._learners]
+
+    @functools.cached_property
+    def _learners(self) -> list[learners.LearnerCell]:
+        asked = self.choice
+        if "learners" not in asked.parts:
+            return []
+        return learners.cells_of(
+            asked.robot, FOLLOW, asked.learners, seeds=asked.seeds, samples=asked.samples, cpu_s=asked.cpu_s
+        )
 
     def document(self, found: Found) -> dict[str, Any]:
         """docs/evaluation.md names its keys."""
@@ -116,6 +129,7 @@ class Avist(Benchmark):
             "policies": {task: each["policy"] for task, each in tasks.items() if "policy" in each},
             "laws": {task: {by: each[by] for by in LAWS if by in each} for task, each in tasks.items()},
             "live": self._entry(found, FOLLOW, "policy", "ros") if "live" in asked.parts else None,
+            "learners": learners.document_of(self._learners, found) if self._learners else None,
         }
 
     def _entry(self, found: Found, task: str, by: str, way: str) -> dict[str, Any]:
@@ -138,12 +152,21 @@ class Avist(Benchmark):
         """A table of tasks, and what is required."""
         return [
             *shown(document, self.checks(document)),
+            *learners.tables_of(document["learners"] or {}, FOLLOW),
             document["published_note"],
             *self.check_lines(document),
         ]
 
+    def plots(self, document: Mapping[str, Any], found: Found) -> Sequence[Part]:
+        """Curves of learners."""
+        from fulmar_benchmarks.avist.learner_plots import plots_of
+
+        return plots_of(document["learners"] or {})
+
     def said(self, cell: Cell, figures: Figures) -> str:
         """Its success."""
+        if isinstance(cell, learners.LearnerCell):
+            return f"return {figures['points'][-1]['returns']:.0f}"
         return said_of(cell, figures, f"success {figures['succeeded'].mean():.3f}")
 
 

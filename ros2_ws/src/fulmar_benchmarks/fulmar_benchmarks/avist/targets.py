@@ -15,6 +15,7 @@ TASKS = ("go_to_position_3d", "go_to_pose_3d", "track_velocities_3d", FOLLOW)
 LAWS = ("lqr", "pd")
 CONTROLLERS = (*LAWS, "policy")
 PARTS = ("tasks", "live")
+ALL_PARTS = (*PARTS, "learners")  # learners take hours, and are asked for by name
 LIVE_EPISODES = 64
 
 PUBLISHED_NOTE = (
