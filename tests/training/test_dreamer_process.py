@@ -196,5 +196,7 @@ def test_a_request_is_the_same_after_it_was_sent():
     assert Request.from_json(sent.as_json()) == sent
 
 
-def test_the_process_is_asked_for_this_checkout_s_own_modules():
-    assert str(Path(train.__file__).parents[2]) in apart._environment()["PYTHONPATH"].split(":")
+def test_the_process_finds_this_checkout_s_modules_and_none_of_the_folder_it_stands_in():
+    variables = apart._environment()
+    assert str(Path(train.__file__).parents[2]) in variables["PYTHONPATH"].split(":")
+    assert variables["PYTHONSAFEPATH"] == "1"

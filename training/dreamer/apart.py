@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from fulmar_core.config.errors import ConfigError, FulmarError
+from fulmar_core.config.module_path import PYTHONPATH, SAFE
 from training.dreamer.request import Request
 
 ENVIRONMENT = ".venv-dreamer"
@@ -127,7 +128,7 @@ def _environment() -> dict[str, str]:
     modules = (importlib.import_module(name) for name in ("training", "fulmar_core"))
     folders = dict.fromkeys(str(Path(str(module.__file__)).resolve().parents[1]) for module in modules)
     threads = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "MKL", "OPENBLAS")}
-    return {**os.environ, **threads, "PYTHONPATH": os.pathsep.join(folders)}
+    return {**os.environ, **threads, **SAFE, PYTHONPATH: os.pathsep.join(folders)}
 
 
 def _last_words(log: Path) -> str:
