@@ -18,7 +18,7 @@ from fulmar_core.loop.policy_bundle import FORMAT, read_passport
 from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.tasks import load_task
-from fulmar_core.worlds.scenario import load_scenario
+from fulmar_core.worlds.scenario import Scenario, load_scenario
 from training.executors import Executor, Watch
 from training.fallback_policy import fallback_settings
 from training.jobs import Job, Outcome
@@ -73,10 +73,11 @@ def recipe(policy: ShippedPolicy, settings: TrainingSettings) -> str:
 
     Values at their default do not count, so that a new option keeps the recipes of policies without it.
     """
+    scenario = load_scenario(settings.scenario)
     ingredients = {
-        "robot": _as_trained(load_robot(policy.robot)),
+        "robot": _as_trained(load_robot(policy.robot), scenario),
         "task": _chosen(load_task(policy.task)),
-        "scenario": _chosen(load_scenario(settings.scenario)),
+        "scenario": _chosen(scenario),
         "settings": _chosen(settings),
         "policy": asdict(policy) | {"success": None},
         "format": FORMAT,
@@ -86,15 +87,15 @@ def recipe(policy: ShippedPolicy, settings: TrainingSettings) -> str:
     return hashlib.sha256(json.dumps(ingredients, sort_keys=True, default=str).encode()).hexdigest()[:16]
 
 
-def _as_trained(robot: Robot) -> Any:
-    """A robot as batches have it: on air, its supply full, and without sensors that no policy reads."""
+def _as_trained(robot: Robot, scenario: Scenario) -> Any:
+    """A robot as batches have it: on air, its supply full, and without what the scenario or a policy does not read."""
     tank = robot.actuators.tank
     # A tank that is a part of the body empties in batches too.
     actuators: Any = robot.actuators if tank is None or tank.weighs else replace(robot.actuators, tank=None)
     sensors = replace(robot.sensors, supply=None, fuel=None)
-    found = _chosen(
-        replace(robot, air_bearing=False, usual_controller="", actuators=actuators, sensors=sensors)
-    )
+    spans = robot.morphology if scenario.body == "morphology" else None
+    same = replace(robot, air_bearing=False, usual_controller="", morphology=spans)
+    found = _chosen(replace(same, actuators=actuators, sensors=sensors))
     del found["sensors"]["own"]
     return found
 

@@ -32,10 +32,18 @@ class FreeFlyer(FreeBody, Floater):
         return body
 
     def take_world(self, model: mujoco.MjModel, world: SpatialWorld) -> None:
-        """Take mass, inertia, centre of mass and constant torque."""
+        """Take mass, inertia, centre of mass, constant torque, and what thrusters make of a command."""
         self.set_inertia(model, tensor_of(world))
         model.body_mass[self._body], model.body_ipos[self._body] = world.mass, world.com
         self._torque = np.array(world.torque, dtype=float)
+        if world.effects is not None:
+            # Actuators take newtons of the robot's own thrusters, at whose places they push.
+            for gear, site, wrench, newtons in zip(
+                model.actuator_gear, model.actuator_trnid[:, 0], np.asarray(world.effects), self._actuators.full_thrust,
+                strict=False,
+            ):  # fmt: skip
+                force = wrench[:3] / newtons
+                gear[:] = *force, *(wrench[3:] / newtons - np.cross(model.site_pos[site], force))
 
     def drive(
         self,

@@ -37,6 +37,7 @@ from fulmar_core.states.rotation import Array, from_yaw, multiply
 from fulmar_core.states.spatial import SpatialState
 from fulmar_core.states.state import RigidBodyState, S
 from fulmar_core.worlds.scenario import Scenario, draw_world
+from fulmar_core.worlds.shaped_world import shaped
 from fulmar_core.worlds.spatial_world import (
     SpatialWorld,
     draw_spatial_world,
@@ -263,7 +264,8 @@ class SpatialDynamics(Dynamics[SpatialWorld, SpatialState]):
 
     def draw_world(self, scenario: Scenario, draws: Draws) -> SpatialWorld:
         """See `Dynamics.draw_world`."""
-        return draw_spatial_world(self.robot, scenario, draws)
+        world = draw_spatial_world(self.robot, scenario, draws)
+        return shaped(self.robot, world, draws) if scenario.body == "morphology" else world
 
     def blurs(self, world: SpatialWorld) -> bool:
         """See `Dynamics.blurs`."""
@@ -312,7 +314,7 @@ class SpatialDynamics(Dynamics[SpatialWorld, SpatialState]):
                 mass, turning = share * world.mass, inertia.scaled(share)
             if applied is not doing:
                 doing = applied
-                force, torque = actuators.spatial_wrench(applied, actuation.gain)
+                force, torque = world.pushed(actuators, applied, actuation.gain)
                 if steps.off_centre:
                     torque = minus(torque, cross(com, force))
                 torque = plus(torque, steady)

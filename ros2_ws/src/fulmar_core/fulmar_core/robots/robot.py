@@ -19,6 +19,7 @@ from fulmar_core.robots.airframe.airframe import Airframe
 from fulmar_core.robots.hydrodynamics import Hydrodynamics
 from fulmar_core.robots.kinds import kind_of
 from fulmar_core.robots.kinds.kind import Kind
+from fulmar_core.robots.morphology import Morphology
 from fulmar_core.robots.sensors.camera import PROFILES, CameraConfig
 from fulmar_core.robots.sensors.event_camera import EventCamera
 from fulmar_core.robots.sensors.imu import ImuSpec
@@ -249,6 +250,9 @@ class Robot:
     event_cameras: tuple[EventCamera, ...] = ()  # that look at the stars, at most two
     usual_controller: str = ""  # that drives it where none is asked for; empty: a shipped policy, else a law
     air_bearing: bool = False  # it floats on air that `air_bearing/enable` switches
+    morphology: Morphology | None = (
+        None  # how far bodies of its kind differ, of thrusters that open by degrees
+    )
 
     @functools.cached_property
     def kind(self) -> Kind:
@@ -338,6 +342,8 @@ class Robot:
             )
         if len(self.event_cameras) > 2:
             raise ValueError("'event_cameras' has more than two; a rate is estimated from one or two.")
+        if self.morphology is not None:
+            self.morphology.check_part_of(self.actuators)
         if self.air_bearing and not self.drifts:
             raise ValueError("'air_bearing' is for robots on the floor with thrusters or fans; leave it out.")
         if self.limits.yaw_rate >= self.sensors.imu.gyroscope_range:

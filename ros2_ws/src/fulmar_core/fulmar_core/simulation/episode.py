@@ -76,7 +76,15 @@ def draw_episodes(
 
     Returns:
         As many episodes.
+
+    Raises:
+        ConfigError: The robot cannot have this scenario.
     """
+    if scenario.body == "morphology" and robot.morphology is None:
+        raise ConfigError(
+            f"scenario '{scenario.title}' has 'body: morphology', and the file of '{robot.name}' has no 'morphology' "
+            "to draw bodies from. Add one, or take another scenario or robot."
+        )
     numbers = np.asarray(numbers)
     repeats = np.zeros_like(numbers) if repeats is None else repeats
     start, goal = task.draw(Draws(seed, numbers, repeats, START), robot, training=training)

@@ -50,7 +50,8 @@ class Scenario:
 
     title: str
     sensor_noise: bool  # whether sensors are as the robot's YAML says, or perfect
-    body: Literal["nominal", "uncertain"]  # uncertain: over the whole spans of the robot's `uncertainty`
+    # uncertain: over the whole spans of the robot's `uncertainty`; morphology: over those of its `morphology`.
+    body: Literal["nominal", "uncertain", "morphology"]
     push: Push = Push()
     wave: Wave = Wave()
     kick: Kick = Kick()

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.sensors.spatial_odometer import SENSED
@@ -74,6 +75,16 @@ class SpatialWorld(Drawn):
     supply_from: Array  # when it begins to fall [s]
     supply_over: Array  # how long it falls [s]
     tank_fill: Array  # pressure of the tank at the start, by that of the full one [-]
+
+    def pushed(self, actuators: Any, applied: Array, gain: Array) -> tuple[Vector, Vector]:
+        """Force and torque by the actuators; arguments and result as in `Pushing.spatial_wrench`."""
+        found: tuple[Vector, Vector] = actuators.spatial_wrench(applied, gain)
+        return found
+
+    @property
+    def effects(self) -> Array | None:
+        """Wrench of each thruster that is fully open, shape (n, 6, ...) [N, N·m]; None: as the robot's file says."""
+        return None
 
 
 def push_in_world(world: SpatialWorld, time_s: Array, control_dt: float) -> Vector:

@@ -23,6 +23,11 @@ class Drawn:
         init=False, repr=False, compare=False, default=None
     )
 
+    @property
+    def strength(self) -> Array | float:
+        """Factor on the thrust, and with it on the gas, of all actuators of each world's body, shape (...,) [-]."""
+        return 1.0
+
     @classmethod
     def names(cls) -> tuple[str, ...]:
         """Names of the fields, in the order of the constructor."""

@@ -28,6 +28,7 @@ class TankActuation(ActuationState):
         assert actuators.tank is not None
         self._actuators, self._tank = actuators, actuators.tank
         self._filled: Array = world.tank_fill
+        self._strength: Array | float = 1.0
         self._fallen: Array = array_namespace(self.applied).zeros_like(
             self.applied[0]
         )  # since the start [Pa]
@@ -58,13 +59,13 @@ class TankActuation(ActuationState):
     def begin(self, command: Array, world: World, noise: Array | None) -> None:
         """Take a new command; see `ActuationState.begin`."""
         super().begin(command, world, noise)
-        self._filled = world.tank_fill
+        self._filled, self._strength = world.tank_fill, world.strength
         self._share = self._tank.share(self.pressure)
         self.gain = self.gain * self._share
 
     def advance(self, dt: float, *, latest_s: float) -> Array:
         """Let time pass, and gas flow; see `ActuationState.advance`."""
         applied = super().advance(dt, latest_s=latest_s)
-        thrust = self._actuators.total_thrust(applied) * self._share
+        thrust = self._actuators.total_thrust(applied) * self._share * self._strength
         self._fallen = self._fallen + self._tank.fall(thrust) * dt
         return applied
