@@ -120,11 +120,13 @@ def expert_of(worlds: BatchVecEnv) -> Expert:
         law = Lqr(robot, task, replace(law.gains, observer=None), control_hz=robot.timing.control_hz)
     if worlds.choice is not None and isinstance(law, Lqr):
         return WrenchExpert(law, worlds.choice, worlds)
-    if isinstance(worlds.action_space, gymnasium.spaces.Box) and worlds.choice is None:
+    if isinstance(worlds.action_space, gymnasium.spaces.Box) and not (worlds.choice or worlds.bodies):
         return CommandExpert(law, worlds)
     raise ConfigError(
         f"'cloning_updates': no law can be cloned where a network opens single valves, as for '{robot.name}' at "
         f"'{task.name}'. Set 'action_space: wrench', or leave 'cloning_updates' out."
+        if worlds.bodies is None
+        else "'cloning_updates' and 'action_space: wrench' go together for on/off valves alone. Leave one of them out."
     )
 
 

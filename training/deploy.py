@@ -15,6 +15,7 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.vec_env import VecNormalize
 from torch import nn
 
+from training.bodies import KnownBodies
 from training.fallback_policy import FallbackPolicy
 from training.network import Decision, DeployedNetwork, NetworkPlan
 from training.vec_env import BatchVecEnv
@@ -55,7 +56,9 @@ def deployed_network(
     worlds = normaliser.unwrapped
     choice = worlds.choice if isinstance(worlds, BatchVecEnv) else None
     mirror = worlds.mirror if isinstance(worlds, BatchVecEnv) else None
-    trained = _trained(learner, wrench=choice is not None)
+    bodies = worlds.bodies if isinstance(worlds, BatchVecEnv) else None
+    wrench: Decision | None = "choose" if choice is not None else "allocate" if bodies is not None else None
+    trained = _trained(learner, wrench)
     plan = NetworkPlan(
         inputs=len(statistics.mean),
         hidden=tuple(layer.out_features for layer in trained.linear[:-1]),
@@ -71,6 +74,7 @@ def deployed_network(
         side=mirror.side if mirror else None,
         fallback=fallback.network.plan if fallback else None,
         losses=len(fallback.losses) if fallback else 0,
+        body=bodies is not None and worlds.takes_body,
     )
     with torch.random.fork_rng(devices=[]):  # must not change what the learner draws next
         network = DeployedNetwork(plan)
@@ -83,6 +87,8 @@ def deployed_network(
             twin.load_state_dict(layer.state_dict())
         if choice is not None:
             network.take_choice(choice)
+        if bodies is not None:
+            network.take_bodies(KnownBodies.of_robot(worlds.robot))
         if mirror is not None:
             network.take_mirror(mirror)
         if fallback is not None:
@@ -92,7 +98,7 @@ def deployed_network(
     return network
 
 
-def _trained(learner: BaseAlgorithm, *, wrench: bool) -> _Trained:
+def _trained(learner: BaseAlgorithm, wrench: Decision | None) -> _Trained:
     policy: Any = learner.policy
     if isinstance(learner, SAC):
         return _Trained([*policy.actor.latent_pi, policy.actor.mu], "squash")
@@ -102,9 +108,7 @@ def _trained(learner: BaseAlgorithm, *, wrench: bool) -> _Trained:
     layers = [*policy.mlp_extractor.policy_net, policy.action_net]
     on_off = isinstance(learner.action_space, spaces.MultiBinary)
     incremental = isinstance(learner.action_space, spaces.MultiDiscrete)
-    decision: Decision = (
-        "choose" if wrench else "threshold" if on_off else "increment" if incremental else "clamp"
-    )
+    decision = wrench or ("threshold" if on_off else "increment" if incremental else "clamp")
     return _Trained(layers, decision, getattr(policy, "lstm_actor", None))
 
 

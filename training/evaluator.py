@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from fulmar_core.config.seeds import EVALUATION_SEED, HELD_OUT_SEED
 from fulmar_core.loop.rollout import roll_out_in_backends, roll_out_in_batch
 from fulmar_core.robots.robot import Robot
@@ -14,7 +16,8 @@ from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.simulation.metrics import summary
 from fulmar_core.tasks import Task, load_task
 from fulmar_core.worlds.scenario import Scenario, load_scenario
-from training.network import NetworkController, load_network
+from training.bodies import KnownBodies
+from training.network import DeployedNetwork, NetworkController, load_network
 from training.policy_network import PolicyNetwork
 from training.run_folder import NETWORK_FILE, read_run_record, write_run_record
 
@@ -48,18 +51,41 @@ def held_out_evaluator(robot: Robot, task: Task, scenario: Scenario) -> Evaluato
     worlds = dict.fromkeys((scenario, load_scenario("nominal")))
 
     def evaluate(network: PolicyNetwork) -> tuple[float, float]:
-        controller = NetworkController(network, robot, task, robot.timing.control_hz)
-        figures = [
-            summary(
-                roll_out_in_batch(controller, robot, task, world, episodes=EPISODES, seed=HELD_OUT_SEED), task
-            )
-            for world in worlds
-        ]
+        figures = [evaluate_in_batch(network, robot, task, world, episodes=EPISODES) for world in worlds]
         success = _mean(figures, "success_rate")
         more = (weight * _mean(figures, name) for name, weight in _WEIGHTS.items() if name in figures[0])
         return success, success + sum(more)
 
     return evaluate
+
+
+def evaluate_in_batch(
+    network: PolicyNetwork,
+    robot: Robot,
+    task: Task,
+    scenario: Scenario,
+    *,
+    episodes: int,
+    seed: int = HELD_OUT_SEED,
+) -> dict[str, Any]:
+    """Figures of a network in the batch; one that asks for a wrench knows the body of each episode.
+
+    Args:
+        network: The network.
+        robot: The robot.
+        task: The task.
+        scenario: What episodes are drawn from.
+        episodes: Number of episodes, 1 to `WORLDS`.
+        seed: Of the episodes.
+    """
+    if isinstance(network, DeployedNetwork) and network.plan.decision == "allocate":
+        numbers = np.arange(episodes)
+        network = network.for_bodies(KnownBodies.of_episodes(robot, scenario, seed=seed, numbers=numbers))
+    controller = NetworkController(network, robot, task, robot.timing.control_hz)
+    figures: dict[str, Any] = summary(
+        roll_out_in_batch(controller, robot, task, scenario, episodes=episodes, seed=seed), task
+    )
+    return figures
 
 
 def _mean(figures: list[dict[str, Any]], name: str) -> float:

@@ -34,24 +34,31 @@ GOLDEN_STEPS = 5  # commands between the two moments that golden vectors are tak
 OPSET = 18
 
 
-def export(run: Path, out: Path) -> Passport:
+def export(run: Path, out: Path, other: str | None = None) -> Passport:
     """Write the bundle of a training run.
 
     Args:
         run: Run folder that `train` left.
         out: Folder of the bundle.
+        other: Robot that it is for, where the network asks for a wrench; the one it was trained on by default.
 
     Raises:
-        ConfigError: `run` is no run folder, or its robot or task has changed since.
+        ConfigError: `run` is no run folder, its robot or task has changed since, or it is not for the other robot.
     """
     record = read_run_record(run)
     robot, task = load_robot(record["robot"]), load_task(record["task"])
-    network, names = load_network(run / NETWORK_FILE), Observer(robot, task).names
-    plan = network.plan
+    network = load_network(run / NETWORK_FILE)
+    if other is not None and other != robot.name:
+        robot = load_robot(other)
+        task.check(robot)
+        network, record = network.for_robot(robot), record | {"trained_on": record["robot"]}
+        record["control_hz"] = robot.timing.control_hz
+        record.pop("mujoco", None)
+    names, plan = Observer(robot, task).names, network.plan
     names += disturbance_terms(robot) if plan.disturbances else ()
-    if plan.inputs != len(names):
+    if plan.observed != len(names):
         raise ConfigError(
-            f"{run}: the network takes {plan.inputs} terms, '{robot.name}' and '{task.name}' now have {len(names)}. "
+            f"{run}: the network takes {plan.observed} terms, '{robot.name}' and '{task.name}' now have {len(names)}. "
             "Train again."
         )
     if plan.on_off != robot.actuators.binary or len(plan.command_scale) != len(robot.actuators.names):
@@ -73,7 +80,11 @@ def export(run: Path, out: Path) -> Passport:
             key: record[key] for key in ("command", "seed", "steps", "wall_s", "settings", "best", "versions")
         }
         | {"git_revision": record.get("git_revision", ""), "interrupted": record.get("interrupted", False)}
-        | {key: record[key] for key in ("updates", "cpu_s", "recipe", "fallback_policy") if key in record}
+        | {
+            key: record[key]
+            for key in ("updates", "cpu_s", "trained_on", "recipe", "fallback_policy")
+            if key in record
+        }
         | {"curve": _curve(record)}
         | _mujoco_result(record),
     )
@@ -106,7 +117,7 @@ def _mujoco_result(record: dict[str, Any]) -> dict[str, Any]:
 
 def _to_onnx(network: PolicyNetwork) -> bytes:
     memory = network.plan.memory
-    example = [torch.zeros(2, network.plan.inputs), *([torch.zeros(2, memory)] if memory else [])]
+    example = [torch.zeros(2, network.plan.observed), *([torch.zeros(2, memory)] if memory else [])]
     worlds = torch.export.Dim("worlds")
     logging.getLogger("torch.onnx").setLevel(
         logging.ERROR

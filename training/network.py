@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import copy
 import itertools
 import pickle
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -16,15 +17,18 @@ from fulmar_core.config.errors import ConfigError
 from fulmar_core.controllers.controller import Inputs
 from fulmar_core.controllers.disturbance_inputs import ESTIMATOR, with_disturbances
 from fulmar_core.controllers.wrench_choice import WRENCH, WrenchChoice
+from fulmar_core.controllers.wrench_shares import BODY_TERMS, WrenchShares
+from fulmar_core.robots.actuators.pushing import WRENCH as BODY_WRENCH
 from fulmar_core.robots.robot import Robot
 from fulmar_core.simulation.symmetry import Mirror
 from fulmar_core.tasks import Task
 from fulmar_core.tasks.observation import Observer
+from training.bodies import KnownBodies
 from training.dreamer.network import DreamerNetwork, DreamerPlan
 from training.incremental_actions import KINDS, incremental_shares
 from training.policy_network import PolicyNetwork
 
-Decision = Literal["threshold", "clamp", "squash", "choose", "increment"]
+Decision = Literal["threshold", "clamp", "squash", "choose", "increment", "allocate"]
 
 
 @dataclass(frozen=True)
@@ -45,11 +49,17 @@ class NetworkPlan:
     side: int | None = None  # where this input is negative, input and output are mirrored
     fallback: NetworkPlan | None = None  # of the network that takes over where too many valves are dead
     losses: int = 0  # sets of dead valves of which one is enough for that
+    body: bool = False  # its last inputs are `BODY_TERMS`, constants of the robot that it holds itself
 
     @property
     def answers(self) -> int:
         """Number of shares of full command, or of terms of a wrench, that the outputs become."""
         return self.outputs // KINDS if self.decision == "increment" else self.outputs
+
+    @property
+    def observed(self) -> int:
+        """Number of observation terms that it is given."""
+        return self.inputs - BODY_TERMS if self.body else self.inputs
 
     @property
     def on_off(self) -> bool:
@@ -71,6 +81,10 @@ class DeployedNetwork(PolicyNetwork):
     mirror_seen: torch.Tensor
     mirror_done: torch.Tensor
     losses: torch.Tensor
+    allocation: torch.Tensor
+    resting: torch.Tensor
+    limits: torch.Tensor
+    body: torch.Tensor
 
     def __init__(self, plan: NetworkPlan) -> None:
         super().__init__()
@@ -89,6 +103,11 @@ class DeployedNetwork(PolicyNetwork):
             self.register_buffer("mirror_done", torch.eye(plan.answers))
         if plan.losses:
             self.register_buffer("losses", torch.ones(plan.losses, valves))
+        if plan.decision == "allocate":
+            self.register_buffer("allocation", torch.zeros(valves, BODY_WRENCH))
+            self.register_buffer("resting", torch.ones(valves))
+            self.register_buffer("limits", torch.ones(BODY_WRENCH))
+            self.register_buffer("body", torch.zeros(BODY_TERMS))
         self.fallback = DeployedNetwork(plan.fallback) if plan.fallback else None
         units = plan.memory // 2
         self.from_input = nn.Linear(plan.inputs, 4 * units) if units else None
@@ -114,6 +133,8 @@ class DeployedNetwork(PolicyNetwork):
             Commands in the actuators' units and the raw outputs behind them, both of shape (worlds, m), and the next
             memory if it has any.
         """
+        if self.plan.body:
+            observation = torch.cat((observation, self.body.expand(observation.shape[0], -1)), dim=1)
         seen = self._mirrored(observation, observation, "seen")
         features = torch.clamp((seen - self.mean) / self.scale, -self.plan.limit, self.plan.limit)
         if memory is None:
@@ -156,6 +177,45 @@ class DeployedNetwork(PolicyNetwork):
         self.choice_offset.copy_(torch.as_tensor(choice.offset))
         self.choice_cost.copy_(torch.as_tensor(choice.valve_costs))
 
+    def take_bodies(self, bodies: KnownBodies) -> None:
+        """Copy the allocation and the terms of a body."""
+        for mine, theirs in self._own_body(bodies).items():
+            getattr(self, mine).copy_(theirs)
+
+    def for_bodies(self, bodies: KnownBodies) -> DeployedNetwork:
+        """The same weights for bodies that differ from row to row of what is observed; it cannot be saved."""
+        twin = copy.copy(self)
+        twin._buffers = self._buffers | self._own_body(bodies)
+        return twin
+
+    def for_robot(self, robot: Robot) -> DeployedNetwork:
+        """The same weights for another robot.
+
+        Raises:
+            ConfigError: The network asks for no wrench, or none can be allocated to the robot's actuators.
+        """
+        if self.plan.decision != "allocate":
+            raise ConfigError(
+                f"the network gives commands of single actuators, not a wrench, so it is not for '{robot.name}'. Train "
+                "with 'action_space: wrench' and 'body_inputs: true'."
+            )
+        try:
+            bodies = KnownBodies.of_robot(robot)
+        except ValueError as error:
+            raise ConfigError(str(error)) from None
+        scale = tuple(map(float, robot.actuators.scale))
+        other = DeployedNetwork(replace(self.plan, command_scale=scale))
+        own = {name for name in self.state_dict() if name in (*self._own_body(bodies), "command_scale")}
+        other.load_state_dict({k: v for k, v in self.state_dict().items() if k not in own}, strict=False)
+        other.take_bodies(bodies)
+        return other
+
+    @staticmethod
+    def _own_body(bodies: KnownBodies) -> dict[str, torch.Tensor]:
+        shares = bodies.shares
+        parts = (shares.openings_per_wrench, shares.resting, shares.limits, torch.from_numpy(bodies.terms))
+        return dict(zip(("allocation", "resting", "limits", "body"), parts, strict=True))
+
     def take_fallback(self, fallback: DeployedNetwork, losses: np.ndarray) -> None:
         """Copy the policy that acts where all valves of a row of `losses` are dead (1), shape (k, valves)."""
         assert self.fallback is not None
@@ -178,7 +238,10 @@ class DeployedNetwork(PolicyNetwork):
         return torch.as_tensor(incremental_shares(actions, seen[:, -self.plan.answers :]))
 
     def _valve_margins(self, raw: torch.Tensor, observation: torch.Tensor) -> torch.Tensor:
-        """Margin for opening each valve, where the last layer gives a wrench; other outputs as they are."""
+        """Margin for opening each valve, or how far, where the last layer gives a wrench; other outputs as they are."""
+        if self.plan.decision == "allocate":
+            shares = WrenchShares(self.allocation, self.resting, self.limits)
+            return shares.openings(torch.clamp(raw, -1.0, 1.0))
         if self.plan.decision != "choose":
             return raw
         choice = WrenchChoice(

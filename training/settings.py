@@ -239,7 +239,10 @@ class TrainingSettings:
     stop_at_success: StopAtSuccess | None = None
     fallback_policy: FallbackPlan | None = None
     disturbance_inputs: bool = False  # pushes and dead valves are network inputs; for on/off valves
-    action_space: ActionSpace = "actuators"  # or a wrench, for which on/off valves are then chosen
+    action_space: ActionSpace = "actuators"  # or a wrench, for which actuators are then chosen
+    body_inputs: bool = (
+        False  # what the body can do is network inputs; with a wrench, for thrusters by degrees
+    )
     # The policy sees goals on the right mirrored to the left, or with `ends` goals behind mirrored to the front.
     mirror: Symmetry | None = None
     valve_cost: float = 1.0  # of an open valve in the choice for a wrench, as a multiple; less is more exact
@@ -274,6 +277,14 @@ class TrainingSettings:
             raise ValueError(
                 "'disturbance_inputs', 'action_space: wrench', 'mirror' and 'compiled' are not for dreamer, whose "
                 "worlds are Gymnasium's."
+            )
+        if wrench and isinstance(algorithm, OffPolicy):
+            raise ValueError(
+                f"'action_space: wrench' is for ppo and recurrent_ppo, not for {algorithm.kind}."
+            )
+        if self.body_inputs and (not wrench or self.disturbance_inputs):
+            raise ValueError(
+                "'body_inputs' need 'action_space: wrench', and go without 'disturbance_inputs'."
             )
         if isinstance(algorithm, OnPolicy) and (self.worlds * algorithm.steps) % algorithm.minibatch:
             raise ValueError(

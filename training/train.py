@@ -130,6 +130,7 @@ def train(
         seed=seed,
         reward_scale=settings.reward_scale,
         disturbance_inputs=settings.disturbance_inputs,
+        body_inputs=settings.body_inputs,
         action_space=settings.action_space,
         valve_cost=settings.valve_cost,
         mirror=settings.mirror,

@@ -10,9 +10,12 @@ import numpy as np
 import torch
 from stable_baselines3.common.vec_env import VecEnv
 
+from fulmar_core.config.errors import ConfigError
 from fulmar_core.controllers.controller import Inputs
 from fulmar_core.controllers.disturbance_inputs import disturbance_terms
 from fulmar_core.controllers.wrench_choice import WRENCH, WrenchChoice
+from fulmar_core.controllers.wrench_shares import BODY_TERMS
+from fulmar_core.robots.actuators.pushing import WRENCH as BODY_WRENCH
 from fulmar_core.robots.robot import Robot
 from fulmar_core.simulation.episode import episode_steps
 from fulmar_core.simulation.simulation import BatchSimulation
@@ -21,6 +24,7 @@ from fulmar_core.tasks import Task
 from fulmar_core.tasks.goal import goal_in_float64
 from fulmar_core.tasks.observation import shares
 from fulmar_core.worlds.scenario import Scenario
+from training.bodies import KnownBodies
 from training.compiled import step_of
 from training.disturbance_inputs import DisturbanceInputs
 from training.incremental_actions import KINDS, check_incremental, incremental_shares
@@ -52,6 +56,7 @@ class BatchVecEnv(VecEnv):
         training: bool = True,
         staggered: bool = True,
         disturbance_inputs: bool = False,
+        body_inputs: bool = False,
         action_space: ActionSpace = "actuators",
         valve_cost: float = 1.0,
         mirror: Symmetry | None = None,
@@ -71,7 +76,8 @@ class BatchVecEnv(VecEnv):
             staggered: First episodes have random lengths.
             disturbance_inputs: Observations include pushes and dead valves
                 (`fulmar_core.controllers.disturbance_inputs`).
-            action_space: "wrench": actions are shares of the strongest wrench, for which valves are chosen.
+            body_inputs: Observations include what each world's body can do (`training.bodies`).
+            action_space: "wrench": actions are shares of the strongest wrench, for which actuators are chosen.
             valve_cost: Of an open valve in that choice, as a multiple.
             mirror: Goals on the right are mirrored to the left, or those behind to the front
                 (`fulmar_core.simulation.symmetry`).
@@ -89,7 +95,10 @@ class BatchVecEnv(VecEnv):
         self._disturbances = (
             DisturbanceInputs(robot, worlds=worlds, seed=seed) if disturbance_inputs else None
         )
-        self.choice = WrenchChoice.of(robot, valve_cost) if action_space == "wrench" else None
+        wrench = action_space == "wrench"
+        self.choice = WrenchChoice.of(robot, valve_cost) if wrench and robot.actuators.binary else None
+        self.takes_body = body_inputs
+        self.bodies = _bodies_of(robot) if wrench and self.choice is None else None
         self.mirror = Mirror.of(robot, task, mirror) if mirror else None
         if action_hold:
             check_incremental(robot)
@@ -101,8 +110,10 @@ class BatchVecEnv(VecEnv):
         self._scale = np.asarray(robot.actuators.scale, dtype=np.float32)
         count = len(robot.actuators.names)
         names = self.simulation.observer.names
-        more = len(disturbance_terms(robot)) if disturbance_inputs else 0
+        more = len(disturbance_terms(robot)) if disturbance_inputs else BODY_TERMS * body_inputs
         actions = shares_space(WRENCH) if self.choice else actuator_space(robot)
+        if self.bodies:
+            actions = shares_space(BODY_WRENCH)
         if self.incremental:
             actions = gymnasium.spaces.MultiDiscrete([KINDS] * count)
         super().__init__(worlds, observation_space(len(names) + more), actions)
@@ -120,6 +131,11 @@ class BatchVecEnv(VecEnv):
             training=self._training,
         )
         self._observed_step = step_of(self.simulation, compiled=self._compiled)
+        self._look_at_bodies()
+
+    def _look_at_bodies(self) -> None:
+        if self.bodies:
+            self.bodies = KnownBodies.of_worlds(self.robot, self.simulation.world)
 
     @property
     def takes_disturbances(self) -> bool:
@@ -135,6 +151,7 @@ class BatchVecEnv(VecEnv):
     def set_state(self, state: dict[str, Any]) -> None:
         """Restore what `state` returned."""
         self.simulation.restore(state["simulation"])
+        self._look_at_bodies()
         self._age, self._mirrored = state["age"].copy(), state["mirrored"].copy()
         if self._disturbances:
             self._disturbances.set_state(state["disturbances"])
@@ -161,14 +178,25 @@ class BatchVecEnv(VecEnv):
     def begin_anew(self, worlds: Sequence[int] | np.ndarray) -> None:
         """Begin the next episode in some worlds."""
         self.simulation.reset(worlds)
+        if self.bodies and self.bodies.terms.ndim > 1:
+            some = np.asarray(worlds)
+            self.bodies.write(some, KnownBodies.of_worlds(self.robot, self.simulation.world, some))
         self._age[np.asarray(worlds)] = 0
         if self._disturbances:
             self._disturbances.reset(worlds)
 
     def _completed(self, observations: np.ndarray) -> np.ndarray:
+        return self._shown(self._with_own_terms(observations), np.arange(self.num_envs))
+
+    def _with_own_terms(self, observations: np.ndarray, worlds: Any = slice(None)) -> np.ndarray:
+        """Observations of some worlds, with what the settings add to those of the task."""
         if self._disturbances:
-            observations = np.hstack((observations, self._disturbances.inputs(self.simulation)))
-        return self._shown(observations, np.arange(self.num_envs))
+            return np.hstack((observations, self._disturbances.inputs(self.simulation)[worlds]))
+        if self.takes_body:
+            assert self.bodies is not None
+            terms = np.broadcast_to(self.bodies.terms, (self.num_envs, BODY_TERMS))
+            return np.hstack((observations, terms[worlds]))
+        return observations
 
     def _shown(self, observations: np.ndarray, worlds: np.ndarray) -> np.ndarray:
         """Observations, mirrored where the goal asks for it; remembers where."""
@@ -184,7 +212,10 @@ class BatchVecEnv(VecEnv):
         if self.incremental:
             actions = actions - 1.0
         actions = self.answered(actions)
-        self._actions = self._valves(self.choice, actions) if self.choice else actions
+        if self.bodies:
+            self._actions = self.bodies.shares.openings(torch.from_numpy(actions)).numpy()
+        else:
+            self._actions = self._valves(self.choice, actions) if self.choice else actions
 
     def answered(self, shares: np.ndarray) -> np.ndarray:
         """Shares of full command, mirrored where the last observation was; its own inverse."""
@@ -244,9 +275,7 @@ class BatchVecEnv(VecEnv):
 
     def _observed(self, worlds: np.ndarray) -> np.ndarray:
         observations = np.asarray(self.simulation.observe(worlds))
-        if self._disturbances:
-            observations = np.hstack((observations, self._disturbances.inputs(self.simulation)[worlds]))
-        return self._shown(observations, worlds)
+        return self._shown(self._with_own_terms(observations, worlds), worlds)
 
     def close(self) -> None:
         """Nothing to release."""
@@ -266,6 +295,18 @@ class BatchVecEnv(VecEnv):
     def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
         """Worlds are never wrapped one by one."""
         return [False for _ in self._get_indices(indices)]
+
+
+def _bodies_of(robot: Robot) -> KnownBodies:
+    """Of a robot whose network asks for a wrench.
+
+    Raises:
+        ConfigError: No wrench can be allocated to its actuators.
+    """
+    try:
+        return KnownBodies.of_robot(robot)
+    except ValueError as error:
+        raise ConfigError(f"'action_space: wrench': {error} Leave it out.") from None
 
 
 _EMPTY: dict[str, Any] = {}

@@ -9,6 +9,7 @@ import pytest
 import torch
 from stable_baselines3.common.vec_env import VecNormalize
 
+from fulmar_core.config.errors import ConfigError
 from fulmar_core.loop.control_loop import ControlLoop
 from fulmar_core.loop.policy_bundle import read_golden
 from fulmar_core.robots.robot_file import load_robot
@@ -140,7 +141,7 @@ def test_a_network_that_asks_for_wrenches_is_the_same_after_saving(learner, tmp_
 
 
 def test_a_robot_without_on_off_valves_cannot_be_asked_for_wrenches():
-    with pytest.raises(ValueError, match="no on/off valves"):
+    with pytest.raises(ConfigError, match="'turtlebot2' has differential_drive; this is for thrusters"):
         BatchVecEnv(
             load_robot("turtlebot2"),
             load_task("go_to_pose"),

@@ -20,6 +20,10 @@ def export(
     to: Annotated[
         str | None, option("FORMAT", "jsbsim: write an aircraft's model for JSBSim in place of a bundle.")
     ] = None,
+    robot: Annotated[
+        str | None,
+        option("NAME", "Another robot, for a network that asks for a wrench; its own by default."),
+    ] = None,
     force: Annotated[bool, flag("--force", "Replace the bundle that DIR holds.")] = False,
 ) -> None:
     """Write a policy bundle: network, golden vectors and passport; then load it as the robot will.
@@ -38,17 +42,17 @@ def export(
             raise UnknownNameError("format", to, (JSBSIM,))
         from sim_nodes.jsbsim_root import write_root
 
-        robot = load_robot(str(run))
+        craft = load_robot(str(run))
         write_line(
-            f"{write_root(robot, out)}: for JSBSim. Trim it and fly it: JSBSim --root={out} "
-            f"--script=scripts/{robot.name}.xml"
+            f"{write_root(craft, out)}: for JSBSim. Trim it and fly it: JSBSim --root={out} "
+            f"--script=scripts/{craft.name}.xml"
         )
         return
     from fulmar_core.tasks import load_task
     from policy_server.policy import Policy
     from training.export import export as write
 
-    passport = write(run, out)
+    passport = write(run, out, robot)
     Policy(out, load_robot(passport.robot), load_task(passport.task), control_hz=passport.control_hz)
     write_line(
         f"{out}: {passport.robot} · {passport.task} · {passport.control_hz:g} Hz · {passport.sha256[:12]}"
