@@ -39,6 +39,14 @@ def small():
     return replace(settings, algorithm=algorithm, worlds=16, evaluate_every_s=1e6)
 
 
+@pytest.fixture(scope="module", autouse=True)
+def no_evaluation():
+    """Episodes of a minute and a half take longer than all else here."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("training.train.held_out_evaluator", lambda *_: lambda network: (0.5, 0.5))
+        yield
+
+
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
     folder = tmp_path_factory.mktemp("run")
@@ -161,7 +169,7 @@ def test_off_policy_learners_ask_for_no_wrench():
 def test_a_wrench_of_valves_that_share_a_line_by_degrees_is_refused():
     robot = load_robot("floating_platform")
     shared = replace(robot, actuators=replace(robot.actuators, continuous=True))
-    with pytest.raises(ConfigError, match="'action_space: wrench': .* share no pressure line"):
+    with pytest.raises(ConfigError, match=r"'action_space: wrench': .* share no pressure line"):
         BatchVecEnv(
             shared, load_task("go_to_pose"), load_scenario("nominal"), worlds=1, seed=1, action_space="wrench"
         )
