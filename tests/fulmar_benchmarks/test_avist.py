@@ -13,10 +13,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fulmar_benchmarks.avist.campaign import Avist, updates_of
-from fulmar_benchmarks.avist.targets import LEAST_SUCCESS, of_live
+from fulmar_benchmarks.avist import generalists
+from fulmar_benchmarks.avist.campaign import Avist, inspection_of, updates_of
+from fulmar_benchmarks.avist.targets import LEAST_SUCCESS, of_inspection, of_live
 from fulmar_benchmarks.campaign import run
-from fulmar_benchmarks.catalogue import choice
+from fulmar_benchmarks.catalogue import choice, rows
 from fulmar_benchmarks.results import PairResult
 from fulmar_benchmarks.shape import HERE
 from fulmar_benchmarks.tables import Table
@@ -138,6 +139,131 @@ def test_updates_are_those_of_the_passport_or_follow_from_its_steps():
 def test_laws_and_policies_of_the_cubesat_have_the_limits_that_were_asked_for():
     assert LEAST_SUCCESS["go_to_pose_3d", "pd"] == LEAST_SUCCESS["go_to_pose_3d", "lqr"] == 0.99
     assert LEAST_SUCCESS["follow_pose_3d", "policy"] == 0.85
+
+
+def inspected(**more):
+    """Figures of a law on one path, in order unless said otherwise."""
+    good = {
+        "success_rate": 1.0, "path_error_m": {"mean": 0.005, "max": 0.01}, "pointing_error_deg": {"mean": 0.1},
+        "least_distance_m": 0.4, "coverage": None, "reason": None,
+    }  # fmt: skip
+    return good | more
+
+
+def test_the_worst_path_of_a_law_counts_and_a_policy_only_has_to_keep_out():
+    bad = inspected(path_error_m={"mean": 0.02, "max": 0.04})
+    near = inspected(least_distance_m=-0.1, path_error_m={"mean": 0.5, "max": 1.0})
+    found = {
+        "gateway": {"circle": {"pd": inspected(), "policy": near}, "line": {"pd": bad, "policy": inspected()}}
+    }
+    checks = {check.name: (check.measured, check.met) for check in of_inspection(found)}
+    assert checks == {
+        "inspect, pd: path_error_m, mean": (0.02, False), "inspect, pd: path_error_m, max": (0.04, True),
+        "inspect, pd: pointing_error_deg, mean": (0.1, True),
+        "inspect, pd: least distance from a keep-out volume [m]": (0.4, True),
+        "inspect, policy: least distance from a keep-out volume [m]": (-0.1, False),
+    }  # fmt: skip
+
+
+def test_a_path_that_was_not_flown_leaves_its_requirements_open():
+    found = {"iss": {"circle": {"lqr": inspected()}, "line": {"lqr": inspection_of("too fast")}}}
+    assert {check.met for check in of_inspection(found)} == {None}
+
+
+def test_a_round_is_asked_for_about_each_thing_along_each_path_for_as_long_as_it_takes():
+    given = {
+        "parts": "inspect",
+        "controllers": "pd",
+        "things": "gateway,iss",
+        "paths": "line,circle",
+        "rounds": 3,
+    }
+    cells = Avist(choice("avist", jobs=1, **given)).cells()
+    assert [cell.name for cell in cells] == [
+        "inspect_gateway_circle_pd", "inspect_gateway_line_pd", "inspect_iss_circle_pd", "inspect_iss_line_pd",
+    ]  # fmt: skip
+    trial = cells[0].trial
+    assert (trial.plan.thing, trial.plan.along, trial.episodes) == ("gateway", "circle", 3)
+    assert trial.task.thing == "gateway"
+    assert trial.plan.duration_s == trial.task.episode_of(trial.robot) > cells[1].trial.plan.duration_s
+
+
+def test_figures_of_rounds_are_means_and_the_worst_and_what_is_no_number_is_null():
+    nothing = np.zeros((2, 2))
+    figures = {
+        "path_error_m": np.array([0.01, 0.03]), "path_error_most_m": np.array([0.05, 0.02]),
+        "pointing_error_deg": np.array([1.0, 2.0]), "least_distance_m": np.array([0.3, 0.2]),
+        "coverage": np.array([np.nan, np.nan]),
+    }  # fmt: skip
+    found = inspection_of(PairResult({}, np.array([True, False]), figures, *([nothing] * 7)))
+    assert found == {
+        "success_rate": 0.5, "path_error_m": {"mean": 0.02, "max": 0.05}, "pointing_error_deg": {"mean": 1.5},
+        "least_distance_m": 0.2, "coverage": None, "episodes": 2, "reason": None,
+    }  # fmt: skip
+
+
+LEARNT = {"updates": 3, "cpu_s": 1.5, "steps": 9}
+
+
+def test_generalists_stand_beside_policies_of_the_same_path_or_body_alone(tmp_path):
+    cells = generalists.cells_of("cubesat_8", "gateway", ("circle", "line"), 3, tmp_path)
+    assert [cell.name for cell in cells] == [
+        "inspect_all_3", "inspect_circle_3", "inspect_line_3", "body_any_3", "body_nominal_3", "body_0_3", "body_1_3",
+    ]  # fmt: skip
+
+    def on(cell):
+        if isinstance(cell, generalists.PathsCell):
+            return {path: {"success_rate": 0.9 if cell.path else 0.8} for path in cell.paths}
+        return (
+            {"random": 0.7}
+            if cell.body == ""
+            else {"random": 0.6}
+            if cell.body == "nominal"
+            else {cell.body: 1.0}
+        )
+
+    found = {cell.name: LEARNT | {"on": on(cell)} for cell in cells}
+    document = generalists.document_of(cells, found)
+    assert document["paths"]["line"] == {
+        "generalist": {"success_rate": 0.8}, "single": {"success_rate": 0.9},
+    }  # fmt: skip
+    assert document["bodies"] == {
+        "random": {"generalist": 0.7, "single": 0.6}, "0": {"single": 1.0}, "1": {"single": 1.0},
+    }  # fmt: skip
+    assert document["learning"]["body_any_3"] == LEARNT
+    assert generalists.behind(document) == {"paths": pytest.approx(0.1), "bodies": pytest.approx(-0.1)}
+
+
+def test_a_run_that_failed_is_named_and_leaves_its_place_empty(tmp_path):
+    cells = generalists.cells_of("cubesat_8", "gateway", ("circle",), 3, tmp_path)[:2]
+    found = {
+        cells[0].name: "RunFailed: no",
+        cells[1].name: LEARNT | {"on": {"circle": {"success_rate": 1.0}}},
+    }
+    document = generalists.document_of(cells, found)
+    assert document["learning"]["inspect_all_3"] == {"error": "RunFailed: no"}
+    assert generalists.behind(document) == {"paths": None, "bodies": None}
+
+
+def test_single_policies_learn_with_one_path_or_body_and_generalists_with_all(tmp_path):
+    pytest.importorskip("torch")
+    cells = {
+        cell.name: cell
+        for cell in generalists.cells_of("cubesat_8", "gateway", ("circle", "line"), 3, tmp_path)
+    }
+    one, every = (cells[name].learned()[1].training_paths for name in ("inspect_line_3", "inspect_all_3"))
+    assert (one, every) == (("line",), ("circle", "line"))
+    own, other, any_body = (cells[f"body_{name}_3"].learned() for name in ("nominal", "0", "any"))
+    assert (own[2].scenario, own[2].body_inputs) == ("nominal", False)
+    assert (any_body[2].scenario, any_body[2].body_inputs) == ("morphologies", True)
+    assert own[0].body.mass == any_body[0].body.mass != other[0].body.mass
+    assert all(each[2].action_space == "wrench" for each in (own, other, any_body))
+
+
+def test_a_benchmark_without_learning_asks_for_no_torch():
+    needs = rows()["avist"].needs
+    assert "torch" not in needs(choice("avist", parts="tasks,inspect"))
+    assert "torch" in needs(choice("avist", parts="generalists"))
 
 
 if __name__ == "__main__":

@@ -34,7 +34,7 @@ def worlds_of(count=4, scenario=ANY, **more):
 
 
 def small():
-    settings = load_training_settings(ROBOT, TASK, "free_flyer_wrench")
+    settings = load_training_settings(ROBOT, TASK, "free_flyer_bodies")
     algorithm = replace(settings.algorithm, steps=8, minibatch=64, epochs=1, hidden=(16,))
     return replace(settings, algorithm=algorithm, worlds=16, evaluate_every_s=1e6)
 
@@ -136,16 +136,16 @@ def test_a_run_among_many_bodies_resumes_exactly(run, tmp_path):
         assert (mine == theirs).all()
 
 
-def test_an_evaluation_among_many_bodies_tells_the_network_each_of_them(run, monkeypatch):
-    told = []
+def test_an_evaluation_among_many_bodies_gives_the_network_each_of_them(run, monkeypatch):
+    given = []
     original = KnownBodies.of_episodes
     monkeypatch.setattr(
-        KnownBodies, "of_episodes", lambda *args, **more: told.append(original(*args, **more)) or told[-1]
+        KnownBodies, "of_episodes", lambda *args, **more: given.append(original(*args, **more)) or given[-1]
     )
     task = replace(TASK, episode_s=1.0)
     found = evaluate_in_batch(load_network(run / NETWORK_FILE), ROBOT, task, ANY, episodes=3, seed=3)
     assert found["episodes"] == 3
-    np.testing.assert_allclose(told[0].terms, worlds_of(3).bodies.terms, rtol=1e-5)
+    np.testing.assert_allclose(given[0].terms, worlds_of(3).bodies.terms, rtol=1e-5)
 
 
 @pytest.mark.parametrize(

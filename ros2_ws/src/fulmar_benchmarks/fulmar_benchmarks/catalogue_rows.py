@@ -185,17 +185,21 @@ AVIST = Row(
     "fulmar_benchmarks.avist.campaign:Avist",
     """Evaluate a cubesat at the tasks of RL-AVIST, by laws and by policies.
 
-    Every controller at every task in MuJoCo (part `tasks`), and the policy that follows a moving pose through live
-    nodes in lock step, in at most 64 episodes (part `live`). Part `learners` teaches PPO, TD3, SAC and DreamerV3 (after
-    `make dreamer`) to follow a pose, each with as many samples and as much processor time; four hours as it is, and
-    asked for by name. A bundle that does not exist leaves its cells empty and
-    says how to make it. The thesis, §6.2, prints no numbers; what its code sets stands in `published`. DIR keeps
-    results for the same code, configuration and controller, so an interrupted benchmark continues where it stopped.
-    DIR/index.html is the report, DIR/avist.json the figures.
+    Every controller at every task in MuJoCo (part `tasks`), the policy that follows a moving pose through live nodes
+    in lock step, in at most 64 episodes (`live`), and every controller one round along every path about every thing
+    (`inspect`). Two parts learn for hours, and are asked for by name: `learners` teaches PPO, TD3, SAC and DreamerV3
+    (after `make dreamer`) to follow a pose, each with as many samples and as much processor time; `generalists`
+    compares policies for all paths, or for bodies of any mass, size and layout of thrusters, with others that learn for
+    one, in as many updates each. A bundle that does not exist leaves its cells empty and says how to make it. The
+    thesis, §6.2, prints no numbers; what its code sets stands in `published`. DIR keeps results for the same code,
+    configuration and controller, so an interrupted benchmark continues where it stopped. DIR/index.html is the report,
+    DIR/avist.json the figures.
 
     Try:
 
     fulmar benchmark avist --parts tasks --tasks go_to_pose_3d --controllers lqr,pd --json
+
+    fulmar benchmark avist --parts inspect --things gateway --paths circle,spiral --rounds 2
 
     fulmar benchmark avist --parts learners --learners ppo,td3 --cpu-s 300 --samples 50000
     """,
@@ -205,8 +209,12 @@ AVIST = Row(
                  family="task", known="fulmar_benchmarks.avist.targets:TASKS"),
         Selector("controllers", "K,...", "Out of lqr, pd and policy, or all.", "all",
                  family="controller", known="fulmar_benchmarks.avist.targets:CONTROLLERS"),
-        Selector("parts", "P,...", "Out of tasks, live and learners; without learners by default.", None,
-                 family="part", known="fulmar_benchmarks.avist.targets:ALL_PARTS",
+        Selector("things", "T,...", "That are inspected; generalists learn about the first.", "all",
+                 family="thing", known="fulmar_benchmarks.avist.targets:THINGS"),
+        Selector("paths", "P,...", "That are followed about them.", "all",
+                 family="path", known="fulmar_benchmarks.avist.targets:PATHS"),
+        Selector("parts", "P,...", "Out of tasks, live, inspect, learners and generalists; the first three by default.",
+                 None, family="part", known="fulmar_benchmarks.avist.targets:ALL_PARTS",
                  usual="fulmar_benchmarks.avist.targets:PARTS"),
         Selector("learners", "L,...", "Out of ppo, td3, sac and dreamer, or all.", "all",
                  family="learner", known="fulmar_benchmarks.avist.learners:LEARNERS"),
@@ -215,9 +223,12 @@ AVIST = Row(
         Selector("cpu_s", "S", "Processor time of each learner and seed.", 1800.0, float, 1.0),
         POLICIES,
         Selector("episodes", "N", "Of each controller at each task.", 256, int, 1),
+        Selector("rounds", "N", "Flights of each controller along each path about each thing.", 20, int, 1),
+        Selector("updates", "N", "Of each policy that learns; one takes about a second.", 200, int, 1),
     ),
     needs=lambda choice: (
         "mujoco", *(("onnxruntime",) * ("policy" in choice.controllers)),
+        *(("torch",) * ("generalists" in choice.parts)),
         *(("torch", "stable_baselines3") * ("learners" in choice.parts)),
     ),
     measures="evaluating",

@@ -1,48 +1,41 @@
-"""Laws and policies of a cubesat at its tasks, through MuJoCo and through live nodes."""
+"""Laws and policies of a cubesat at its tasks and along paths about things, through MuJoCo and live nodes."""
 
 from __future__ import annotations
 
 import functools
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from fulmar_benchmarks.avist import learners
+import numpy as np
+
+from fulmar_benchmarks.avist import generalists, learners
+from fulmar_benchmarks.avist.tables import shown, tasks_of
 from fulmar_benchmarks.avist.targets import (
-    CONTROLLERS,
     FOLLOW,
+    INSPECT,
     LAWS,
     LIVE_EPISODES,
     PUBLISHED,
     PUBLISHED_NOTE,
+    of_inspection,
     of_live,
     of_tasks,
 )
 from fulmar_benchmarks.pairs import Pair, plan_of, with_law, with_policy
 from fulmar_benchmarks.rans3d.document import figures_of
 from fulmar_benchmarks.rans3d.unit import SpaceCell, SpaceTrial
-from fulmar_benchmarks.results import outcome_of
+from fulmar_benchmarks.results import Outcome, outcome_of
 from fulmar_benchmarks.shape import Benchmark, Cell, Check, Figures, Found
-from fulmar_benchmarks.tables import Entry, Row, Shown, Table, display_name, number, tone_of
+from fulmar_benchmarks.tables import Shown, display_name
 from fulmar_benchmarks.unit import costs, said_of, where_of
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.tasks import load_task
 from policy_server.controllers import policies_directory
 
 if TYPE_CHECKING:
     from fulmar_evaluation.report.page import Part
-
-HEADS = (
-    "success",
-    "distance [m]",
-    "attitude [°]",
-    "velocity [m/s]",
-    "turn rate [°/s]",
-    "duty",
-    "updates",
-    "cpu s",
-)
-SHOWN = (
-    ("success_rate", 3), ("position_error_m", 3), ("attitude_error_deg", 1), ("velocity_error_m_s", 3),
-    ("rate_error_deg_s", 1), ("duty", 2), ("updates", 0), ("cpu_s", 0),
-)  # fmt: skip
 
 
 class Avist(Benchmark):
@@ -62,6 +55,7 @@ class Avist(Benchmark):
         asked = self.choice
         wanted = [(task, by) for task in asked.tasks for by in asked.controllers if "tasks" in asked.parts]
         wanted += [(FOLLOW, "policy")] * ("live" in asked.parts)
+        wanted += [(INSPECT, by) for by in asked.controllers if "inspect" in asked.parts]
         return {place: self._pair(*place) for place in wanted}
 
     def _pair(self, task: str, controller: str) -> Pair:
@@ -85,7 +79,7 @@ class Avist(Benchmark):
             (*place, way): self._trial(pair, way, count)
             for place, pair in self.pairs.items()
             for way, count in ways.items()
-            if not pair.missing
+            if not pair.missing and pair.task != INSPECT
         }
         live = self.pairs.get((FOLLOW, "policy"))
         if "live" in asked.parts and live is not None and not live.missing:
@@ -101,9 +95,49 @@ class Avist(Benchmark):
             way=way, trial=trial, defines=pair.sha256, bounds=self.choice.out / "outcomes",
         )  # fmt: skip
 
+    @functools.cached_property
+    def _flights(self) -> dict[tuple[str, str, str], SpaceCell | str]:
+        """By thing, path and controller; a sentence where it is not flown."""
+        asked = self.choice
+        return {
+            (thing, path, by): self._flight(thing, path, self.pairs[INSPECT, by])
+            for thing in asked.things
+            for path in asked.paths
+            for by in asked.controllers
+            if "inspect" in asked.parts
+        }
+
+    def _flight(self, thing: str, path: str, pair: Pair) -> SpaceCell | str:
+        if pair.missing:
+            return pair.reason
+        robot, task = load_robot(pair.robot), load_task(INSPECT, thing).along(path)
+        try:
+            task.check(robot)
+        except ConfigError as error:
+            return str(error)
+        cell = self._trial(pair, "mujoco", self.choice.rounds)
+        plan = replace(cell.trial.plan, thing=thing, along=path, duration_s=task.episode_of(robot))
+        trial = replace(cell.trial, plan=plan)
+        place = INSPECT, thing, path, pair.controller
+        return replace(
+            cell,
+            name="_".join(place),
+            title=", ".join(map(display_name, place)),
+            cost=costs(trial),
+            trial=trial,
+        )
+
+    @functools.cached_property
+    def _learned(self) -> list[generalists.LearnedCell]:
+        asked = self.choice
+        if "generalists" not in asked.parts:
+            return []
+        return generalists.cells_of(asked.robot, asked.things[0], asked.paths, asked.updates, asked.out)
+
     def cells(self) -> list[Cell]:
-        """Trials, and learners."""
-        return [*self._trials.values(), *self._learners]
+        """Trials, flights, learners, and policies of one body or path."""
+        flights = [each for each in self._flights.values() if not isinstance(each, str)]
+        return [*self._trials.values(), *flights, *self._learners, *self._learned]
 
     @functools.cached_property
     def _learners(self) -> list[learners.LearnerCell]:
@@ -118,7 +152,7 @@ class Avist(Benchmark):
         """docs/evaluation.md names its keys."""
         asked = self.choice
         tasks: dict[str, dict[str, Any]] = {}
-        for task, by in self.pairs if "tasks" in asked.parts else ():
+        for task, by in [place for place in self.pairs if place[0] in asked.tasks]:
             tasks.setdefault(task, {})[by] = self._entry(found, task, by, "mujoco")
         return {
             "robot": asked.robot,
@@ -129,8 +163,18 @@ class Avist(Benchmark):
             "policies": {task: each["policy"] for task, each in tasks.items() if "policy" in each},
             "laws": {task: {by: each[by] for by in LAWS if by in each} for task, each in tasks.items()},
             "live": self._entry(found, FOLLOW, "policy", "ros") if "live" in asked.parts else None,
+            "inspect": self._inspections(found),
             "learners": learners.document_of(self._learners, found) if self._learners else None,
+            "generalists": generalists.document_of(self._learned, found) if self._learned else None,
         }
+
+    def _inspections(self, found: Found) -> dict[str, dict[str, dict[str, Any]]]:
+        """Figures by thing, path and controller."""
+        every: dict[str, dict[str, dict[str, Any]]] = {}
+        for (thing, path, by), cell in self._flights.items():
+            outcome = cell if isinstance(cell, str) else outcome_of(found[cell.name])
+            every.setdefault(thing, {}).setdefault(path, {})[by] = inspection_of(outcome)
+        return every
 
     def _entry(self, found: Found, task: str, by: str, way: str) -> dict[str, Any]:
         """Success, errors, and how a policy was made; null where it could not be evaluated, with the reason."""
@@ -146,10 +190,11 @@ class Avist(Benchmark):
     def checks(self, document: Mapping[str, Any]) -> list[Check]:
         """Success."""
         tasks = tasks_of(document)
-        return [*of_tasks(tasks), *of_live(document["live"], tasks.get(FOLLOW, {}).get("policy"))]
+        live = of_live(document["live"], tasks.get(FOLLOW, {}).get("policy"))
+        return [*of_tasks(tasks), *live, *of_inspection(document["inspect"])]
 
     def tables(self, document: Mapping[str, Any]) -> list[Shown]:
-        """A table of tasks, and what is required."""
+        """Tables of tasks, inspections, generalists and learners, and what is required."""
         return [
             *shown(document, self.checks(document)),
             *learners.tables_of(document["learners"] or {}, FOLLOW),
@@ -167,6 +212,8 @@ class Avist(Benchmark):
         """Its success."""
         if isinstance(cell, learners.LearnerCell):
             return f"return {figures['points'][-1]['returns']:.0f}"
+        if not isinstance(cell, SpaceCell):
+            return f"learned in {figures['cpu_s']:.0f} s of processor time"
         return said_of(cell, figures, f"success {figures['succeeded'].mean():.3f}")
 
 
@@ -179,32 +226,24 @@ def updates_of(training: Mapping[str, Any]) -> int | None:
     return round(training["steps"] / each) if each else None
 
 
-def tasks_of(document: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    """Figures by task and controller."""
-    policies = document["policies"]
-    return {
-        task: each | ({"policy": policies[task]} if task in policies else {})
-        for task, each in document["laws"].items()
-    }
-
-
-def shown(document: Mapping[str, Any], checks: list[Check]) -> list[Shown]:
-    """One row for each controller at each task, and why some could not be evaluated."""
-    met = {check.name: check.met for check in checks}
-    places = [
-        (task, by, each[by]) for task, each in tasks_of(document).items() for by in CONTROLLERS if by in each
-    ]
-    places += [(f"{FOLLOW}, live", "policy", document["live"])] if document["live"] else []
-    rows = [
-        Row(
-            (
-                Entry(display_name(task)),
-                Entry(by),
-                Entry(number(each["success_rate"], 3), tone_of(met.get(f"{task}, {by}: success"))),
-                *(Entry(number(each.get(key), digits)) for key, digits in SHOWN[1:]),
-            )
+def inspection_of(outcome: Outcome) -> dict[str, Any]:
+    """Figures of some rounds about a thing; null where there is none, with the reason."""
+    if isinstance(outcome, str):
+        empty = dict.fromkeys(
+            ("success_rate", "path_error_m", "pointing_error_deg", "least_distance_m", "coverage")
         )
-        for task, by, each in places
-    ]
-    missing = [f"{display_name(task)}, {by}: {each['reason']}" for task, by, each in places if each["reason"]]
-    return [Table(display_name(document["robot"]), ("", "", *HEADS), rows, words=2), *missing]
+        return {**empty, "episodes": 0, "reason": outcome}
+    its = outcome.figures
+    seen = its.get("coverage")
+    return {
+        "success_rate": float(outcome.succeeded.mean()),
+        "path_error_m": {
+            "mean": float(its["path_error_m"].mean()),
+            "max": float(its["path_error_most_m"].max()),
+        },
+        "pointing_error_deg": {"mean": float(its["pointing_error_deg"].mean())},
+        "least_distance_m": float(its["least_distance_m"].min()),
+        "coverage": float(seen.mean()) if seen is not None and np.isfinite(seen).all() else None,
+        "episodes": len(outcome.succeeded),
+        "reason": None,
+    }

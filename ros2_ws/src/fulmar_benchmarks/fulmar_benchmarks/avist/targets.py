@@ -14,8 +14,11 @@ FOLLOW = "follow_pose_3d"
 TASKS = ("go_to_position_3d", "go_to_pose_3d", "track_velocities_3d", FOLLOW)
 LAWS = ("lqr", "pd")
 CONTROLLERS = (*LAWS, "policy")
-PARTS = ("tasks", "live")
-ALL_PARTS = (*PARTS, "learners")  # learners take hours, and are asked for by name
+INSPECT = "inspect"
+THINGS = ("gateway", "iss", "venus_express")
+PATHS = ("circle", "spiral", "capsule", "rectangle", "lemniscate", "lissajous", "line")
+PARTS = ("tasks", "live", "inspect")
+ALL_PARTS = (*PARTS, "learners", "generalists")  # the last two learn for hours, and are asked for by name
 LIVE_EPISODES = 64
 
 PUBLISHED_NOTE = (
@@ -40,6 +43,32 @@ LEAST_SUCCESS = {
     (FOLLOW, "policy"): 0.85,
 }
 MOST_FROM_BATCH = 0.03  # success through live nodes, beside MuJoCo
+MOST_PATH_ERROR_M, MOST_OFF_PATH_M, MOST_POINTING_DEG = 0.01, 0.05, 0.5  # mean, largest; mean; of laws
+
+
+def of_inspection(found: dict[str, dict[str, dict[str, Any]]]) -> list[Check]:
+    """The worst of each law over things and paths; nobody may enter a keep-out volume."""
+    checks = []
+    for by in CONTROLLERS:
+        flown = [each[by] for paths in found.values() for each in paths.values() if by in each]
+        if not flown:
+            continue
+        limits = {
+            ("path_error_m", "mean"): MOST_PATH_ERROR_M,
+            ("path_error_m", "max"): MOST_OFF_PATH_M,
+            ("pointing_error_deg", "mean"): MOST_POINTING_DEG,
+        }
+        for (key, inner), limit in limits.items() if by in LAWS else ():
+            checks.append(Check.most(f"inspect, {by}: {key}, {inner}", _worst(flown, key, inner), limit))
+        least = [one["least_distance_m"] for one in flown]
+        away = None if None in least else min(least)
+        checks.append(Check.least(f"inspect, {by}: least distance from a keep-out volume [m]", away, 0.0))
+    return checks
+
+
+def _worst(flown: list[dict[str, Any]], key: str, inner: str) -> float | None:
+    values = [(one[key] or {}).get(inner) for one in flown]
+    return None if None in values else max(values)
 
 
 def of_tasks(found: dict[str, dict[str, Any]]) -> list[Check]:

@@ -12,7 +12,7 @@ _RANS_FEW = (
 _FALCON = "--tasks hold,a,d --controllers lqi,lqr --scenarios exact,calm --episodes 2 --no-report"
 _AVIST_FEW = "--parts tasks --tasks go_to_pose_3d --controllers lqr,pd --episodes 4 --no-report"
 OPTIONS = {  # smoke, quick; full: no options
-    "avist": (_AVIST_FEW, "--parts tasks --episodes 64"),
+    "avist": (_AVIST_FEW, "--parts tasks,inspect --episodes 64 --rounds 4"),
     "descent": (_LIVE, "--flights 16 --real-time 1"),
     "drift": ("--through batch --episodes 16 --no-report", "--through batch"),
     "endurance": ("--seconds 20 --rate 5", "--seconds 600 --rate 10"),
