@@ -135,7 +135,7 @@ class BodiesCell(LearnedCell):
         return robot, task, settings
 
     def found(self, network: Any) -> Figures:
-        """Success on the robot's own body, on random ones of learning, on others, and on those with policies of theirs."""
+        """Success on the robot's own body, on random ones of learning and others, and on those with their own policies."""
         from training.evaluator import evaluate_in_batch
 
         task, nominal, shaped = load_task(BODIES_TASK), load_scenario(NOMINAL), load_scenario(ANY_BODY)
@@ -209,7 +209,7 @@ def document_of(cells: list[LearnedCell], found: Found) -> dict[str, Any]:
 
 
 def behind(document: Mapping[str, Any]) -> dict[str, float | None]:
-    """How much less often the generalist succeeds than policies of one path or body: the worst of either."""
+    """How much less often the generalist succeeds than policies of one path or body, the worst of these."""
     found: dict[str, float | None] = {}
     for kind, places in (("paths", document["paths"]), ("bodies", document["bodies"])):
         pairs = [
