@@ -20,7 +20,7 @@ from fulmar_core.safety.actuator_guard import BRIDGED_S, ActuatorGuard
 from fulmar_core.safety.watchdog import Watchdog
 from fulmar_core.states.planar import PlanarState
 from fulmar_evaluation.identification.model import nominal_world
-from tests.new_robots import robots_of_every_family
+from tests.new_robots import new_robot, robots_of_every_family
 from tests.spaces import pushes_within_its_plane
 
 ROBOTS = robots_of_every_family()
@@ -92,12 +92,27 @@ def test_a_person_drives_it_ahead_and_round(robot):
     assert turning.yaw_rate > 0.02
 
 
-def test_a_body_in_space_whose_actuators_push_out_of_its_plane_is_not_driven():
-    others = {name: robot for name, robot in PUSHED.items() if name not in DRIVEN}
-    assert set(others) == {"int_ball2"}
-    for robot in others.values():
+@pytest.mark.parametrize("name", ["int_ball2", "cubesat_8"])
+def test_a_body_whose_actuators_push_out_of_its_plane_is_driven_by_all_of_them_within_it(name):
+    robot = PUSHED[name]
+    assert name not in DRIVEN
+    drive = hand_mapping(robot)
+    assert not drive(Wish()).any()
+    for wish in (Wish(ahead=1.0), Wish(left=-1.0), Wish(turn=0.7), Wish(ahead=-0.5, turn=0.3)):
+        force, torque = (part / most for part, most in zip(
+            robot.actuators.wrench_in_body(drive(wish)),
+            (robot.performance.force, robot.performance.torque), strict=True,
+        ))  # fmt: skip
+        np.testing.assert_allclose([force[2], *torque[:2]], 0.0, atol=1e-3)
+        got, asked = np.array([force[0], force[1], torque[2]]), np.array(wish.parts)
+        assert got @ asked > 0.9 * np.linalg.norm(got) * np.linalg.norm(asked)
+        assert np.linalg.norm(got) > 0.4 * np.linalg.norm(asked)
+
+
+def test_a_body_in_space_that_its_actuators_do_not_turn_about_every_axis_is_not_driven():
+    for name in ("placeholder_ball", "cubesat_8_srb_layout"):
         with pytest.raises(ConfigError, match=r"its actuators push out of it\. Send it goals: fulmar goals"):
-            hand_mapping(robot)
+            hand_mapping(new_robot(name))
 
 
 def test_a_satellite_is_not_driven_by_hand():

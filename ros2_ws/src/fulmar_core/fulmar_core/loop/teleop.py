@@ -17,6 +17,7 @@ from fulmar_core.states.spatial import SpatialState
 
 OUT_OF_PLANE = [2, 3, 4]  # z, roll and pitch of a wrench
 VALVE_COST = 0.02  # of an open valve, where a full wish has a cost of 1: small wishes open nothing
+STAYS_IN_PLANE = 1e4  # cost of a force or torque out of the plane, by that of one within it
 KEY_HOLDS_NS = 600_000_000  # a key that is held repeats within this time, also after its first, longer wait
 JOY_LASTS_NS = 300_000_000  # a gamepad that is silent for longer is gone
 MOST_AXES = 64  # a gamepad with more is none
@@ -77,27 +78,50 @@ def hand_mapping(robot: Robot) -> Callable[[Wish], np.ndarray]:
 def _allocated(robot: Robot) -> Callable[[Wish], np.ndarray]:
     """Commands that bring up the wrench a person asks for, in shares of the robot's own."""
     assert isinstance(robot.actuators, Pushing)  # no other family leaves it to an allocation
-    full = np.array([robot.performance.force, robot.performance.force, robot.performance.torque])
+    force, torque = robot.performance.force, robot.performance.torque
+    full, alive = np.array([force, force, torque]), None
+    if robot.state_type is SpatialState:
+        alive = _in_plane(robot)
+        if alive is None:
+            return _allocated_in_space(robot.actuators, np.array([force] * 3 + [torque] * 3))
     allocation = allocation_of(robot.actuators, weight=np.diag(1.0 / full**2), cost=VALVE_COST)
-    alive = _in_plane(robot) if robot.state_type is SpatialState else None
     return lambda wish: np.asarray(allocation.best(full * np.array(wish.parts), alive))
 
 
-def _in_plane(robot: Robot) -> np.ndarray:
+def _in_plane(robot: Robot) -> np.ndarray | None:
     """1 for actuators that push a robot within the plane of its x and y axes, 0 for the others, shape (n,).
 
-    Raises:
-        ValueError: They do not push to every side and about z.
+    None where these do not push to every side and about z.
     """
     assert isinstance(robot.actuators, Pushing)
     wrenches = robot.actuators.wrench_per_newton
     inside = np.abs(wrenches[:, OUT_OF_PLANE]).max(axis=1) < 1e-9
     if np.linalg.matrix_rank(wrenches[np.ix_(inside, PLANAR)]) < len(PLANAR):
+        return None
+    return np.asarray(inside, dtype=float)
+
+
+def _allocated_in_space(actuators: Pushing, full: np.ndarray) -> Callable[[Wish], np.ndarray]:
+    """Commands of actuators that push out of the plane one by one, and within it together; `full` has shape (6,).
+
+    Raises:
+        ValueError: They only open and close, or do not push and turn about every axis.
+    """
+    if actuators.binary or np.linalg.matrix_rank(actuators.wrench_per_newton) < len(full):
         raise ValueError(
             "keys and sticks drive in the plane of its x and y axes, and its actuators push out of it. Send it goals: "
             "fulmar goals."
         )
-    return np.asarray(inside, dtype=float)
+    asked = np.isin(np.arange(len(full)), PLANAR)
+    weight = np.diag(np.where(asked, 1.0, STAYS_IN_PLANE) / full**2)
+    allocation = allocation_of(actuators, weight=weight, cost=VALVE_COST)
+
+    def command(wish: Wish) -> np.ndarray:
+        wrench = np.zeros(len(full))
+        wrench[PLANAR] = full[PLANAR] * np.array(wish.parts)
+        return np.asarray(allocation.best(wrench))
+
+    return command
 
 
 class Keyboard:
