@@ -69,7 +69,7 @@ class Policy:
         check_fit(self.passport, robot, task, self.control_hz, where=str(folder))
         self._observer = Observer(robot, task)
         self.estimator = ESTIMATOR if takes_disturbances(self.passport.observation_names, robot) else None
-        self.readings: tuple[str, ...] = ()
+        self.readings: tuple[str, ...] = self._observer.readings
         self.observer: StateObserver[Any] | None = None
         self._session = _open(bundle)
         self._memory: np.ndarray | None = None
