@@ -311,7 +311,7 @@ class NetworkController:
         self.control_hz = control_hz
         self._memory: np.ndarray | None = None
         self.estimator = ESTIMATOR if network.plan.disturbances else None
-        self.readings: tuple[str, ...] = ()
+        self.readings: tuple[str, ...] = self._observer.readings
         self.observer = None
 
     def reset(self) -> None:

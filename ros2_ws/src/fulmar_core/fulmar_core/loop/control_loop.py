@@ -12,6 +12,7 @@ from fulmar_core.dynamics.by_kind import begin_of
 from fulmar_core.estimators.actuator_health.actuator_estimator import ActuatorEstimate, ActuatorEstimator
 from fulmar_core.estimators.actuator_health.applied import Applied, AppliedHistory
 from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.sensors.fuel import NAME as FUEL
 from fulmar_core.safety.command_gate import command_problem
 from fulmar_core.safety.keep_out import KeepOutGuard
 from fulmar_core.states.state import State
@@ -80,6 +81,7 @@ class ControlLoop:
         self.estimate: ActuatorEstimate | None = None
         self._estimated_ns = -1
         self._controller = controller
+        self._fuel: np.ndarray | None = None  # share of the tank by the newest reading, shape (n,)
 
     @property
     def controller(self) -> Controller:
@@ -131,7 +133,9 @@ class ControlLoop:
             self.previous = begin_of(self.robot).command(self.robot, state)
         goal = self._advanced(state, stamp_ns)
         self._estimate(state, stamp_ns)
-        observation = np.asarray(self.observer(state, goal, self.previous), dtype=float)
+        if self.observer.sees_fuel and FUEL in readings:
+            self._fuel = readings[FUEL][:, 1]
+        observation = np.asarray(self.observer(state, goal, self.previous, self._fuel), dtype=float)
         return Inputs(
             state,
             goal,

@@ -124,10 +124,12 @@ class BatchSimulation(MutableState, Generic[S]):
 
     def observe(self, worlds: np.ndarray | None = None) -> Array:
         """Observations of some worlds, all by default, shape (worlds, n)."""
+        fuel = self._actuation.fuel_share if self.observer.sees_fuel else None
         if worlds is None:
-            return self.observer(self.measured, self.goal, self.command)
+            return self.observer(self.measured, self.goal, self.command, fuel)
         index = self._whole(worlds)
-        return self.observer(self.measured[index], self.goal[index], self.command[index])
+        left = None if fuel is None else fuel[index]
+        return self.observer(self.measured[index], self.goal[index], self.command[index], left)
 
     def reset(self, worlds: Sequence[int] | np.ndarray | range) -> None:
         """Begin a new episode in the worlds of these numbers."""

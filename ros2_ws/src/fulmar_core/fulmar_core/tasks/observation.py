@@ -6,18 +6,22 @@ import numpy as np
 from array_api_compat import device
 
 from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.sensors.fuel import NAME as FUEL
 from fulmar_core.states.arrays import array_namespace, clip, is_numpy, is_single
 from fulmar_core.states.rotation import Array
 from fulmar_core.states.state import State
 from fulmar_core.tasks import Task
 from fulmar_core.tasks.goal import Goal
 
+FUEL_TERM = "fuel_share"
+
 
 class Observer:
-    """A task's terms, and the robot's own where its actuators take time to follow.
+    """A task's terms, and the robot's own where its actuators take time to follow, or its fuel is observed.
 
     Attributes:
         names: Of the terms, in order.
+        readings: Sensors that it needs beside the state, see `Controller.readings`.
     """
 
     def __init__(self, robot: Robot, task: Task) -> None:
@@ -25,22 +29,31 @@ class Observer:
         self._remembers = robot.actuators.remembers
         self._scale = robot.actuators.scale
         own = tuple(f"previous_{name}" for name in robot.actuators.names) if self._remembers else ()
-        self.names: tuple[str, ...] = (*task.observation_names, *own)
+        gauge = robot.sensors.specs.get(FUEL)
+        self.sees_fuel = gauge is not None and gauge.observed
+        self.readings = (FUEL,) if self.sees_fuel else ()
+        self.names: tuple[str, ...] = (
+            *task.observation_names,
+            *own,
+            *([FUEL_TERM] if self.sees_fuel else []),
+        )
 
-    def __call__(self, state: State, goal: Goal, previous_command: Array) -> Array:
+    def __call__(self, state: State, goal: Goal, previous_command: Array, fuel: Array | None = None) -> Array:
         """Observe.
 
         Args:
             state: Measured state, shapes (...,).
             goal: Goal of the same leading shape.
             previous_command: What was last commanded, after every limit, shape (..., m).
+            fuel: Share of the full tank that is left, shape (...,); None: it is full, as before the first reading.
 
         Returns:
             Terms in the order of `names`, shape (..., n).
         """
         if self._task.observes_numbers and is_single(state.like):
-            own = shares(previous_command, self._scale)[0].tolist() if self._remembers else ()
-            return np.array([[*self._task.observe(state.in_numbers(), goal), *own]])
+            own = shares(previous_command, self._scale)[0].tolist() if self._remembers else []
+            left = [1.0 if fuel is None else float(fuel[0])] if self.sees_fuel else []
+            return np.array([[*self._task.observe(state.in_numbers(), goal), *own, *left]])
         terms = self._task.observe(state, goal)
         like = state.columns()[0]
         xp = array_namespace(like)
@@ -54,6 +67,9 @@ class Observer:
         if self._remembers:
             share = shares(previous_command, self._scale)
             columns += [share[..., i] for i in range(share.shape[-1])]
+        if self.sees_fuel:
+            left = xp.ones_like(like) if fuel is None else xp.asarray(fuel, dtype=like.dtype, device=place)
+            columns.append(xp.broadcast_to(left, shape))
         # Stacked in front and turned about: each column is written in one piece.
         stacked = xp.stack(columns, axis=0)
         return stacked.T if len(shape) == 1 else xp.moveaxis(stacked, 0, -1)

@@ -86,6 +86,11 @@ class ActuationState(MutableState):
         return None
 
     @property
+    def fuel_share(self) -> Array | None:
+        """What is left of a full tank, shape (worlds,) [-]; None where none ever empties."""
+        return None
+
+    @property
     def readings(self) -> dict[str, np.ndarray]:
         """What sensors measure of it without errors, worlds first; see `Inputs.readings`."""
         return {}

@@ -45,6 +45,11 @@ class TankActuation(ActuationState):
         return self._tank.gone(self.pressure) if self._tank.weighs else None
 
     @property
+    def fuel_share(self) -> Array | None:
+        """By the pressure of an ideal gas; see `ActuationState.fuel_share`."""
+        return self.pressure / self._tank.pressure
+
+    @property
     def readings(self) -> dict[str, np.ndarray]:
         """Pressure and content of the tanks; see `ActuationState.readings`."""
         pressure = np.asarray(self.pressure, dtype=float)

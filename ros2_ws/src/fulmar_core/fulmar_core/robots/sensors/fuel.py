@@ -25,6 +25,8 @@ MORE = 1.5  # that a gauge can report, by what is in the full tank [-]
 class FuelSpec(JointSpec):
     """What the gauge reports, and when; masses in kg."""
 
+    observed: bool = False  # what policies observe ends with the share that is left
+
 
 @dataclass(frozen=True, slots=True)
 class Fuel:
