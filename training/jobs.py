@@ -14,7 +14,7 @@ from fulmar_core.robots.calibration import calibration_path
 from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.tasks import Task, load_task
-from training.dreamer.train import train_dreamer
+from training.dreamer_training import train_dreamer
 from training.fallback_policy import FallbackPolicy, fallback_settings, load_fallback
 from training.progress import Watcher, progress_file
 from training.run_folder import (
@@ -111,20 +111,12 @@ def learn(job: Job, watcher: Watcher) -> dict[str, Any]:
 def _train(
     job: Job, robot: Robot, task: Task, watcher: Watcher, fallback: FallbackPolicy | None = None
 ) -> dict[str, Any]:
+    made_by = {"command": job.command, "git_revision": job.git_revision}
+    shared: dict[str, Any] = {**_limits(job), **made_by, "watcher": watcher}
     if isinstance(job.settings.algorithm, Dreamer):
-        return train_dreamer(job, robot, task, watcher)
-    return train(
-        robot,
-        task,
-        job.settings,
-        **_limits(job),
-        resume=(job.out / CHECKPOINT_FILE).is_file(),
-        command=job.command,
-        git_revision=job.git_revision,
-        fallback=fallback,
-        watcher=watcher,
-        curves=_curves(job),
-    )
+        return train_dreamer(robot, task, job.settings, **shared)
+    resume = (job.out / CHECKPOINT_FILE).is_file()
+    return train(robot, task, job.settings, **shared, resume=resume, fallback=fallback, curves=_curves(job))
 
 
 def _limits(job: Job) -> dict[str, Any]:

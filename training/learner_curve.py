@@ -11,6 +11,7 @@ import numpy as np
 
 from fulmar_core.config.seeds import HELD_OUT_SEED
 from fulmar_core.controllers.controller import Controller, Inputs, StateObserver
+from fulmar_core.estimators.actuator_health.filters import HealthSettings
 from fulmar_core.loop.control_loop import ControlLoop
 from fulmar_core.loop.rollout import roll_out_in_batch
 from fulmar_core.robots.robot import Robot
@@ -119,7 +120,7 @@ class ClosedValves:
     """Commands nothing: what a learner that has learned nothing may still be worth."""
 
     name = "closed_valves"
-    estimator = None
+    estimator: HealthSettings | None = None
     observer: StateObserver[Any] | None = None
     readings: tuple[str, ...] = ()
 

@@ -17,8 +17,8 @@ from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.tasks import Task, load_task
 from fulmar_core.worlds.scenario import load_scenario
 from training.deploy import deployed_network
-from training.dreamer.apart import Learner, dreamer_python
-from training.dreamer.request import Request
+from training.dreamer_process import Learner, dreamer_python
+from training.dreamer_request import Request
 from training.learner_curve import Budget, Curve
 from training.learners import begin_near, build_learner, callbacks_of, first_action
 from training.run_folder import SETTINGS_FILE

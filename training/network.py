@@ -24,7 +24,7 @@ from fulmar_core.simulation.symmetry import Mirror
 from fulmar_core.tasks import Task
 from fulmar_core.tasks.observation import Observer
 from training.bodies import KnownBodies
-from training.dreamer.network import DreamerNetwork, DreamerPlan
+from training.dreamer_network import DreamerNetwork, DreamerPlan
 from training.incremental_actions import KINDS, incremental_shares
 from training.policy_network import PolicyNetwork
 

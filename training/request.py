@@ -12,7 +12,7 @@ from fulmar_core.config.provenance import git_revision
 from fulmar_core.robots.robot_file import load_robot, use_calibration
 from fulmar_core.simulation.counts import check_count, check_episodes
 from fulmar_core.tasks import load_task
-from training.dreamer.apart import dreamer_python
+from training.dreamer_process import dreamer_python
 from training.executors import Executor, LocalExecutor
 from training.jobs import Job
 from training.ray_executor import RayExecutor

@@ -12,7 +12,7 @@ from packaging.utils import canonicalize_name
 from packaging.version import Version
 
 from fulmar_cli.installation.installed_as import EXTRAS_OF_SETUP
-from training.dreamer.apart import SHEEPRL
+from training.dreamer_process import SHEEPRL
 
 RUN_LOCK, DEV_LOCK, PEERS_LOCK = "requirements.lock", "requirements-dev.lock", "requirements-peers.lock"
 DREAMER_LOCK = "requirements-dreamer.lock"

@@ -67,7 +67,7 @@ def test_a_table_for_each_budget_says_who_has_not_learned(found):
     assert [each[1] for each in last] == ["learned", "not learned"]
 
 
-def test_the_curves_are_a_small_picture(found):
+def test_the_curves_are_a_small_plot(found):
     with house_style():
         (plot,) = plots_of(document_of(CELLS, found))
         assert 5_000 < len(as_png(plot.figure)) < 500_000

@@ -16,7 +16,7 @@ from fulmar_core.tasks import load_task
 from policy_server.policy import Policy
 from tests.peers.environment import DREAMER, run_peer
 from tests.training.dreamer_runs import small_plan
-from training.dreamer.network import DreamerNetwork
+from training.dreamer_network import DreamerNetwork
 from training.export import export
 from training.jobs import Job, run_job
 from training.settings import Dreamer, load_training_settings

@@ -10,7 +10,7 @@ import torch
 from fulmar_core.robots.robot import Robot
 from fulmar_core.tasks import Task
 from fulmar_core.tasks.observation import Observer
-from training.dreamer.network import DreamerNetwork, DreamerPlan
+from training.dreamer_network import DreamerNetwork, DreamerPlan
 from training.network import save_network
 from training.run_folder import NETWORK_FILE, RUN_FILE
 

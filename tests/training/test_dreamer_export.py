@@ -17,7 +17,7 @@ from fulmar_core.tasks.goal import goal_in_float64
 from fulmar_core.worlds.scenario import load_scenario
 from policy_server.policy import Policy
 from tests.training.dreamer_runs import drawn_network, small_plan, write_run
-from training.dreamer.network import CLEAR, DreamerNetwork
+from training.dreamer_network import CLEAR, DreamerNetwork
 from training.export import export
 from training.network import NetworkController, load_network
 from training.run_folder import NETWORK_FILE

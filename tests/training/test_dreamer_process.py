@@ -15,10 +15,10 @@ from fulmar_core.config.errors import ConfigError
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.tasks import load_task
 from tests.training.dreamer_runs import drawn_network
-from training.dreamer import apart, train
-from training.dreamer.apart import DreamerError, Learner, dreamer_python
-from training.dreamer.learn import load_checkpoint
-from training.dreamer.request import Request
+from training import dreamer_process, dreamer_training
+from training.dreamer_learning import load_checkpoint
+from training.dreamer_process import DreamerError, Learner, dreamer_python
+from training.dreamer_request import Request
 from training.jobs import Job, run_job
 from training.learner_curve import Budget
 from training.network import save_network
@@ -34,7 +34,7 @@ EVALUATED = {"kind": "evaluated", "elapsed_s": 1.0, "success": 0.25}
 
 
 def interpreter(folder: Path, *, sheeprl: str = "0.8.4", says: str = "", code: int = 0) -> Path:
-    """A Python of `.venv-dreamer` that does what it is told to."""
+    """A Python of `.venv-dreamer` that does what is asked for here."""
     python = folder / ".venv-dreamer" / "bin" / "python"
     python.parent.mkdir(parents=True, exist_ok=True)
     python.write_text(
@@ -54,7 +54,7 @@ def says(*reports: dict) -> str:
 def away_from_the_checkout(tmp_path, monkeypatch):
     """The environment of this checkout, if there is one, is not looked at."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(apart, "CHECKOUT", tmp_path)
+    monkeypatch.setattr(dreamer_process, "CHECKOUT", tmp_path)
 
 
 @pytest.fixture
@@ -66,7 +66,7 @@ def job(tmp_path):
     return Job("mine", "turtlebot2", "go_to_position", 3, settings, run, updates=3, command="fulmar train")
 
 
-class Heard:
+class Seen:
     """A watcher that remembers."""
 
     def __init__(self) -> None:
@@ -96,12 +96,12 @@ def request(**changes) -> TrainingRequest:
 
 def test_a_training_leaves_the_record_that_every_other_leaves(job, tmp_path):
     interpreter(tmp_path, says=says(ADVANCE, EVALUATED, DONE))
-    heard = Heard()
-    record = run_job(job, heard)
+    seen = Seen()
+    record = run_job(job, seen)
     assert record == read_run_record(job.out)
     assert (record["steps"], record["updates"], record["seed"]) == (80, 3, 3)
     assert record["settings"]["algorithm"]["kind"] == "dreamer"
-    assert heard.said == [("begin",), ("advance", 0.5, 1.0, 40), ("evaluated", 1.0, 0.25), ("end",)]
+    assert seen.said == [("begin",), ("advance", 0.5, 1.0, 40), ("evaluated", 1.0, 0.25), ("end",)]
     asked = Request.from_json((tmp_path / "asked.json").read_text())
     assert (asked.robot, asked.seed, asked.updates, asked.resume) == ("turtlebot2", 3, 3, False)
     assert read_start(job.out)["updates"] == 3
@@ -110,14 +110,14 @@ def test_a_training_leaves_the_record_that_every_other_leaves(job, tmp_path):
 def test_a_run_with_a_checkpoint_goes_on(job, tmp_path):
     (job.out / CHECKPOINT_FILE).write_bytes(b"content")
     interpreter(tmp_path, says=says(DONE))
-    run_job(job, Heard())
+    run_job(job, Seen())
     assert Request.from_json((tmp_path / "asked.json").read_text()).resume
 
 
 def test_an_interrupted_training_is_finished_and_says_so(job, tmp_path):
     interpreter(tmp_path, says=says({**DONE, "interrupted": True}))
     with pytest.raises(KeyboardInterrupt):
-        run_job(job, Heard())
+        run_job(job, Seen())
     assert read_run_record(job.out)["interrupted"]
 
 
@@ -151,13 +151,13 @@ def test_another_version_of_sheeprl_is_refused(tmp_path, sheeprl, words):
 def test_what_fails_gives_the_last_words_of_its_log(job, tmp_path):
     interpreter(tmp_path, says="echo 'RuntimeError: no more memory' >&2", code=1)
     with pytest.raises(DreamerError, match=r"failed: RuntimeError: no more memory\. See .*dreamer\.log"):
-        run_job(job, Heard())
+        run_job(job, Seen())
 
 
 def test_what_the_process_refuses_is_the_user_s_mistake(job, tmp_path):
     interpreter(tmp_path, says=says({"kind": "refused", "error": "checkpoint.pkl: is none."}), code=2)
     with pytest.raises(ConfigError, match="is none"):
-        run_job(job, Heard())
+        run_job(job, Seen())
 
 
 @pytest.mark.parametrize(
@@ -197,6 +197,6 @@ def test_a_request_is_the_same_after_it_was_sent():
 
 
 def test_the_process_finds_this_checkout_s_modules_and_none_of_the_folder_it_stands_in():
-    variables = apart._environment()
-    assert str(Path(train.__file__).parents[2]) in variables["PYTHONPATH"].split(":")
+    variables = dreamer_process._environment()
+    assert str(Path(dreamer_training.__file__).parents[1]) in variables["PYTHONPATH"].split(":")
     assert variables["PYTHONSAFEPATH"] == "1"

@@ -17,6 +17,7 @@ from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.states.counter_rng import WORLD, Draws
 from fulmar_core.tasks import Task, load_task
+from fulmar_core.tasks.inspect import Inspect
 from fulmar_core.worlds.scenario import load_scenario
 from fulmar_core.worlds.shaped_world import BRANCH, draw_bodies, robot_with
 
@@ -99,7 +100,8 @@ class PathsCell(LearnedCell):
         from training.settings import load_training_settings
 
         robot, task = load_robot(self.robot), load_task("inspect", self.thing)
-        task = replace(task, training_paths=(self.path,) if self.path else self.paths)  # type: ignore[call-arg]
+        assert isinstance(task, Inspect)
+        task = replace(task, training_paths=(self.path,) if self.path else self.paths)
         return robot, task, load_training_settings(robot, task)
 
     def found(self, network: Any) -> Figures:
@@ -135,7 +137,7 @@ class BodiesCell(LearnedCell):
         return robot, task, settings
 
     def found(self, network: Any) -> Figures:
-        """Success on the robot's own body, on random ones of learning and others, and on those with their own policies."""
+        """Success on the robot's own body, on those of learning, on others, and on those with policies of their own."""
         from training.evaluator import evaluate_in_batch
 
         task, nominal, shaped = load_task(BODIES_TASK), load_scenario(NOMINAL), load_scenario(ANY_BODY)

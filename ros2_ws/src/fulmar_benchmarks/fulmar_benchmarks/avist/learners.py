@@ -28,7 +28,7 @@ BUDGETS = {"equal_cpu_time": "equal processor time", "equal_samples": "equal sam
 class LearnerCell(Cell):
     """One learner with one seed, or closed valves."""
 
-    modules: ClassVar[tuple[str, ...]] = ("training.learner_runs", "training.dreamer.learn")
+    modules: ClassVar[tuple[str, ...]] = ("training.learner_runs", "training.dreamer_learning")
     robot: str
     task: str
     learner: str
@@ -68,7 +68,13 @@ def cells_of(
     robot: str, task: str, learners: Iterable[str], *, seeds: int, samples: int, cpu_s: float
 ) -> list[LearnerCell]:
     """Closed valves, and each learner with each seed from 1 on."""
-    shared = {"robot": robot, "task": task, "samples": samples, "cpu_s": cpu_s, "way": "training"}
+    shared: dict[str, Any] = {
+        "robot": robot,
+        "task": task,
+        "samples": samples,
+        "cpu_s": cpu_s,
+        "way": "training",
+    }
     closed = LearnerCell(name=f"{task}_{CLOSED}", learner=CLOSED, seed=0, **shared)
     return [closed] + [
         LearnerCell(

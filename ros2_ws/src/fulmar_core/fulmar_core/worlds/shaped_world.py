@@ -130,7 +130,8 @@ def can_be_flown(bodies: Bodies) -> np.ndarray:
     sizes = np.linalg.svd(effect, compute_uv=False)
     together = effect.sum(axis=-1)[..., None]
     resting = 1.0 - (np.linalg.pinv(effect) @ together)[..., 0]
-    return (sizes[:, -1] > LEAST_RATIO * sizes[:, 0]) & (resting.min(axis=-1) > LEAST_RESTING)
+    strong, balanced = sizes[:, -1] > LEAST_RATIO * sizes[:, 0], resting.min(axis=-1) > LEAST_RESTING
+    return np.asarray(strong & balanced)
 
 
 def shaped(robot: Robot, world: SpatialWorld, draws: Draws) -> ShapedWorld:
@@ -144,14 +145,22 @@ def shaped(robot: Robot, world: SpatialWorld, draws: Draws) -> ShapedWorld:
     bodies = draw_bodies(robot, draws.branch(BRANCH))
     effect = np.swapaxes(bodies.effect, -1, -2).reshape(draws.worlds, -1).T
     plain = replace(world, mass=bodies.mass, inertia=bodies.inertia.T)
-    return ShapedWorld(*plain.parts(), effect, bodies.thrust / robot.actuated_by(Thrusters).thrust)
+    strength = bodies.thrust / robot.actuated_by(Thrusters).thrust
+    return ShapedWorld(
+        **{name: getattr(plain, name) for name in plain.names()}, effect=effect, thrust=strength
+    )
+
+
+def _three(row: np.ndarray) -> tuple[float, float, float]:
+    x, y, z = map(float, row)
+    return x, y, z
 
 
 def robot_with(robot: Robot, bodies: Bodies, row: int) -> Robot:
     """The robot with one of these bodies, as its own file could say."""
     valves, mass, can = robot.actuated_by(Thrusters), float(bodies.mass[row]), robot.performance
     nozzles = tuple(
-        replace(nozzle, position=tuple(map(float, place)), direction=tuple(map(float, way)))
+        replace(nozzle, position=_three(place), direction=_three(way))
         for nozzle, place, way in zip(
             valves.nozzles, bodies.positions[row], bodies.directions[row], strict=True
         )

@@ -35,6 +35,11 @@ class DreamerPlan:
     disturbances: bool = False
 
     @property
+    def observed(self) -> int:
+        """Number of observation terms that it is given."""
+        return self.inputs
+
+    @property
     def discrete(self) -> int:
         """Numbers of the discrete state, ones and zeros."""
         return self.groups * self.classes

@@ -4,24 +4,35 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 from fulmar_core.robots.calibration import calibration_path
 from fulmar_core.robots.robot import Robot
 from fulmar_core.safety.geofence import check_starts
 from fulmar_core.tasks import Task
-from training.dreamer.apart import Learner, dreamer_python
-from training.dreamer.request import Request
+from training.dreamer_process import Learner, dreamer_python
+from training.dreamer_request import Request
+from training.progress import Watcher
 from training.run_folder import CHECKPOINT_FILE, SETTINGS_FILE, write_run_record
 from training.session import polite_interrupt
+from training.settings import TrainingSettings
 from training.train import begin_run
 
-if TYPE_CHECKING:
-    from training.jobs import Job
-    from training.progress import Watcher
 
-
-def train_dreamer(job: Job, robot: Robot, task: Task, watcher: Watcher) -> dict[str, Any]:
+def train_dreamer(
+    robot: Robot,
+    task: Task,
+    settings: TrainingSettings,
+    *,
+    seed: int,
+    out: Path,
+    time_limit_s: float | None,
+    updates: int | None,
+    command: str,
+    git_revision: str,
+    watcher: Watcher,
+) -> dict[str, Any]:
     """Learn as `training.train.train` does, in a process of `.venv-dreamer`.
 
     Returns:
@@ -35,18 +46,18 @@ def train_dreamer(job: Job, robot: Robot, task: Task, watcher: Watcher) -> dict[
     python = dreamer_python()
     check_starts(robot, task)
     check_starts(robot, task, training=True)
-    limit = job.time_limit_s
-    if limit is None and job.updates is None:
-        limit = job.settings.time_limit_s
-    begin_run(robot, task, job.settings, seed=job.seed, out=job.out, time_limit_s=limit, updates=job.updates)
+    limit = time_limit_s
+    if limit is None and updates is None:
+        limit = settings.time_limit_s
+    begin_run(robot, task, settings, seed=seed, out=out, time_limit_s=limit, updates=updates)
     calibration = calibration_path()
     request = Request(
-        robot.name, task.name, job.seed, str((job.out / SETTINGS_FILE).absolute()), str(job.out.absolute()),
-        time_limit_s=limit, updates=job.updates, resume=(job.out / CHECKPOINT_FILE).is_file(),
+        robot.name, task.name, seed, str((out / SETTINGS_FILE).absolute()), str(out.absolute()),
+        time_limit_s=limit, updates=updates, resume=(out / CHECKPOINT_FILE).is_file(),
         calibration=str(calibration.absolute()) if calibration else "",
     )  # fmt: skip
 
-    def hear(said: Mapping[str, Any]) -> None:
+    def take(said: Mapping[str, Any]) -> None:
         if said["kind"] == "advance":
             watcher.advance(said["share"], said["elapsed_s"], said["steps"])
         elif said["kind"] == "evaluated":
@@ -55,21 +66,21 @@ def train_dreamer(job: Job, robot: Robot, task: Task, watcher: Watcher) -> dict[
     with polite_interrupt() as asked, Learner(request, python) as learner:
         watcher.begin()
         try:
-            done = learner.listen(hear, asked.is_set)
+            done = learner.listen(take, asked.is_set)
         finally:
             watcher.end()
     del done["kind"]
     record = {
         "robot": robot.name,
         "task": task.name,
-        "seed": job.seed,
-        "command": job.command,
-        "git_revision": job.git_revision,
+        "seed": seed,
+        "command": command,
+        "git_revision": git_revision,
         "control_hz": robot.timing.control_hz,
-        "settings": asdict(job.settings),
+        "settings": asdict(settings),
         **done,
     }
-    write_run_record(job.out, record)
+    write_run_record(out, record)
     if record["interrupted"]:
         raise KeyboardInterrupt
     return record

@@ -31,15 +31,15 @@ from fulmar_core.robots.robot_file import load_robot, use_calibration
 from fulmar_core.tasks import load_task
 from fulmar_core.tasks.observation import Observer
 from fulmar_core.worlds.scenario import load_scenario
-from training.dreamer.network import DreamerNetwork, DreamerPlan
-from training.dreamer.request import Request
-from training.dreamer.sheeprl_settings import NEVER, sheeprl_settings
+from training.dreamer_network import DreamerNetwork, DreamerPlan
+from training.dreamer_request import Request
 from training.evaluator import Check, held_out_evaluator
 from training.gym_env import TaskEnv
 from training.learner_curve import Curve
 from training.network import save_network
 from training.run_folder import CHECKPOINT_FILE, NETWORK_FILE
 from training.settings import Dreamer, load_training_settings
+from training.sheeprl_settings import NEVER, sheeprl_settings
 
 Report = Callable[[str, dict[str, Any]], None]
 
@@ -310,3 +310,10 @@ def _follow(stopped: threading.Event) -> None:
     while os.read(sys.stdin.fileno(), 1):
         pass
     stopped.set()
+
+
+if __name__ == "__main__":
+    # The module that sheeprl imports has the session, `__main__` has not.
+    from training import dreamer_learning
+
+    raise SystemExit(dreamer_learning.main())

@@ -6,7 +6,7 @@ import importlib
 from pathlib import Path
 from typing import Any
 
-from training.dreamer.request import Request
+from training.dreamer_request import Request
 from training.run_folder import CHECKPOINT_FILE, TENSORBOARD_FOLDER
 from training.settings import Dreamer, TrainingSettings
 
@@ -21,8 +21,8 @@ def sheeprl_settings(request: Request, settings: TrainingSettings) -> Any:
     plain = conf.to_container(composed, resolve=True, throw_on_missing=True)
     # Paths and names of functions are no overrides: hydra would read some of their characters as syntax.
     plain["log_root"] = str(Path(request.out) / TENSORBOARD_FOLDER)
-    plain["env"]["wrapper"] = {"_target_": "training.dreamer.learn.make_world", "seed": 0, "rank": 0}
-    plain["fabric"]["callbacks"] = [{"_target_": "training.dreamer.learn.make_callback"}]
+    plain["env"]["wrapper"] = {"_target_": "training.dreamer_learning.make_world", "seed": 0, "rank": 0}
+    plain["fabric"]["callbacks"] = [{"_target_": "training.dreamer_learning.make_callback"}]
     if request.resume:
         plain["checkpoint"]["resume_from"] = str(Path(request.out) / CHECKPOINT_FILE)
     return importlib.import_module("sheeprl.utils.utils").dotdict(plain)

@@ -15,16 +15,16 @@ from typing import IO, Any
 
 from fulmar_core.config.errors import ConfigError, FulmarError
 from fulmar_core.config.module_path import PYTHONPATH, SAFE
-from training.dreamer.request import Request
+from training.dreamer_request import Request
 
 ENVIRONMENT = ".venv-dreamer"
-SHEEPRL = "0.8.4"  # whose networks `training.dreamer.network` copies
+SHEEPRL = "0.8.4"  # whose networks `training.dreamer_network` copies
 LOG_FILE = "dreamer.log"  # what sheeprl writes, in the run folder
 INSTALL = "Run: make dreamer"
-CHECKOUT = Path(__file__).resolve().parents[2]
+CHECKOUT = Path(__file__).resolve().parents[1]
 LOOK_S = 0.5  # how often it is seen whether the run shall end [s]
 
-Hear = Callable[[Mapping[str, Any]], None]
+Take = Callable[[Mapping[str, Any]], None]
 
 
 class DreamerError(FulmarError):
@@ -69,7 +69,7 @@ class Learner:
         with ExitStack() as stack:
             log: IO[bytes] = stack.enter_context((out / LOG_FILE).open("ab"))
             self._process = subprocess.Popen(
-                [self.python, "-m", "training.dreamer", self.request.as_json(), str(sink)],
+                [self.python, "-m", "training.dreamer_learning", self.request.as_json(), str(sink)],
                 stdin=subprocess.PIPE, stdout=log, stderr=log, pass_fds=(sink,), env=_environment(),
                 start_new_session=True,  # a Ctrl-C of the terminal is ours to pass on
             )  # fmt: skip
@@ -91,7 +91,7 @@ class Learner:
         assert self._process.stdin is not None
         self._process.stdin.close()
 
-    def listen(self, hear: Hear, asked_to_stop: Callable[[], bool] = lambda: False) -> dict[str, Any]:
+    def listen(self, take: Take, asked_to_stop: Callable[[], bool] = lambda: False) -> dict[str, Any]:
         """Pass reports on until the process ends; returns its last one.
 
         Raises:
@@ -113,7 +113,7 @@ class Learner:
                 *lines, rest = (rest + content).split(b"\n")
                 for line in lines:
                     last = json.loads(line)
-                    hear(last)
+                    take(last)
         self._process.wait()
         if last.get("kind") == "refused":
             raise ConfigError(last["error"])
