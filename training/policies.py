@@ -92,7 +92,7 @@ def _as_trained(robot: Robot, scenario: Scenario) -> Any:
     tank = robot.actuators.tank
     # A tank that is a part of the body empties in batches too.
     actuators: Any = robot.actuators if tank is None or tank.weighs else replace(robot.actuators, tank=None)
-    sensors = replace(robot.sensors, supply=None, fuel=None)
+    sensors = replace(robot.sensors, supply=None, fuel=None, camera=None)
     spans = robot.morphology if scenario.body == "morphology" else None
     same = replace(robot, air_bearing=False, usual_controller="", morphology=spans)
     found = _chosen(replace(same, actuators=actuators, sensors=sensors))

@@ -47,7 +47,9 @@ def test_the_table_names_every_policy_that_shall_ship():
     wanted |= {
         f"spacecraft_16_{task}" for task in (positions, poses, "track_velocities_3d", "go_through_poses_3d")
     }
-    wanted |= {f"cubesat_8_{task}" for task in (positions, poses, "track_velocities_3d")}
+    wanted |= {
+        f"cubesat_8_{task}" for task in (positions, poses, "track_velocities_3d", "follow_pose_3d", "inspect")
+    }
     wanted |= {"airship_v7_fly_hold", "airship_v7_fly_b", "airship_v7_fly_c", "volantex_ranger_fly_attitude"}
     assert names == wanted
 
