@@ -32,6 +32,7 @@ class SpacePlan:
     """What kind of run to write; start and goal are x, y, z [m], roll, pitch, yaw [deg]."""
 
     task: str = "go_to_pose_3d"
+    thing: str = ""  # in space
     controller: str = "lqr"  # the name that the bag has
     seed: int = 3
     duration_s: float = 60.0
@@ -85,7 +86,7 @@ def _posed(pose: tuple[float, ...]) -> np.ndarray:
 
 def write_space_run(folder: Path, plan: SpacePlan = SpacePlan()) -> Path:
     """Write one run into a bag folder and return the folder."""
-    robot, task = load_robot(ROBOT), load_task(plan.task)
+    robot, task = load_robot(ROBOT), load_task(plan.task, plan.thing)
     simulation = BatchSimulation(
         robot,
         task,
@@ -130,6 +131,7 @@ def _info(plan: SpacePlan) -> dict[str, object]:
     named = {"task": plan.task, "controller": plan.controller} if plan.named else {}
     return {
         **named,
+        "thing": plan.thing,
         "robot": ROBOT,
         "backend": "mujoco",
         "seed": plan.seed,

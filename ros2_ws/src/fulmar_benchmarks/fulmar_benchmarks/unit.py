@@ -214,7 +214,7 @@ def _count_goals(
 def _same_with_few_worlds(trial: Trial, figures: dict[str, np.ndarray]) -> tuple[bool, int]:
     """Whether the first episodes give the same numbers in small batches, bit for bit."""
     count = min(COMPARED, trial.episodes)
-    tally = Tally(trial.task)
+    tally = Tally(trial.task, trial.robot)
     for run in runs_of(replace(trial, episodes=count, worlds=FEW_WORLDS)):
         tally.add(run)
     again = tally.figures

@@ -23,6 +23,8 @@ from fulmar_core.simulation.metrics import Trajectories, episode_metrics, succes
 from fulmar_core.tasks import Task
 from fulmar_core.tasks.path_task import evaluated_task
 from fulmar_core.worlds.scenario import Scenario, load_scenario
+from fulmar_evaluation.coverage.of_runs import EPISODES as EPISODES_COVERED
+from fulmar_evaluation.coverage.of_runs import with_coverage
 from fulmar_evaluation.waypoint_score import bound_figures, has_bound, waypoint_bound
 from policy_server.own_controller import OwnController
 
@@ -147,9 +149,9 @@ def _simulator(trial: Trial, robot: Robot, task: Task, scenario: Scenario) -> Ca
 class Tally:
     """Figures of episodes, gathered run by run: of a step nothing is kept."""
 
-    def __init__(self, task: Task) -> None:
-        """Begin empty."""
-        self._task = task
+    def __init__(self, task: Task, robot: Robot | None = None) -> None:
+        """Begin empty; with the robot, what its camera saw is among the figures where the task asks for that."""
+        self._task, self._robot, self._covered = task, robot, 0
         self._succeeded: list[np.ndarray] = []
         self._figures: list[dict[str, np.ndarray]] = []
         self.steps = 0
@@ -157,7 +159,12 @@ class Tally:
     def add(self, run: Trajectories) -> None:
         """Evaluate some more episodes."""
         self._succeeded.append(successes(run, self._task))
-        self._figures.append(episode_metrics(run, self._task))
+        figures = episode_metrics(run, self._task)
+        if self._robot is not None:
+            most = max(0, EPISODES_COVERED - self._covered)
+            figures = with_coverage(figures, run, self._robot, self._task, most=most)
+            self._covered += len(run.x)
+        self._figures.append(figures)
         self.steps += run.x.size
 
     @property
@@ -180,7 +187,7 @@ def evaluate_trial(trial: Trial, progress: Progress = lambda steps: None) -> dic
         Success rate and every figure, JSON-ready. Where waypoints are counted, also what physics allows in the first
         `bounded`: `bound`, the rule in words, and the shares of it. `warnings` of a controller of the user's own.
     """
-    tally, controller = Tally(trial.task), None if trial.through == "ros" else trial.controller()
+    tally, controller = Tally(trial.task, trial.robot), None if trial.through == "ros" else trial.controller()
     for run in runs_of(trial, progress, controller=controller):
         tally.add(run)
     figures, more = tally.figures, dict[str, Any]()

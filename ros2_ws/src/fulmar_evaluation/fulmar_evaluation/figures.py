@@ -101,7 +101,12 @@ FIGURES = {
         "more",
     ),
     "coverage": Figure(
-        "coverage", "-", "Share of the thing's outer surface that the camera has seen.", "more",
+        "coverage", "-",
+        "Share of the thing's whole outer surface that the camera has seen at 60° or less from its normal, with "
+        "nothing in between; of the first 64 episodes.", "more",
+    ),
+    "coverage_possible": Figure(
+        "coverage possible", "-", "The same, could the camera have looked everywhere from where it was.",
     ),
     "ALV_m_s": Figure("mean speed", "m/s", "Mean speed over the episode."),
     "AAV_rad_s": Figure("mean turn rate", "rad/s", "Mean size of the turn rate over the episode."),

@@ -15,6 +15,7 @@ from fulmar_core.config.errors import BagError
 from fulmar_core.loop.mission import LONGEST_AHEAD_NS, SLACK_NS
 from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.safety.keep_out import drift_enters_s
 from fulmar_core.simulation.metrics import (
     TargetCounter,
     Trajectories,
@@ -26,7 +27,9 @@ from fulmar_core.simulation.metrics import (
 from fulmar_core.states.state import State
 from fulmar_core.tasks import Task, load_recorded_task
 from fulmar_core.tasks.goal import Goal, stack_goals
+from fulmar_evaluation.coverage.of_runs import with_coverage
 
+KEEP_OUT_OF = "the keep-out volume of"  # how the words begin for what is entered, and not touched
 LATE_NS = 1_000_000_000  # in real time a goal comes at most so long after its stamp
 
 
@@ -62,6 +65,14 @@ class RunResult:
         if self.progress is not None and self.counts:
             return not self.figures["collided"]
         return bool(successes(self.run, self.task)[0])
+
+    @property
+    def touched(self) -> str:
+        """What the robot touched, or whose keep-out volume it entered; empty if neither."""
+        if not self.figures["collided"]:
+            return ""
+        names = ", ".join(f"'{structure.name}'" for structure in self.task.structures)
+        return f"{KEEP_OUT_OF} {names}" if names else self.robot.kind.obstacle
 
     @property
     def path_error_m(self) -> float | None:
@@ -140,6 +151,12 @@ def evaluate_run(record: RunRecord) -> RunResult | None:
     log = TrajectoryLog(robot, task, float(time_s[0]))
     log.add(states[samples], goal, _applied(record.actuation, robot, motion.stamp_s[0] + time_s - time_s[0]))
     run = log.trajectories().mapped(lambda array: np.swapaxes(array, 0, 1))
+    figures = with_coverage(episode_metrics(run, task), run, robot, task)
+    if task.keep_outs:
+        last = states[samples[-1:]].to_rigid()
+        figures["drift_enters_s"] = drift_enters_s(
+            task.keep_outs, last.position_in_world, last.velocity_in_world
+        )
     return RunResult(
         robot=robot,
         task=task,
@@ -149,7 +166,7 @@ def evaluate_run(record: RunRecord) -> RunResult | None:
         aims=task.target_of(goal),
         things=things,
         run=run,
-        figures={name: float(values[0]) for name, values in episode_metrics(run, task).items()},
+        figures={name: float(values[0]) for name, values in figures.items()},
         duration_s=float(motion.stamp_s[-1] - motion.stamp_s[0]),
         **_of_goal_file(record),
     )

@@ -13,7 +13,7 @@ from fulmar_core.estimators.actuator_health.supply_check import TANK_EMPTY
 from fulmar_core.robots.wire_check import BETWEEN, WARNINGS, WIRE_WARNINGS
 from fulmar_core.safety.command_range import CommandRange
 from fulmar_core.safety.estop import HOLDS
-from fulmar_evaluation.run_evaluation import RunResult, evaluate_run
+from fulmar_evaluation.run_evaluation import KEEP_OUT_OF, RunResult, evaluate_run
 from policy_server.controllers import EXTERNAL, controller_entry
 
 ASKED = ("robot", "task", "controller", "backend", "seed")
@@ -30,7 +30,14 @@ FIGURES = (
     "impulse_N_s",
     "fuel_used_kg",
 )  # of `metrics.episode_metrics`; None where the task does not ask
-BESIDE = ("path_error_most_m", "pointing_error_deg", "least_distance_m", "coverage")  # as `FIGURES`
+BESIDE = (
+    "path_error_most_m",
+    "pointing_error_deg",
+    "least_distance_m",
+    "coverage",
+    "coverage_possible",
+    "drift_enters_s",
+)
 Spread = dict[str, float | None]
 
 
@@ -55,7 +62,7 @@ def summarise(record: RunRecord) -> dict[str, Any]:
         "success": result is not None and result.success,
         **{name: result.figure(name) if result else None for name in FIGURES},
         "collided": None if result is None else bool(result.figures["collided"]),
-        "touched": result.robot.kind.obstacle if result and result.figures["collided"] else None,
+        "touched": (result.touched or None) if result else None,
         **{name: result.figure(name) if result else None for name in BESIDE},
         "path_error_m": result.path_error_m if result else None,
         **_tracking(result),
@@ -267,11 +274,18 @@ FIGURE_TEXTS: dict[str, Callable[[Any], str]] = {
     "pointing_error_deg": lambda value: f"camera {degrees_text(value)} off",
     "least_distance_m": "{:.2f} m from the keep-out volume at least".format,
     "coverage": "{:.0%} of the surface seen".format,
+    "coverage_possible": "{:.0%} could be from there".format,
+    "drift_enters_s": "adrift from the end on, it enters that volume after {:.0f} s".format,
     "tracking_error_m": "moving target {:.3f} m off".format,
     "tracking_error_deg": "its attitude {:.1f}° off".format,
     "goals_progress": str,
     "fuel_used_kg": lambda value: f"{1e3 * value:.0f} g of fuel used",
 }
+
+
+def collision_text(touched: str) -> str:
+    """What a robot touched or entered, with the verb for it."""
+    return f"{'entered' if touched.startswith(KEEP_OUT_OF) else 'touched'} {touched}"
 
 
 def summary_text(summary: dict[str, Any]) -> str:
@@ -285,7 +299,7 @@ def summary_text(summary: dict[str, Any]) -> str:
     else:
         result = "moved without a goal"
     known = [text(summary[key]) for key, text in FIGURE_TEXTS.items() if summary[key] is not None]
-    known += [f"touched {summary['touched']}"] if summary["touched"] else []
+    known += [collision_text(summary["touched"])] if summary["touched"] else []
     length = f"; length of the run {summary['duration_s']:.0f} s"
     lines = [f"{summary['controller']}: {', '.join([result, *known])}{length}"]
     if summary["steps"]:

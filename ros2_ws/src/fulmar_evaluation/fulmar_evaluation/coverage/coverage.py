@@ -6,6 +6,7 @@ found exactly, by rays, or as a robot finds it, from the depth and the segmentat
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -47,7 +48,7 @@ def coverage(structure: Structure, poses: np.ndarray, camera: CameraConfig) -> C
         camera: Of the robot.
     """
     surface = surface_of(structure)
-    cast = _Rays(structure)
+    cast = _rays_of(structure)
     could, seen = np.zeros((2, len(surface.points)), dtype=bool)
     for eye, local in _views(surface, poses, camera):
         facing = _faces(surface, eye)
@@ -110,6 +111,11 @@ def _in_view(local: np.ndarray, camera: CameraConfig) -> np.ndarray:
     x, y, z = local.T
     wide, high = (0.5 * side / camera.focal_px * z for side in (camera.width, camera.height))
     return np.asarray((z > camera.near) & (z < camera.far) & (np.abs(x) <= wide) & (np.abs(y) <= high))
+
+
+@functools.cache
+def _rays_of(structure: Structure) -> _Rays:
+    return _Rays(structure)
 
 
 class _Rays:

@@ -11,7 +11,7 @@ import numpy as np
 from fulmar_bags.run_record import RunRecord
 from fulmar_evaluation.report.style import colours
 from fulmar_evaluation.run_evaluation import RunResult, evaluate_run
-from fulmar_evaluation.run_summary import degrees_text, latencies_ms, summarise
+from fulmar_evaluation.run_summary import collision_text, degrees_text, latencies_ms, summarise
 from policy_server.controllers import CONTROLLERS
 
 DISPLAY_NAMES = {
@@ -82,7 +82,7 @@ def result_of(run: View) -> tuple[str, str]:
     result = run.result
     if result is None:
         return "No result", "The bag holds fewer than two states, so there is nothing to evaluate."
-    touched = f" It touched {result.robot.kind.obstacle}." if result.figures["collided"] else ""
+    touched = f" It {collision_text(result.touched)}." if result.touched else ""
     if not run.strives:
         return "Moved", "The controller moved the robot to show its parameters; there was no goal to meet."
     if not result.long_enough:
