@@ -69,8 +69,9 @@ def test_the_list_is_one_json_object(fulmar):
     found = json.loads(out)
     assert list(found) == [
         "robots", "tasks", "controllers", "systems", "policies", "goals", "hardware", "scenarios", "estimators",
+        "things",
     ]  # fmt: skip
-    assert "nominal" in found["scenarios"]
+    assert "nominal" in found["scenarios"] and "gateway" in found["things"]
     assert found["controllers"] == [
         "policy",
         "lqr",

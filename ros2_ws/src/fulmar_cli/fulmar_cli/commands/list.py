@@ -14,6 +14,7 @@ from fulmar_core.config.paths import config_names
 
 FAMILIES = (
     "robots", "tasks", "controllers", "systems", "policies", "goals", "hardware", "scenarios", "estimators",
+    "things",
 )  # fmt: skip
 
 
@@ -21,7 +22,7 @@ def list_names(
     family: Annotated[
         str | None,
         argument(
-            "[robots|tasks|controllers|systems|policies|goals|hardware|scenarios|estimators]",
+            "[robots|tasks|controllers|systems|policies|goals|hardware|scenarios|estimators|things]",
             "All by default.",
         ),
     ] = None,
@@ -73,6 +74,7 @@ def _family(family: str) -> tuple[list[str], Callable[[str], str]]:
     from fulmar_core.tasks import load_task
     from fulmar_core.tasks.goal_files import load_goal_file
     from fulmar_core.worlds.scenario import load_scenario
+    from fulmar_core.worlds.structures import load_structure
     from hardware_drivers.hardware import load_hardware
     from policy_server.controllers import CONTROLLERS, policies_directory, shipped_policies
 
@@ -92,6 +94,7 @@ def _family(family: str) -> tuple[list[str], Callable[[str], str]]:
         "scenarios": load_scenario,
         "estimators": load_estimator,
         "systems": load_system,
+        "things": load_structure,
     }
     load = loaders[family]
     return config_names(family), lambda name: str(load(name).title)
