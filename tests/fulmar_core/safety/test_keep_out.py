@@ -22,7 +22,7 @@ from fulmar_core.tasks.goal import goal_in_float64
 from fulmar_core.worlds.scenario import load_scenario
 from fulmar_core.worlds.structures import list_structures, load_structure
 
-ROBOTS = ("int_ball2", "spacecraft_16")
+ROBOTS = ("cubesat_8", "int_ball2", "spacecraft_16")
 ROBOT, VOLUME = load_robot("int_ball2"), load_structure("gateway").keep_out
 S = 1_000_000_000
 

@@ -119,9 +119,8 @@ class KeepOutGuard:
         missing = LEAVES_M_S * away - _rows(state.velocity)
         force = _limited(self._mass / BRAKES_S * rotate_inverse(quat, missing), self._weakest)
         rate = _rows(state.rate)
-        torque = _limited(-(rate @ self._inertia) / STEADIES_S, self._turn) + cross(
-            rate, rate @ self._inertia
-        )
+        # No more than the actuators have beside the force, at any rate: no gyroscopic torque is made up for.
+        torque = _limited(-(rate @ self._inertia) / STEADIES_S, self._turn)
         wrench = np.concatenate((force, torque + cross(self._com, force)), axis=-1)
         return np.asarray(self._allocation.best(wrench, alive))
 
