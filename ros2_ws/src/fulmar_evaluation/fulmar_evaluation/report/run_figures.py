@@ -77,6 +77,8 @@ def space_path(runs: Sequence[View]) -> Plot:
         caption += (
             " Numbered circles are the targets, as large as the tolerance; those that were reached are grey."
         )
+    if any(result.task.structures for _, result in evaluated(runs)):
+        caption += " The thing in space is drawn faintly; the dashed circle about it is its keep-out volume."
     if any(result.target_moves for _, result in evaluated(runs)):
         caption += """ The goal moves: the dashed line is its path, the white dot its end. Below, the way as seen from
         the goal: bold is the closing window, the dashed circle is the tolerance."""

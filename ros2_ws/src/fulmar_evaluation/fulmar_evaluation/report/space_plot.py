@@ -15,6 +15,7 @@ from matplotlib.patches import Circle
 from fulmar_core.states.rotation import rotate
 from fulmar_evaluation.report.drawing import colour_lines, spaced
 from fulmar_evaluation.report.run_view import View, evaluated
+from fulmar_evaluation.report.structure_plot import draw_structures, reach_of
 from fulmar_evaluation.report.style import BODY_AXES, DASHED, INK, PAPER, quiet_grid
 from fulmar_evaluation.report.trajectory_plot import (
     OUTLINES,
@@ -116,6 +117,7 @@ def _room(runs: Sequence[View]) -> tuple[tuple[float, float], np.ndarray]:
 def _places(run: View, result: RunResult) -> np.ndarray:
     """Everything that must be seen, shape (n, 3) [m]."""
     way = run.record.motion.position[result.samples]
+    way = np.concatenate((way, reach_of(result.task.structures)))
     if result.counts or has_place(result):
         return np.concatenate((way, given_targets(result)[:, :3], result.targets[:, :3]))
     return way
@@ -126,6 +128,8 @@ def _path(axes: Axes, runs: Sequence[View], side: Side, *, reach: float) -> None
     quiet_grid(axes)
     axes.set_aspect("equal")
     columns = list(side.axes)
+    structures = {each.name: each for _, result in evaluated(runs) for each in result.task.structures}
+    draw_structures(axes, list(structures.values()), columns)
     for order, (run, result) in enumerate(evaluated(runs)):
         motion, radius = run.record.motion, result.robot.body.radius
         way = motion.position[result.samples]
