@@ -12,8 +12,9 @@ from fulmar_core.loop.fallback import WARM_UP, ControllerSwitch, warm_up
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.safety.command_gate import REJECTIONS_TO_LATCH
 from fulmar_core.tasks import load_task
+from tests.spaces import robot_for
 
-ROBOT, AIRCRAFT = load_robot("turtlebot2"), load_robot("airship_v7")
+ROBOT, IN_SPACE = load_robot("turtlebot2"), load_robot("cubesat_8")
 
 
 class Counting:
@@ -40,7 +41,7 @@ class Counting:
 @pytest.mark.parametrize("task", config_names("tasks"))
 def test_it_is_asked_for_commands_of_its_task_and_begins_anew(task):
     controller = Counting()
-    warm_up(controller, ROBOT if ROBOT.kind in load_task(task).kinds else AIRCRAFT, load_task(task))
+    warm_up(controller, robot_for(load_task(task), ROBOT, IN_SPACE), load_task(task))
     assert len(controller.seen) == WARM_UP
     assert np.isfinite(controller.seen).all()
     assert controller.since_reset == 0
