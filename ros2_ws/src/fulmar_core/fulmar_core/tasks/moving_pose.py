@@ -10,20 +10,15 @@ import numpy as np
 
 from fulmar_core.states.arrays import array_namespace, clip
 from fulmar_core.states.attitude import (
-    Quaternion,
-    Vector,
-    conjugate,
     length,
-    minus,
-    product,
     scaled,
-    turn,
     turn_back,
 )
 from fulmar_core.states.rotation import Array
-from fulmar_core.states.spatial import SpatialState, quat_of
+from fulmar_core.states.spatial import SpatialState
 from fulmar_core.tasks.goal import Goal, no_obstacles
 from fulmar_core.tasks.goal_words import number
+from fulmar_core.tasks.pose_reference import Reference, between, motion_errors, vector_of
 from fulmar_core.tasks.references.planned_flight import of_one_sign
 from fulmar_core.tasks.space_terms import (
     ATTITUDE_TERMS,
@@ -57,15 +52,6 @@ ACCELERATION = 0.05  # that counts as 1 in the observation [m/s²]
 
 
 @dataclass(frozen=True)
-class Reference:
-    """A target at one moment: pose (..., 7), motion and its change (..., 6), as `NOW`, `MOTION` and `CHANGE`."""
-
-    pose: Array
-    motion: Array
-    change: Array
-
-
-@dataclass(frozen=True)
 class FollowReward:
     """Weights of the reward, per control step; d is the distance, e the angle to the target's attitude."""
 
@@ -85,7 +71,7 @@ class FollowReward:
 class MovingPose(FileTask[SpatialState]):
     """Stay with poses that lie `spacing_s` apart in time, all of them known from the start (`goal_path`).
 
-    Between them place and quaternion are cubic in time with the slopes of their neighbours (Catmull and Rom 1974).
+    Between them it is where `pose_reference.between` puts it.
     """
 
     spacing_s: float  # between two poses [s]
@@ -139,7 +125,7 @@ class MovingPose(FileTask[SpatialState]):
         share = clip(time_s / self.spacing_s, 0.0, float(last))
         before = clip(xp.floor(share + 1e-6), 0.0, max(last - 1.0, 0.0))
         going = xp.astype(time_s < last * self.spacing_s - 1e-6, targets.dtype)[..., None]
-        now = self._between(targets, before, (share - before)[..., None], last)
+        now = between(targets, before, (share - before)[..., None], self.spacing_s)
         zero = 0.0 * now.pose[..., :1]
         things = {
             NOW: now.pose,
@@ -147,30 +133,6 @@ class MovingPose(FileTask[SpatialState]):
             CHANGE: xp.concat((going * now.change, zero), axis=-1),
         }
         return replace(goal, done=xp.astype(before, goal.done.dtype), things={**goal.things, **things})
-
-    def _between(self, targets: Array, before: Array, part: Array, last: int) -> Reference:
-        """The target a part of the way from one of its poses to the next."""
-        xp, step = array_namespace(targets), self.spacing_s
-
-        def pose(further: int) -> Array:
-            which = xp.astype(clip(before + further, 0.0, float(last)), xp.int64)
-            return xp.take_along_axis(targets, which[..., None, None], axis=-2)[..., 0, :]
-
-        a, b, c, d = (pose(further) for further in (-1, 0, 1, 2))
-        if last > 1:  # beyond the ends it goes on with the acceleration that it has there
-            a = xp.where(before[..., None] < 0.5, 3.0 * (b - c) + d, a)
-            d = xp.where(before[..., None] > last - 1.5, 3.0 * (c - b) + a, d)
-        first, second, third = c - a, 2.0 * a - 5.0 * b + 4.0 * c - d, 3.0 * (b - c) + d - a
-        here = b + 0.5 * part * (first + part * (second + part * third))
-        rate = 0.5 * (first + part * (2.0 * second + 3.0 * part * third)) / step
-        change = (second + 3.0 * part * third) / (step * step)
-        size = xp.sqrt(xp.sum(here[..., 3:] ** 2, axis=-1, keepdims=True))
-        quat = here[..., 3:] / size
-        return Reference(
-            xp.concat((here[..., :3], quat), axis=-1),
-            xp.concat((rate[..., :3], turning(quat, rate[..., 3:] / size)), axis=-1),
-            xp.concat((change[..., :3], turning(quat, change[..., 3:] / size)), axis=-1),
-        )
 
     def reference_of(self, goal: Goal) -> Reference:
         """The target now; of a goal that has not begun, its first pose at rest."""
@@ -192,7 +154,7 @@ class MovingPose(FileTask[SpatialState]):
         now = self.reference_of(goal)
         way, error = goal_terms(state, now.pose), attitude_terms(state, now.pose)
         velocity, rate = motion_errors(state, now)
-        push = turn_back(state.quat, _vector(now.change))
+        push = turn_back(state.quat, vector_of(now.change))
         return (
             *way,
             *fine_terms(way, saturation=self.fine_distance),
@@ -229,28 +191,3 @@ class MovingPose(FileTask[SpatialState]):
     def errors(self, state: SpatialState, goal: Goal) -> Errors:
         """Distance from the target, and angle to its attitude."""
         return place_errors(state, self.target_of(goal), attitude=True)
-
-
-def motion_errors(state: SpatialState, now: Reference) -> tuple[Vector, Vector]:
-    """Velocity [m/s] and turn rate [rad/s] of the target less those of a body, along the body's axes."""
-    to_target = product(conjugate(state.quat), quat_of(now.pose))
-    along = turn_back(state.quat, _vector(now.motion))
-    about = turn(to_target, _vector(now.motion[..., 3:]))
-    return minus(along, state.velocity_in_body), minus(about, state.rate)
-
-
-def turning(quat: Array, change: Array) -> Array:
-    """Twice the vector of q⁻¹ ⊗ its derivative: a turn rate about the body's axes (Solà eq. 200), shape (..., 3).
-
-    Of the second derivative it is the change of that rate, since the product of two first ones has no vector.
-    """
-    x, y, z, _ = product(conjugate(_quat(quat)), _quat(change))
-    return 2.0 * array_namespace(quat).stack((x, y, z), axis=-1)
-
-
-def _vector(columns: Array) -> Vector:
-    return columns[..., 0], columns[..., 1], columns[..., 2]
-
-
-def _quat(columns: Array) -> Quaternion:
-    return columns[..., 0], columns[..., 1], columns[..., 2], columns[..., 3]
