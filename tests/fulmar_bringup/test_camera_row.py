@@ -123,4 +123,4 @@ def test_a_wrong_platform_is_refused_also_where_a_simulator_alone_would_end_by_i
 
 def test_lock_step_takes_a_camera_and_no_markers():
     with pytest.raises(ConfigError, match="takes no --markers"):
-        checked(replace(LOCKSTEP, extras=("camera", "markers"), robot="spacecraft_16"))
+        checked(replace(LOCKSTEP, extras=("camera", "markers"), robot="cubesat_8"))

@@ -56,7 +56,8 @@ def plant_spec(plan: RunPlan, *, port: str = "") -> NodeSpec:
         thing=plan.thing,
         estop=plan.guards.estop,
         estimated=estimated,
-        truth_in_period=any(TRUTH.name in node.inputs for node in (*plan.nodes, *between(plan))),
+        truth_in_period=bool(chain)
+        and any(TRUTH.name in node.inputs for node in (*plan.nodes, *between(plan))),
         chain=list(chain),
     )
     if estimated and not captured:
