@@ -20,7 +20,7 @@ class Recording:
     after_fault_s: float = 5.0  # ring: written after the last sign of a fault [s]
     split_mb: float = 1000.0  # a file that has grown to this is followed by a new one; 0: never [1e6 bytes]
     split_s: float = 3600.0  # so is one that was begun so long ago; 0: never [s]
-    # Images of cameras: as JPEG and PNG, or as they come, which takes 60 times as much room.
+    # Images of cameras: as JPEG and PNG, or as they come, which takes 20 times as much room.
     frames: FrameForm = "compressed"
 
     def __post_init__(self) -> None:
