@@ -26,7 +26,7 @@ MESSAGES_LOCK := ros2_ws/src/fulmar_bringup/fulmar_bringup/tf2_msgs/requirements
 # Of .venv after an install on x86-64 [MiB], measured by `du -s --block-size=1M .venv`; the last two of
 # .venv-peers and .venv-dreamer.
 RUN_SIZE := 884
-DEV_SIZE := 7386
+DEV_SIZE := 7489
 PEERS_SIZE := 8838
 DREAMER_SIZE := 6209
 
@@ -98,7 +98,7 @@ with: $(RUN_STAMP) ## Add an extra of pyproject.toml, without the rest of `make 
 	@$(BIN)/python -m fulmar_cli.installation.add_extra $(EXTRA)
 
 .PHONY: dev
-dev: $(DEV_STAMP) $(if $(HAS_ROS_WHEELS),$(TF_STAMP)) $(STARS_STAMP) ## Install everything, also for training and tests (7.2 GiB)
+dev: $(DEV_STAMP) $(if $(HAS_ROS_WHEELS),$(TF_STAMP)) $(STARS_STAMP) ## Install everything, also for training and tests (7.3 GiB)
 
 .PHONY: peers
 peers: $(PEERS_STAMP) ## Install the outside programs that tests compare with, into .venv-peers (8.6 GiB)
