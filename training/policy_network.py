@@ -16,12 +16,10 @@ class PolicyNetwork(nn.Module):
 
     Attributes:
         plan: Structure of the network; `inputs`, `memory`, `command_scale`, `on_off` and `disturbances` of any.
-        fallback: Network that takes over where too many valves are dead; None without one.
         remembers_command: Whether its memory ends with its last command, as shares of full command.
     """
 
     plan: Any
-    fallback: nn.Module | None = None
     remembers_command = False
 
     def infer(
