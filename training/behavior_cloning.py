@@ -21,6 +21,9 @@ from fulmar_core.controllers.disturbance_inputs import PUSH_TERMS
 from fulmar_core.controllers.law import Law
 from fulmar_core.controllers.lqr import Lqr
 from fulmar_core.controllers.wrench_choice import WrenchChoice
+from fulmar_core.controllers.wrench_shares import body_terms
+from fulmar_core.states.attitude import scaled
+from fulmar_core.states.rotation import Array
 from training.fast_ppo import FastPPO, rows
 from training.vec_env import BatchVecEnv
 
@@ -120,13 +123,13 @@ def expert_of(worlds: BatchVecEnv) -> Expert:
         law = Lqr(robot, task, replace(law.gains, observer=None), control_hz=robot.timing.control_hz)
     if worlds.choice is not None and isinstance(law, Lqr):
         return WrenchExpert(law, worlds.choice, worlds)
-    if isinstance(worlds.action_space, gymnasium.spaces.Box) and not (worlds.choice or worlds.bodies):
+    if worlds.bodies:
+        return BodyExpert(worlds)
+    if isinstance(worlds.action_space, gymnasium.spaces.Box) and worlds.choice is None:
         return CommandExpert(law, worlds)
     raise ConfigError(
         f"'cloning_updates': no law can be cloned where a network opens single valves, as for '{robot.name}' at "
         f"'{task.name}'. Set 'action_space: wrench', or leave 'cloning_updates' out."
-        if worlds.bodies is None
-        else "'cloning_updates' and 'action_space: wrench' go together for on/off valves alone. Leave one of them out."
     )
 
 
@@ -144,6 +147,47 @@ class WrenchExpert:
             terms = inputs.observation.shape[1]
             now = replace(now, push=np.asarray(observations[:, terms : terms + len(PUSH_TERMS)], dtype=float))
         return np.asarray(self._choice.shares_of(self._law.wanted(inputs, now)), dtype=np.float32)
+
+
+class BodyExpert:
+    """The PD law in space, slower by the root of r for a body with a share r of the robot's acceleration.
+
+    Where a target moves, or a velocity is wanted, every body follows as fast as the robot would.
+    """
+
+    def __init__(self, worlds: BatchVecEnv) -> None:
+        robot = worlds.robot
+        law: Any = load_classical(robot, worlds.task, law="pd")
+        law.allocation = _Asked()
+        self._law, self._worlds = law, worlds
+        self._scales = not (law.frame.tracks or worlds.task.moves)
+        self._own = body_terms(robot)
+        self._mass = np.array([robot.body.mass] * 3 + list(robot.body.inertia[:3]))
+
+    def actions(self, observations: np.ndarray) -> np.ndarray:
+        """Shares of what each body can do; see `Expert`."""
+        bodies, inputs = self._worlds.bodies, self._worlds.inputs()
+        assert bodies is not None
+        terms = np.broadcast_to(bodies.terms, (len(observations), len(self._own))).astype(float)
+        share = np.ones_like(terms)
+        if self._scales:
+            ratios = (terms / self._own).reshape(-1, 2, 3).mean(axis=-1)
+            share, (pace, turning) = np.repeat(ratios, 3, axis=1), np.sqrt(ratios.T)
+            state: Any = inputs.state
+            slowed = (*scaled(1.0 / pace, state.velocity), *scaled(1.0 / turning, state.rate))
+            inputs = replace(inputs, state=type(state)(*state.position, *state.quat, *slowed))
+        wanted = self._law.command(inputs) / self._mass * share / terms
+        parts = wanted.reshape(-1, 2, 3)
+        fitting = parts / np.maximum(1.0, np.abs(parts).max(axis=-1, keepdims=True))
+        return np.asarray(fitting.reshape(-1, 6), dtype=np.float32)
+
+
+class _Asked:
+    """In the place of an allocation: gives the wrench itself."""
+
+    def best(self, wanted: Array, alive: Array | None = None, dearer: Array | None = None) -> Array:
+        """See `Allocation.best`."""
+        return wanted
 
 
 class CommandExpert:

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from fulmar_core.config.errors import ConfigError
+from fulmar_core.controllers.classical import load_classical
 from fulmar_core.controllers.wrench_shares import BODY_TERMS, WrenchShares, body_terms
 from fulmar_core.loop.policy_bundle import read_golden
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.tasks import load_task
 from fulmar_core.worlds.scenario import load_scenario
 from policy_server.policy import Policy
+from training.behavior_cloning import BodyExpert
 from training.bodies import KnownBodies
 from training.evaluator import evaluate_in_batch
 from training.export import export
@@ -146,6 +149,32 @@ def test_an_evaluation_among_many_bodies_gives_the_network_each_of_them(run, mon
     found = evaluate_in_batch(load_network(run / NETWORK_FILE), ROBOT, task, ANY, episodes=3, seed=3)
     assert found["episodes"] == 3
     np.testing.assert_allclose(given[0].terms, worlds_of(3).bodies.terms, rtol=1e-5)
+
+
+def test_the_law_that_is_cloned_asks_each_body_for_what_it_can_do():
+    env = worlds_of(16)
+    seen = env.reset()
+    shares = BodyExpert(env).actions(seen)
+    assert shares.shape == (16, 6)
+    assert np.abs(shares).max() <= 1.0
+    # At rest the PD law pushes along the way to the goal, whatever the body.
+    way = seen[:, :3]
+    push = shares[:, :3] * env.bodies.terms[:, :3]
+    along = np.sum(way * push, axis=1) / np.linalg.norm(way, axis=1) / np.linalg.norm(push, axis=1)
+    assert along.min() > 0.99
+
+
+def test_the_law_that_is_cloned_is_the_robots_own_for_its_own_body():
+    env = worlds_of(4, scenario=load_scenario("nominal"))
+    seen = env.reset()
+    env.step(np.full((4, 6), 0.3, np.float32))
+    law = load_classical(ROBOT, TASK, law="pd")
+    law.allocation = SimpleNamespace(best=lambda wrench, alive: wrench)
+    wrench = law.command(env.inputs()).reshape(4, 2, 3)
+    limits = WrenchShares.of_robot(ROBOT).limits.reshape(2, 3)
+    expected = wrench / limits
+    expected /= np.maximum(1.0, np.abs(expected).max(axis=-1, keepdims=True))
+    np.testing.assert_allclose(BodyExpert(env).actions(seen), expected.reshape(4, 6), atol=1e-5)
 
 
 @pytest.mark.parametrize(

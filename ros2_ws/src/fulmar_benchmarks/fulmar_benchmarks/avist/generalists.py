@@ -137,7 +137,7 @@ class BodiesCell(LearnedCell):
         return robot, task, settings
 
     def found(self, network: Any) -> Figures:
-        """Success on the robot's own body, on those of learning, on others, and on those with policies of their own."""
+        """Success on the robot's own body, random ones of learning and others, and those with their own policies."""
         from training.evaluator import evaluate_in_batch
 
         task, nominal, shaped = load_task(BODIES_TASK), load_scenario(NOMINAL), load_scenario(ANY_BODY)
