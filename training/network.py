@@ -185,7 +185,7 @@ class DeployedNetwork(PolicyNetwork):
     def for_bodies(self, bodies: KnownBodies) -> DeployedNetwork:
         """The same weights for bodies that differ from row to row of what is observed; it cannot be saved."""
         twin = copy.copy(self)
-        twin._buffers = self._buffers | self._own_body(bodies)
+        twin._buffers = {**self._buffers, **self._own_body(bodies)}
         return twin
 
     def for_robot(self, robot: Robot) -> DeployedNetwork:

@@ -67,9 +67,8 @@ def of_inspection(found: dict[str, dict[str, dict[str, Any]]]) -> list[Check]:
 
 
 def _worst(flown: list[dict[str, Any]], key: str, inner: str) -> float | None:
-    values = [(one[key] or {}).get(inner) for one in flown]
-    known = [float(value) for value in values if value is not None]
-    return max(known) if len(known) == len(values) else None
+    values: list[Any] = [(one[key] or {}).get(inner) for one in flown]
+    return None if None in values else max(values)
 
 
 def of_tasks(found: dict[str, dict[str, Any]]) -> list[Check]:

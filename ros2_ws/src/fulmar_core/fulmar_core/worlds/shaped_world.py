@@ -93,6 +93,8 @@ def draw_bodies(robot: Robot, draws: Draws) -> Bodies:
         tried = _drawn(own, spans, draws)
         taken = ~done & can_be_flown(tried)
         found, done = tried.where(taken, found), done | taken
+        if done.all():
+            break
     return found
 
 
@@ -130,8 +132,7 @@ def can_be_flown(bodies: Bodies) -> np.ndarray:
     sizes = np.linalg.svd(effect, compute_uv=False)
     together = effect.sum(axis=-1)[..., None]
     resting = 1.0 - (np.linalg.pinv(effect) @ together)[..., 0]
-    strong, balanced = sizes[:, -1] > LEAST_RATIO * sizes[:, 0], resting.min(axis=-1) > LEAST_RESTING
-    return np.asarray(strong & balanced)
+    return np.asarray((sizes[:, -1] > LEAST_RATIO * sizes[:, 0]) & (resting.min(axis=-1) > LEAST_RESTING))
 
 
 def shaped(robot: Robot, world: SpatialWorld, draws: Draws) -> ShapedWorld:
@@ -145,24 +146,17 @@ def shaped(robot: Robot, world: SpatialWorld, draws: Draws) -> ShapedWorld:
     bodies = draw_bodies(robot, draws.branch(BRANCH))
     effect = np.swapaxes(bodies.effect, -1, -2).reshape(draws.worlds, -1).T
     plain = replace(world, mass=bodies.mass, inertia=bodies.inertia.T)
-    strength = bodies.thrust / robot.actuated_by(Thrusters).thrust
-    return ShapedWorld(
-        **{name: getattr(plain, name) for name in plain.names()}, effect=effect, thrust=strength
-    )
-
-
-def _three(row: np.ndarray) -> tuple[float, float, float]:
-    x, y, z = map(float, row)
-    return x, y, z
+    parts: dict[str, Any] = dict(zip(plain.names(), plain.parts(), strict=True))
+    return ShapedWorld(**parts, effect=effect, thrust=bodies.thrust / robot.actuated_by(Thrusters).thrust)
 
 
 def robot_with(robot: Robot, bodies: Bodies, row: int) -> Robot:
     """The robot with one of these bodies, as its own file could say."""
     valves, mass, can = robot.actuated_by(Thrusters), float(bodies.mass[row]), robot.performance
     nozzles = tuple(
-        replace(nozzle, position=_three(place), direction=_three(way))
-        for nozzle, place, way in zip(
-            valves.nozzles, bodies.positions[row], bodies.directions[row], strict=True
+        replace(nozzle, position=(x, y, z), direction=(a, b, c))
+        for nozzle, (x, y, z), (a, b, c) in zip(
+            valves.nozzles, bodies.positions[row].tolist(), bodies.directions[row].tolist(), strict=True
         )
     )
     share = float(bodies.thrust[row]) / valves.thrust
