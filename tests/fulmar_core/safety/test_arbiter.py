@@ -34,6 +34,7 @@ LADDER = [
     ({"last_input_ns": None}, Mode.ARMED, "no odom yet"),
     ({"last_input_ns": NOW - 620 * MS}, Mode.ARMED, "no usable odom for 620 ms (limit 400 ms)"),
     ({"input_problem": "odom is NaN"}, Mode.ARMED, "odom is NaN"),
+    ({"image_problem": "no image yet"}, Mode.ARMED, "no image yet"),
     ({"outside": "the robot is outside"}, Mode.ARMED, "the robot is outside"),
     ({"bearing_off": True}, Mode.ARMED, "the air bearing is off"),
     ({"unconverged": "it comes no nearer"}, Mode.ARMED, "it comes no nearer"),

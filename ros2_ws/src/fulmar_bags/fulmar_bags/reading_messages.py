@@ -8,10 +8,20 @@ from typing import Any
 import numpy as np
 
 from fulmar_bags.event_packets import events_of_cloud
+from fulmar_bags.image_bytes import pixels_of
 from fulmar_bags.message_reader import reading_of, stamp_ns
 from fulmar_core.config.errors import shortened
 from fulmar_core.estimators.readings import ReadingKind
-from fulmar_core.robots.topics import EVENTS, EVENTS_2, INERTIA, MOCAP, RATE, Wire
+from fulmar_core.robots.topics import (
+    CAMERA_DEPTH,
+    CAMERA_IMAGE,
+    EVENTS,
+    EVENTS_2,
+    INERTIA,
+    MOCAP,
+    RATE,
+    Wire,
+)
 from fulmar_core.wires.reading import Reading
 from fulmar_core.wires.robot_name import Frames
 
@@ -56,4 +66,25 @@ def _events(message: Any, _frames: Frames) -> Reading | str:
     return problem if events is None else Reading(events, stamp_ns(message.header.stamp))
 
 
-READERS: dict[Wire, Read] = {MOCAP: _pose, RATE: _rate, INERTIA: _inertia, EVENTS: _events, EVENTS_2: _events}
+def _depth(message: Any, _frames: Frames) -> Reading | str:
+    pixels = pixels_of(message, "32FC1")
+    if isinstance(pixels, str):
+        return pixels
+    # REP 118: NaN is a pixel that the camera could not measure, which is as good as one where nothing is.
+    return Reading(np.where(np.isnan(pixels), np.float32(np.inf), pixels), stamp_ns(message.header.stamp))
+
+
+def _color(message: Any, _frames: Frames) -> Reading | str:
+    pixels = pixels_of(message, "rgb8")
+    return pixels if isinstance(pixels, str) else Reading(pixels, stamp_ns(message.header.stamp))
+
+
+READERS: dict[Wire, Read] = {
+    MOCAP: _pose,
+    RATE: _rate,
+    INERTIA: _inertia,
+    EVENTS: _events,
+    EVENTS_2: _events,
+    CAMERA_DEPTH: _depth,
+    CAMERA_IMAGE: _color,
+}

@@ -325,6 +325,8 @@ class ControllerNode(LifecycleNode):
         stamp = measurement.stamp_ns if measurement else 0
         if self._readings.subscribed:
             guard.readings = self._readings.newest.at(stamp)
+            taken = guard.loop.controller.readings
+            guard.set(image_problem=self._readings.newest.image_problem(taken, stamp))
         command, step, took_ns = self._safe, None, 0
         try:
             decision, inputs = guard.begin_step(measurement, time.monotonic_ns())

@@ -9,6 +9,7 @@ from typing import Any
 from rclpy.node import Node
 from rclpy.subscription import Subscription
 
+from fulmar_bags.image_bytes import read_image
 from fulmar_bags.message_reader import stamp_ns
 from fulmar_bags.reading_messages import Read, reader_of
 from fulmar_core.loop.newest_readings import NewestReadings
@@ -58,12 +59,18 @@ class ReadingInputs:
         self.newest = NewestReadings(robot, names, in_step=lockstep)
         self.followed: dict[str, list[Subscription]] = {}
         self.subscribed = {
-            kind.wire: lockstep and kind.sensor is not None for kind in self.newest.kinds.values()
+            kind.wire: lockstep and kind.comes_with_its_step for kind in self.newest.kinds.values()
         }
         for name, kind in self.newest.kinds.items():
             wire = kind.wire
             kind_of_message, receive = needed_class(wire), partial(self._take, name, reader_of(kind))
-            if kind.sensor is None:
+            if kind.image:
+                qos = subscriber_qos(wire, reliable=lockstep)
+                # As bytes: rclpy would copy their pixels one by one.
+                receive = partial(self._take_bytes, name, reader_of(kind))
+                made = node.create_subscription(kind_of_message, wire.name, receive, qos, raw=True)
+                self.followed[wire.name] = [made]
+            elif kind.sensor is None:
                 self.followed[wire.name] = subscribe_every(node, kind_of_message, wire, receive)
             else:
                 qos = subscriber_qos(wire, reliable=lockstep)
@@ -93,9 +100,18 @@ class ReadingInputs:
         try:
             reading = read(message, self._frames)
             if isinstance(reading, str):
-                newest.refused, newest.refusal = newest.refused + 1, reading
-            elif newest.take(name, reading, stamp_ns(message.header.stamp)) and newest.kinds[name].sensor:
+                newest.refuse(name, reading)
+            elif (
+                newest.take(name, reading, stamp_ns(message.header.stamp))
+                and newest.kinds[name].comes_with_its_step
+            ):
                 self._on_reading()
         except (ValueError, TypeError, KeyError, ArithmeticError) as error:
-            newest.refused += 1
-            newest.refusal = f"{name} cannot be read: {type(error).__name__}: {error}"
+            newest.refuse(name, f"{name} cannot be read: {type(error).__name__}: {error}")
+
+    def _take_bytes(self, name: str, read: Read, data: bytes) -> None:
+        """Take a serialised image."""
+        try:
+            self._take(name, read, read_image(data))
+        except ValueError as error:
+            self.newest.refuse(name, str(error))

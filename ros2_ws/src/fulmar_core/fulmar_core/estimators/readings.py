@@ -11,12 +11,22 @@ from dataclasses import dataclass
 import numpy as np
 
 from fulmar_core.config.errors import ConfigError
+from fulmar_core.estimators.images import IMAGE_LASTS_S, color_problem, depth_problem
 from fulmar_core.estimators.inertia.momentum_balance import is_body
 from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.sensors.kind import SensorKind
 from fulmar_core.robots.sensors.ranges import attitude_problem, covariance_problem, size_problem
 from fulmar_core.robots.sensors.table import SENSORS
-from fulmar_core.robots.topics import EVENTS, EVENTS_2, INERTIA, MOCAP, ODOMETRY, RATE
+from fulmar_core.robots.topics import (
+    CAMERA_DEPTH,
+    CAMERA_IMAGE,
+    EVENTS,
+    EVENTS_2,
+    INERTIA,
+    MOCAP,
+    ODOMETRY,
+    RATE,
+)
 from fulmar_core.wires.reading import Reading
 from fulmar_core.wires.wire import Wire
 
@@ -34,9 +44,19 @@ class ReadingKind:
     sensor: SensorKind | None = None  # whose it is; None: of another node
     lasts_s: float = 1.0  # older ones are not used by controllers [s]
     per_robot: bool = True  # whether a controller gets it with a leading axis of robots
+    # Whether it is an image of the robot's camera: in lock step a step waits for that of its own time, and a controller
+    # that takes it does not act without it.
+    image: bool = False
+
+    @property
+    def comes_with_its_step(self) -> bool:
+        """Whether in lock step the reading of a time counts from the step of that time on."""
+        return self.sensor is not None or self.image
 
     def numbers(self, reading: Reading, robot: Robot) -> np.ndarray:
         """What a controller gets of it; see `Inputs.readings`."""
+        if self.image:
+            return np.asarray(reading.value)
         if self.sensor is None:
             return np.asarray(reading.value, dtype=float)
         return self.sensor.numbers(reading, robot)
@@ -110,6 +130,8 @@ OTHERS: dict[str, ReadingKind] = {
     "inertia": ReadingKind(INERTIA, _inertia, lasts_s=10.0, per_robot=False),
     "events": ReadingKind(EVENTS, _unchecked),
     "events_2": ReadingKind(EVENTS_2, _unchecked),
+    "camera_depth": ReadingKind(CAMERA_DEPTH, depth_problem, lasts_s=IMAGE_LASTS_S, image=True),
+    "camera_image": ReadingKind(CAMERA_IMAGE, color_problem, lasts_s=IMAGE_LASTS_S, image=True),
 }
 READINGS: dict[str, ReadingKind] = OTHERS | {
     name: _of_sensor(kind) for name, kind in SENSORS.items() if kind.wire != ODOMETRY

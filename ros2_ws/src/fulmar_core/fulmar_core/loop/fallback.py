@@ -12,6 +12,7 @@ import numpy as np
 from fulmar_core.config.errors import ConfigError, TaskError
 from fulmar_core.config.own_class import SEPARATOR, one_line
 from fulmar_core.controllers.controller import Controller
+from fulmar_core.estimators.images import nothing_seen
 from fulmar_core.loop.control_loop import ControlLoop
 from fulmar_core.robots.robot import Robot
 from fulmar_core.safety.command_gate import REJECTIONS_TO_LATCH, Rejections
@@ -43,9 +44,10 @@ def warm_up(
     episode = draw_episodes(robot, task, load_scenario("nominal"), seed=0, numbers=np.zeros(1, dtype=int))
     loop = ControlLoop(robot, task, controller)
     loop.begin(goal_in_float64(episode.goal))
+    seen = nothing_seen(robot, controller.readings)
     try:
         for number in range(WARM_UP):
-            step = loop.step(episode.start, {}, round(1e9 * number * loop.dt))
+            step = loop.step(episode.start, seen, round(1e9 * number * loop.dt))
             if step.action.shape != step.command.shape:
                 raise ConfigError(
                     f"controller '{controller.name}': {step.refusal}. `act` returns a row for each robot, of which a "

@@ -9,6 +9,7 @@ import numpy as np
 
 from fulmar_core.estimators.readings import ReadingKind, reading_problem, readings_of
 from fulmar_core.robots.robot import Robot
+from fulmar_core.safety.image_gate import ImageWatch
 from fulmar_core.wires.reading import Reading
 
 REMEMBERED = 8  # readings of a name: more than come within a step, late ones included
@@ -48,23 +49,37 @@ class NewestReadings:
         self._newest: dict[str, deque[tuple[int, np.ndarray]]] = {
             name: deque(maxlen=REMEMBERED) for name in self.kinds
         }
+        self._images = {name: ImageWatch(name) for name, kind in self.kinds.items() if kind.image}
 
     def take(self, name: str, reading: Reading, stamp_ns: int) -> bool:
         """Take a reading in, measured at a time [ns]; whether it is believed, else it counts as not measured."""
         self.refusal = reading_problem(name, reading, self._robot)
-        self.refused += bool(self.refusal)
         if self.refusal:
+            self.refuse(name, self.refusal)
             return False
         kind = self.kinds[name]
+        if kind.image and not self._images[name].came(stamp_ns):
+            return False  # sent again
         numbers = kind.numbers(reading, self._robot)
         self._newest[name].append((stamp_ns, numbers[None] if kind.per_robot else numbers))
         return True
+
+    def refuse(self, name: str, why: str) -> None:
+        """Count a reading that is none."""
+        self.refused, self.refusal = self.refused + 1, why
+        if name in self._images:
+            self._images[name].refused(why)
+
+    def image_problem(self, names: Iterable[str], time_ns: int) -> str:
+        """Why a controller that takes these readings cannot act on a state of a time; empty if it can [ns]."""
+        watches = (self._images[name] for name in names if name in self._images)
+        return next(filter(None, (watch.problem(time_ns) for watch in watches)), "")
 
     def at(self, time_ns: int) -> dict[str, np.ndarray]:
         """What is young enough at a time [ns], see `Inputs.readings`."""
         found = {}
         for name, newest in self._newest.items():
-            latest_ns = time_ns if self.kinds[name].sensor else time_ns - 1
+            latest_ns = time_ns if self.kinds[name].comes_with_its_step else time_ns - 1
             lasts_ns = round(1e9 * self.kinds[name].lasts_s)
             for stamp_ns, value in reversed(newest):
                 if not self._in_step or stamp_ns <= latest_ns:
@@ -75,8 +90,10 @@ class NewestReadings:
 
     @property
     def silent(self) -> tuple[str, ...]:
-        """Sensors that have said nothing yet."""
-        return tuple(name for name, kind in self.kinds.items() if kind.sensor and not self._newest[name])
+        """Sensors and cameras that have said nothing yet."""
+        return tuple(
+            name for name, kind in self.kinds.items() if kind.comes_with_its_step and not self._newest[name]
+        )
 
     def lacks_something_of(self, time_ns: int) -> bool:
         """Whether the reading of a time [ns] is still to come from a sensor that measures at each step."""
@@ -84,6 +101,8 @@ class NewestReadings:
 
 
 def _comes_each_step(robot: Robot, name: str, kind: ReadingKind) -> bool:
+    if kind.image:
+        return True  # the camera of a policy is as fast as its commands
     if kind.sensor is None or name in robot.sensors.own:
         return False
     spec = robot.sensors.specs[name]

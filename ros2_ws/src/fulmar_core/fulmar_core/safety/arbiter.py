@@ -37,6 +37,7 @@ class Flags:
     outside: str = ""  # how the robot left the area that it may be in, empty if it did not
     contested: str = ""  # which nodes publish one of the inputs, where more than one does
     unconverged: str = ""  # why the robot came no nearer to its goal, empty if it does
+    image_problem: str = ""  # why the controller cannot see what it acts on, empty if it can or need not
     bearing_off: bool = False  # the robot has an air bearing that is not known to be on
     active_s: float = 0.0  # how long it has been acting [s]
     max_run_time_s: float = 0.0  # and how long it may; 0: for ever [s]
@@ -82,6 +83,8 @@ def arbitrate(flags: Flags, now_ns: int) -> Decision:
         )
     if flags.input_problem:
         return Decision(Mode.ARMED, False, flags.input_problem)
+    if flags.image_problem:
+        return Decision(Mode.ARMED, False, flags.image_problem)
     if flags.outside:
         return Decision(Mode.ARMED, False, flags.outside, may_brake=True)
     if flags.bearing_off:

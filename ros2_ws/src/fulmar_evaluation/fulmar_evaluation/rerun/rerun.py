@@ -15,7 +15,7 @@ import numpy as np
 from fulmar_bags.control_steps import ControlSteps
 from fulmar_bags.recorded_estop import RecordedEstop
 from fulmar_bags.wire_reader import ABSENT
-from fulmar_core.config.errors import BagError, FulmarError, RunFailed, TaskError
+from fulmar_core.config.errors import BagError, ConfigError, FulmarError, RunFailed, TaskError
 from fulmar_core.controllers.controller import Controller, Inputs
 from fulmar_core.controllers.law import Law
 from fulmar_core.estimators.actuator_health.applied import AppliedHistory
@@ -131,6 +131,11 @@ class _Rerun:
         )
         names = [name for each in self._guard.switch.known for name in each.controller.readings]
         self._readings = NewestReadings(record.robot, names, in_step=record.settings.lockstep)
+        if any(kind.image for kind in self._readings.kinds.values()):
+            raise ConfigError(
+                f"controller '{controller.name}' acts on images, which bags pack with losses. It would command "
+                "something else. Fly it anew: fulmar run or fulmar evaluate --through mujoco."
+            )
         self._to_read = {name: deque(record.readings(kind)) for name, kind in self._readings.kinds.items()}
         # Of a robot without a bearing, and in a bag that says nothing of it, there is none to wait for.
         self._guard.take_bearing(not record.bearing or bool(record.bearing[0].value))
