@@ -57,7 +57,7 @@ PLACES = ("go_to_position", "go_to_position_with_obstacles", "go_through_positio
 IN_PLANE = (*PLACES, "go_to_pose", "go_through_poses", "race_wayposes", "track_velocities")
 IN_SPACE = (
     "go_to_position_3d", "go_to_pose_3d", "go_through_positions_3d", "go_through_poses_3d", "track_velocities_3d",
-    "follow_pose_3d", "inspect",
+    "follow_pose_3d", "inspect", "dock",
 )  # fmt: skip
 HOLDS = ("hold_attitude", "hold_airspeed")
 FLIGHTS = ("follow_reference", *HOLDS)

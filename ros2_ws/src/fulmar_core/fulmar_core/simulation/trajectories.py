@@ -104,7 +104,7 @@ class TrajectoryLog:
         left_out = (
             *(() if "z" in task.state_type.COLUMNS else IN_SPACE),
             *(() if self._exhaust_speed else OF_FUEL),
-            *(() if task.structures else BESIDE),
+            *(() if task.keep_outs else BESIDE),
         )
         self._names = tuple(name for name in COLUMNS if name not in left_out)
         self._columns: dict[str, list[np.ndarray]] = {name: [] for name in self._names}
@@ -161,7 +161,7 @@ def _step_columns(robot: Robot, task: Task, state: State, goal: Goal) -> dict[st
     away = task.distance_from_goal(state, goal)
     far = none if away is None else np.asarray(away > robot.limits.geofence)
     return {
-        **(_beside(robot, task, state) if task.structures else {}),
+        **(_beside(robot, task, state) if task.keep_outs else {}),
         **state.logged(),
         "position_error": unasked if errors.position is None else errors.position,
         "heading_error": unasked if errors.heading is None else errors.heading,

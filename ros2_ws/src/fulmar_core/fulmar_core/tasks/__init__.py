@@ -16,6 +16,7 @@ from fulmar_core.config.plausibility import check_plausible
 from fulmar_core.config.plausible_ranges import TASK
 from fulmar_core.config.strict_yaml import load_config
 from fulmar_core.robots.kinds.free_flyer import FREE_FLYER
+from fulmar_core.tasks.dock import Dock
 from fulmar_core.tasks.follow_pose_3d import FollowPose3d
 from fulmar_core.tasks.follow_reference import FollowReference
 from fulmar_core.tasks.go_to_pose import GoToPose
@@ -55,6 +56,7 @@ ShippedTask = (  # what a file of `configs/tasks` can be
     | GoThroughPoses3d
     | FollowPose3d
     | Inspect
+    | Dock
     | Point
     | FollowReference
     | HoldAttitude

@@ -240,8 +240,8 @@ class Task(ABC, Generic[S]):
             what: What the places are, such as `the goal`.
             places: x, y, z [m] and whatever follows, shape (k, 3 or more).
         """
-        for structure in self.structures if len(places) else ():
-            deep = -np.asarray(structure.keep_out.distance(np.asarray(places, dtype=float)[:, :3]))
+        for volume, structure in zip(self.keep_outs, self.structures, strict=False) if len(places) else ():
+            deep = -np.asarray(volume.distance(np.asarray(places, dtype=float)[:, :3]))
             if (deep > 0.0).any():
                 first = int(np.argmax(deep > 0.0))
                 x, y, z = (float(number) for number in np.asarray(places)[first][:3])
