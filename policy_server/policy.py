@@ -69,7 +69,9 @@ class Policy:
         check_fit(self.passport, robot, task, self.control_hz, where=str(folder))
         self._observer = Observer(robot, task)
         self.estimator = ESTIMATOR if takes_disturbances(self.passport.observation_names, robot) else None
-        self.readings: tuple[str, ...] = self._observer.readings
+        self.image = self.passport.image
+        seen = (self.image.reading,) if self.image else ()
+        self.readings: tuple[str, ...] = (*self._observer.readings, *seen)
         self.observer: StateObserver[Any] | None = None
         self._session = _open(bundle)
         self._memory: np.ndarray | None = None
@@ -86,19 +88,20 @@ class Policy:
         """Choose actuators; see `Controller.act`."""
         seen = with_disturbances(self._observer, inputs) if self.estimator else inputs.observation
         batch = np.asarray(seen, dtype=np.float32)
+        feed = {"observation": batch}
+        if self.image is not None:
+            feed["image"] = self.image.taken(inputs.readings[self.image.reading])
         if self.passport.memory:
             if self._memory is None or len(self._memory) != len(batch):
                 self._memory = np.zeros((len(batch), self.passport.memory), dtype=np.float32)
                 self._expected = None
-            memory = self._corrected(self._memory, inputs.previous)
-            command, self._memory = self._session.run(
-                ["command", "next_memory"], {"observation": batch, "memory": memory}
-            )
+            feed["memory"] = self._corrected(self._memory, inputs.previous)
+            command, self._memory = self._session.run(["command", "next_memory"], feed)
             if self.passport.remembers_command:
                 limited = self._robot.actuators.limited(np.asarray(command, dtype=float))
                 self._expected = slewed(limited, inputs.previous, self._robot, inputs.dt)
         else:
-            (command,) = self._session.run(["command"], {"observation": batch})
+            (command,) = self._session.run(["command"], feed)
         return np.asarray(command)
 
     def _corrected(self, memory: np.ndarray, previous: np.ndarray) -> np.ndarray:
@@ -135,21 +138,25 @@ def _check_shapes(session: onnxruntime.InferenceSession, passport: Passport, fol
     inputs = {node.name: node for node in session.get_inputs()}
     outputs = {node.name: node for node in session.get_outputs()}
     wanted = [
-        (inputs, "observation", len(passport.observation_names)),
-        (outputs, "command", len(passport.actuator_names)),
-        (outputs, "logits", len(passport.actuator_names)),
+        (inputs, "observation", (len(passport.observation_names),)),
+        (outputs, "command", (len(passport.actuator_names),)),
+        (outputs, "logits", (len(passport.actuator_names),)),
     ]
     takes = ["observation"]
     if passport.memory:
-        wanted += [(inputs, "memory", passport.memory), (outputs, "next_memory", passport.memory)]
+        wanted += [(inputs, "memory", (passport.memory,)), (outputs, "next_memory", (passport.memory,))]
         takes.append("memory")
-    for found, name, width in wanted:
+    if passport.image is not None:
+        wanted.append((inputs, "image", passport.image.shape))
+        takes.append("image")
+    for found, name, sizes in wanted:
         if name not in found:
             raise BundleError(f"{folder / NETWORK}: has no tensor '{name}', only {', '.join(found)}.")
         shape, kind = found[name].shape, found[name].type
-        if len(shape) != 2 or isinstance(shape[0], int) or shape[1] != width:
+        if not shape or isinstance(shape[0], int) or tuple(shape[1:]) != sizes:
             raise BundleError(
-                f"{folder / NETWORK}: '{name}' has shape {shape}, the passport needs (any number, {width})."
+                f"{folder / NETWORK}: '{name}' has shape {shape}, the passport needs (any number, "
+                f"{', '.join(map(str, sizes))})."
             )
         if kind != "tensor(float)":
             raise BundleError(f"{folder / NETWORK}: '{name}' is a {kind}, it must be a tensor(float).")
@@ -166,6 +173,8 @@ def _check_golden(session: onnxruntime.InferenceSession, bundle: Bundle) -> None
     if passport.memory:
         feed["memory"] = golden.memories
         names.append("next_memory")
+    if golden.images is not None:
+        feed["image"] = golden.images
     try:
         command, logits, *memories = session.run(names, feed)
     except Exception as error:
@@ -191,16 +200,23 @@ def _check_golden(session: onnxruntime.InferenceSession, bundle: Bundle) -> None
 
 def _check_golden_shapes(golden: Golden, passport: Passport, folder: Path) -> None:
     count = len(golden.observations) if golden.observations.ndim else 0
-    for name, width in (
-        ("observations", len(passport.observation_names)),
-        ("memories", passport.memory),
-        ("commands", len(passport.actuator_names)),
-        ("logits", len(passport.actuator_names)),
-        ("next_memories", passport.memory),
-    ):
+    if (golden.images is None) != (passport.image is None):
+        raise BundleError(
+            f"{folder / GOLDEN}: has {'no ' if golden.images is None else ''}'images', which the passport "
+            f"{'names' if passport.image else 'does not name'}. Export the policy again."
+        )
+    wanted: list[tuple[str, tuple[int, ...]]] = [
+        ("observations", (len(passport.observation_names),)),
+        ("memories", (passport.memory,)),
+        ("commands", (len(passport.actuator_names),)),
+        ("logits", (len(passport.actuator_names),)),
+        ("next_memories", (passport.memory,)),
+        *([("images", passport.image.shape)] if passport.image else []),
+    ]
+    for name, sizes in wanted:
         found = getattr(golden, name)
-        if count == 0 or found.shape != (count, width) or found.dtype != np.float32:
+        if count == 0 or found.shape != (count, *sizes) or found.dtype != np.float32:
             raise BundleError(
                 f"{folder / GOLDEN}: '{name}' is {found.dtype} of shape {found.shape}, it must be float32 of shape "
-                f"({count or 'at least 1'}, {width}). Export the policy again."
+                f"({count or 'at least 1'}, {', '.join(map(str, sizes))}). Export the policy again."
             )

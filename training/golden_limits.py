@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import fields
 
 import numpy as np
 
@@ -64,6 +63,5 @@ def with_limits(golden: Golden, infer: Infer, scale: np.ndarray, action: Action)
         for side, actuator in np.argwhere(missing)
     ]
     found = Golden(*(each[rows] for each in (seen, memory, commands, logits, after)))
-    return Golden(
-        *(np.concatenate((getattr(golden, f.name), getattr(found, f.name))) for f in fields(Golden))
-    )
+    added = found.arrays()
+    return Golden(**{name: np.concatenate((array, added[name])) for name, array in golden.arrays().items()})

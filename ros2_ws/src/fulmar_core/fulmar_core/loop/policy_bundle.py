@@ -1,8 +1,8 @@
 """A policy with its passport: one folder that says what it is and refuses to be anything else.
 
     policy.onnx     the network: input `observation`, outputs `command` and `logits`; one with memory also takes
-                    `memory` and gives `next_memory`
-    golden.npz      observations, and what the network gave for them when it was exported
+                    `memory` and gives `next_memory`, one that sees also takes `image`
+    golden.npz      observations and images, and what the network gave for them when it was exported
     passport.json   robot, task, rate, names, hashes of the two files, and how it was made
     signature.json  of the passport, where it is signed: `fulmar_core.loop.bundle_signature`
 
@@ -27,6 +27,7 @@ from fulmar_core.config.atomic_write import write_whole
 from fulmar_core.config.bounded_file import WEIGHTS_BYTES, load_arrays, read_bounded
 from fulmar_core.config.errors import BundleError, did_you_mean
 from fulmar_core.controllers.disturbance_inputs import disturbance_terms
+from fulmar_core.loop.image_input import ImageInput
 from fulmar_core.robots.robot import Robot
 from fulmar_core.tasks import Task
 from fulmar_core.tasks.observation import Observer
@@ -41,9 +42,8 @@ MOST_OFFERED = 3  # bundles, in place of one that does not exist
 MAX_BYTES = WEIGHTS_BYTES  # a file beyond this is no policy of ours, and is not read
 
 Action = Literal["on_off", "continuous"]
-LATER: dict[str, Any] = {
-    "remembers_command": False
-}  # keys that came after format 2, and what is without them
+# Keys that came after format 2, and what is without them.
+LATER: dict[str, Any] = {"remembers_command": False, "image": None}
 
 
 @dataclass(frozen=True)
@@ -66,6 +66,7 @@ class Passport:
     # Whether the memory ends with the last command, as shares of full command: where the robot was then commanded
     # otherwise, that takes its place.
     remembers_command: bool = False
+    image: ImageInput | None = None  # what it sees; None: nothing
 
     def sealed(self) -> Passport:
         """The same passport with its own hash filled in."""
@@ -93,6 +94,12 @@ class Golden:
     commands: np.ndarray  # (k, m) float32
     logits: np.ndarray  # (k, m) float32, what the network decided the commands by
     next_memories: np.ndarray  # (k, `memory`) float32
+    images: np.ndarray | None = None  # (k, *`ImageInput.shape`) float32, where the network sees
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """Those that there are, by name."""
+        found = {each.name: getattr(self, each.name) for each in fields(self)}
+        return {name: array for name, array in found.items() if array is not None}
 
 
 @dataclass(frozen=True)
@@ -142,8 +149,9 @@ def write_bundle(folder: Path, network: bytes, golden: Golden, passport: Passpor
     """
     folder.mkdir(parents=True, exist_ok=True)
     vectors = io.BytesIO()
-    np.savez(vectors, **{f.name: getattr(golden, f.name) for f in fields(golden)})
-    values = asdict(passport) | {
+    save = np.savez if golden.images is None else np.savez_compressed
+    save(vectors, **golden.arrays())
+    values = passport.plain() | {
         "network_sha256": _sha256(network),
         "golden_sha256": _sha256(vectors.getvalue()),
         "sha256": "",
@@ -273,6 +281,8 @@ def check_fit(passport: Passport, robot: Robot, task: Task, control_hz: float, *
             f"policy '{where}' was trained for full commands of {list(passport.command_scale)}, those of "
             f"'{robot.name}' are {list(scale)}. Train and export it again."
         )
+    if passport.image is not None and (problem := passport.image.problem(robot, control_hz)):
+        raise BundleError(f"policy '{where}' {problem}")
 
 
 def takes_disturbances(names: tuple[str, ...], robot: Robot) -> bool:
@@ -319,6 +329,10 @@ def _passport_of(values: Any, path: Path) -> Passport:
     for name in ("observation_names", "actuator_names"):
         values[name] = tuple(map(str, values[name]))
     values["command_scale"] = tuple(map(float, values["command_scale"]))
+    try:
+        values["image"] = None if values["image"] is None else ImageInput.from_plain(values["image"])
+    except (ValueError, TypeError) as error:
+        raise BundleError(f"{path}: 'image' has no meaning: {error}. Export the policy again.") from error
     return Passport(**values)
 
 
@@ -353,8 +367,12 @@ def _content(folder: Path, name: str) -> bytes:
 
 def _golden_of(content: bytes, path: Path) -> Golden:
     try:
-        arrays = load_arrays(content, MAX_BYTES, names=[f.name for f in fields(Golden)])
-        return Golden(**arrays)
+        arrays = load_arrays(content, MAX_BYTES)
+        found = {f.name: arrays[f.name] for f in fields(Golden) if f.name in arrays}
+        missing = [f.name for f in fields(Golden) if f.name not in (*found, "images")]
+        if missing:
+            raise ValueError(f"lacks an array: {missing[0]}")
+        return Golden(**found)
     except ValueError as error:
         raise BundleError(f"{path}: cannot be read: {error}. Export the policy again.") from error
 
