@@ -123,15 +123,20 @@ def runs_of(
             progress=progress,
         )
         return
-    yield roll_out_in_backends(
-        controller or trial.controller(),
-        _simulator(trial, robot, task, scenario),
-        task,
-        scenario,
-        episodes=trial.episodes,
-        seed=plan.seed,
-        progress=progress,
-    )
+    from sim_nodes.sight import sight_of
+
+    acting = controller or trial.controller()
+    with sight_of(acting, robot, task) as sight:
+        yield roll_out_in_backends(
+            acting,
+            _simulator(trial, robot, task, scenario),
+            task,
+            scenario,
+            episodes=trial.episodes,
+            seed=plan.seed,
+            progress=progress,
+            sight=sight,
+        )
 
 
 def _simulator(trial: Trial, robot: Robot, task: Task, scenario: Scenario) -> Callable[[], Backend]:

@@ -8,8 +8,10 @@ from typing import Protocol
 
 import numpy as np
 
+from fulmar_core.config.errors import ConfigError
 from fulmar_core.controllers.controller import Controller, Readings
 from fulmar_core.dynamics.things import Poses
+from fulmar_core.estimators.readings import readings_of
 from fulmar_core.loop.control_loop import ControlLoop
 from fulmar_core.loop.newest_readings import NewestReadings
 from fulmar_core.robots.robot import Robot
@@ -27,6 +29,8 @@ SIDE_BY_SIDE = 256  # simulators alive at once
 WORLDS = 2048  # of a batch at once: nearly as fast as more, and their record stays below some 200 MB
 
 Progress = Callable[[int], None]  # called with the number of control steps done
+# What cameras of robots in some true states see, shapes (n,): images by the name of their reading, each (n, ...).
+Sight = Callable[[State], Readings]
 
 
 def roll_out_in_batch(
@@ -38,11 +42,13 @@ def roll_out_in_batch(
     episodes: int,
     seed: int,
     progress: Progress = lambda steps: None,
+    sight: Sight | None = None,
 ) -> Trajectories:
     """Run episodes in the core's own dynamics; arguments and errors as in `batches`, their runs in one."""
-    return join(
-        list(batches(controller, robot, task, scenario, episodes=episodes, seed=seed, progress=progress))
+    runs = batches(
+        controller, robot, task, scenario, episodes=episodes, seed=seed, progress=progress, sight=sight
     )
+    return join(list(runs))
 
 
 def batches(
@@ -55,6 +61,7 @@ def batches(
     seed: int,
     worlds: int = WORLDS,
     progress: Progress = lambda steps: None,
+    sight: Sight | None = None,
 ) -> Iterator[Trajectories]:
     """Run some episodes of a seed in the core's own dynamics, some at once.
 
@@ -67,13 +74,15 @@ def batches(
         seed: Seed of the draws.
         worlds: How many run at once, >= 1; what happens does not depend on it.
         progress: Receives the number of control steps done.
+        sight: The robots' cameras.
 
     Yields:
         What happened, from the true states, for the next so many episodes.
 
     Raises:
-        ConfigError: An episode is shorter than one control step.
+        ConfigError: An episode is shorter than one control step, or the controller sees and there is no `sight`.
     """
+    _check_sight(controller, robot, sight)
     for done in range(0, episodes, worlds):
         count = min(worlds, episodes - done)
         simulation = BatchSimulation(
@@ -90,7 +99,7 @@ def batches(
         def further(steps: int, before: int = before) -> None:
             progress(before + steps)
 
-        yield _roll_out(controller, robot, task, simulation, simulation.goal, further)
+        yield _roll_out(controller, robot, task, simulation, simulation.goal, further, sight)
 
 
 def roll_out_in_backends(
@@ -102,6 +111,7 @@ def roll_out_in_backends(
     episodes: int,
     seed: int,
     progress: Progress = lambda steps: None,
+    sight: Sight | None = None,
 ) -> Trajectories:
     """Run some episodes of a seed, each in a backend of its own, stepped side by side.
 
@@ -113,12 +123,13 @@ def roll_out_in_backends(
         episodes: Number of episodes, >= 1.
         seed: Seed of the draws.
         progress: Receives the number of control steps done.
+        sight: The robots' cameras.
 
     Returns:
         What happened, from the true states.
 
     Raises:
-        ConfigError: An episode is shorter than one control step.
+        ConfigError: An episode is shorter than one control step, or the controller sees and there is no `sight`.
     """
     runs: list[Trajectories] = []
     with ExitStack() as stack:
@@ -134,13 +145,14 @@ def roll_out_in_backends(
                 progress(done + steps)
 
             robot = backends[0].robot
+            _check_sight(controller, robot, sight)
             drawn = draw_episodes(robot, task.fitted(robot), scenario, seed=seed, numbers=np.asarray(numbers))
             samples = [
                 backend.reset(drawn[i], seed=seed, number=each)
                 for i, (backend, each) in enumerate(zip(backends, numbers, strict=False))
             ]
             worlds = _Backends(backends, samples, controller, task.state_type)
-            runs.append(_roll_out(controller, robot, task, worlds, drawn.goal, further))
+            runs.append(_roll_out(controller, robot, task, worlds, drawn.goal, further, sight))
     return join(runs)
 
 
@@ -172,8 +184,29 @@ class _Worlds(Protocol):
         ...
 
 
+def _check_sight(controller: Controller, robot: Robot, sight: Sight | None) -> None:
+    """Refuse a controller that sees where there is no camera.
+
+    Raises:
+        ConfigError: With what to do.
+    """
+    known = readings_of(robot)
+    seen = [name for name in controller.readings if name in known and known[name].image]
+    if seen and sight is None:
+        raise ConfigError(
+            f"controller '{controller.name}' takes the reading '{seen[0]}', and there is no camera here. Evaluate it "
+            "with --through mujoco, which draws what it sees."
+        )
+
+
 def _roll_out(
-    controller: Controller, robot: Robot, task: Task, worlds: _Worlds, goal: Goal, progress: Progress
+    controller: Controller,
+    robot: Robot,
+    task: Task,
+    worlds: _Worlds,
+    goal: Goal,
+    progress: Progress,
+    sight: Sight | None,
 ) -> Trajectories:
     """Run one episode in each world; what happened is taken from the true states."""
     loop = ControlLoop(robot, task, controller, robots=len(goal.done))
@@ -183,7 +216,8 @@ def _roll_out(
     for number in range(episode_steps(task, loop.dt)):
         assert loop.goal is not None
         loop.goal = goal_in_float64(loop.goal.among(worlds.things))
-        step = loop.step(worlds.measured, worlds.readings, round(1e9 * number * loop.dt))
+        readings = worlds.readings if sight is None else {**worlds.readings, **sight(worlds.truth)}
+        step = loop.step(worlds.measured, readings, round(1e9 * number * loop.dt))
         worlds.move(step.command)
         log.add(worlds.truth, counter.update(worlds.truth, worlds.things), step.command)
         progress((number + 1) * len(goal.done))

@@ -1,0 +1,84 @@
+"""The cameras of robots that are simulated without ROS, for evaluations and learners: states in, images out."""
+
+from __future__ import annotations
+
+import contextlib
+from typing import Self
+
+import numpy as np
+
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.controllers.controller import Controller, Readings
+from fulmar_core.loop.image_input import ImageInput
+from fulmar_core.robots.robot import Robot
+from fulmar_core.robots.sensors.camera import CameraConfig
+from fulmar_core.states.state import State
+from fulmar_core.tasks import Task
+
+
+class CameraSight:
+    """What the camera of a robot sees from many states, drawn one after the other; see `rollout.Sight`.
+
+    A process that learns imports `torch._dynamo` first: loaded after an EGL renderer was made, its compiler ends the
+    process by a segmentation fault.
+    """
+
+    def __init__(self, robot: Robot, task: Task, camera: CameraConfig | None = None) -> None:
+        """Build the scene of a task.
+
+        Args:
+            robot: The robot.
+            task: Has the structures.
+            camera: In the place of the robot's own.
+
+        Raises:
+            ConfigError: Nothing can draw here, with what to install.
+        """
+        # Only here: most evaluations draw nothing.
+        from sim_nodes.camera.backdrop import backdrop_of
+        from sim_nodes.camera.renderer import Renderer
+
+        own = camera or robot.sensors.camera
+        assert own is not None, "a policy that sees was checked against the robot's camera"
+        self._renderer = Renderer(own, task.structures, backdrop=backdrop_of(robot))
+
+    def __call__(self, state: State) -> Readings:
+        """Images of each state, shapes (n,): depth (n, h, w) float32 [m] and colours (n, h, w, 3) uint8."""
+        rigid = state.to_rigid()
+        poses = np.concatenate((np.asarray(rigid.position_in_world), np.asarray(rigid.quat_xyzw)), axis=-1)
+        frames = [self._renderer.render(pose) for pose in np.atleast_2d(poses)]
+        return {
+            "camera_depth": np.stack([frame.depth for frame in frames]),
+            "camera_image": np.stack([frame.rgb for frame in frames]),
+        }
+
+    def close(self) -> None:
+        """Free what the driver holds."""
+        self._renderer.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def sight_of(
+    controller: Controller, robot: Robot, task: Task
+) -> contextlib.AbstractContextManager[CameraSight | None]:
+    """The camera of a robot for a controller that takes its images, to be closed; None for another one.
+
+    Of a policy it draws only those pixels that its network takes.
+
+    Raises:
+        ConfigError: The robot has no camera, or nothing can draw here.
+    """
+    if not {"camera_depth", "camera_image"}.intersection(controller.readings):
+        return contextlib.nullcontext()
+    image: ImageInput | None = getattr(controller, "image", None)
+    if robot.sensors.camera is None:
+        raise ConfigError(
+            f"controller '{controller.name}' takes images, and '{robot.name}' has no camera. Add 'camera' to the "
+            "'sensors' of its file."
+        )
+    return CameraSight(robot, task, image.camera if image else None)
