@@ -17,7 +17,7 @@ from fulmar_core.simulation.metrics import summary
 from fulmar_core.tasks import Task, load_task
 from fulmar_core.worlds.scenario import Scenario, load_scenario
 from training.bodies import KnownBodies
-from training.network import DeployedNetwork, NetworkController, load_network
+from training.network import DeployedNetwork, NetworkController, controller_of, load_network
 from training.policy_network import PolicyNetwork
 from training.run_folder import NETWORK_FILE, read_run_record, write_run_record
 
@@ -104,19 +104,23 @@ def evaluate_in_mujoco(run: Path, *, episodes: int, scenario: str = "nominal") -
     Returns:
         Success rate and every metric.
     """
-    from sim_nodes.mujoco_backend import MujocoBackend  # only here: learning itself needs no MuJoCo
+    # Only here: learning itself needs no MuJoCo.
+    from sim_nodes.mujoco_backend import MujocoBackend
+    from sim_nodes.sight import sight_of
 
     record = read_run_record(run)
     robot, task, world = load_robot(record["robot"]), load_task(record["task"]), load_scenario(scenario)
-    controller = NetworkController(load_network(run / NETWORK_FILE), robot, task, record["control_hz"])
-    trajectories = roll_out_in_backends(
-        controller,
-        lambda: MujocoBackend.of(robot, task, world),
-        task,
-        world,
-        episodes=episodes,
-        seed=EVALUATION_SEED,
-    )
+    controller = controller_of(load_network(run / NETWORK_FILE), robot, task, record["control_hz"])
+    with sight_of(controller, robot, task) as sight:
+        trajectories = roll_out_in_backends(
+            controller,
+            lambda: MujocoBackend.of(robot, task, world),
+            task,
+            world,
+            episodes=episodes,
+            seed=EVALUATION_SEED,
+            sight=sight,
+        )
     figures: dict[str, Any] = summary(trajectories, task)
     record["mujoco"] = {"scenario": scenario, "seed": EVALUATION_SEED, **figures}
     write_run_record(run, record)

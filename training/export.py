@@ -24,6 +24,8 @@ from fulmar_core.tasks.goal import goal_in_float64
 from fulmar_core.tasks.observation import Observer
 from fulmar_core.worlds.scenario import load_scenario
 from training.golden_limits import with_limits
+from training.golden_views import golden_views
+from training.image_network import ImageNetwork
 from training.network import DeployedNetwork, NetworkController, load_network
 from training.policy_network import PolicyNetwork
 from training.run_folder import NETWORK_FILE, read_run_record
@@ -87,8 +89,13 @@ def export(run: Path, out: Path, other: str | None = None) -> Passport:
         }
         | {"curve": _curve(record)}
         | _mujoco_result(record),
+        image=network.plan.image if isinstance(network, ImageNetwork) else None,
     )
-    golden = _golden(network, robot, task)
+    golden = (
+        golden_views(network, robot, task)
+        if isinstance(network, ImageNetwork)
+        else _golden(network, robot, task)
+    )
     check_output(golden.logits, golden.commands, golden.next_memories, what=f"{out}: no bundle is written")
     return write_bundle(out, _to_onnx(network), golden, passport)
 
@@ -117,7 +124,10 @@ def _mujoco_result(record: dict[str, Any]) -> dict[str, Any]:
 
 def _to_onnx(network: PolicyNetwork) -> bytes:
     memory = network.plan.memory
-    example = [torch.zeros(2, network.plan.observed), *([torch.zeros(2, memory)] if memory else [])]
+    more = {"memory": torch.zeros(2, memory)} if memory else {}
+    if isinstance(network, ImageNetwork):
+        more["image"] = torch.ones(2, *network.plan.image.shape)
+    example = [torch.zeros(2, network.plan.observed), *more.values()]
     worlds = torch.export.Dim("worlds")
     logging.getLogger("torch.onnx").setLevel(
         logging.ERROR
@@ -130,7 +140,7 @@ def _to_onnx(network: PolicyNetwork) -> bytes:
             program = torch.onnx.export(
                 network,
                 tuple(example),
-                input_names=["observation", *(["memory"] if memory else [])],
+                input_names=["observation", *more],
                 output_names=["command", "logits", *(["next_memory"] if memory else [])],
                 dynamic_shapes=tuple({0: worlds} for _ in example),
                 opset_version=OPSET,

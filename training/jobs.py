@@ -25,7 +25,7 @@ from training.run_folder import (
     read_run_record,
     write_run_record,
 )
-from training.settings import Dreamer, TrainingSettings
+from training.settings import Clone, Dreamer, TrainingSettings
 from training.train import begin_run, check_seed, train
 
 
@@ -115,6 +115,11 @@ def _train(
     shared: dict[str, Any] = {**_limits(job), **made_by, "watcher": watcher}
     if isinstance(job.settings.algorithm, Dreamer):
         return train_dreamer(robot, task, job.settings, **shared)
+    if isinstance(job.settings.algorithm, Clone):  # it has no checkpoint: a run that was broken off begins anew
+        from training.image_cloning import train_from_images  # only here: it needs a renderer
+
+        begin_run(robot, task, job.settings, **_limits(job))
+        return train_from_images(robot, task, job.settings, **shared)
     resume = (job.out / CHECKPOINT_FILE).is_file()
     return train(robot, task, job.settings, **shared, resume=resume, fallback=fallback, curves=_curves(job))
 

@@ -25,6 +25,7 @@ from fulmar_core.tasks import Task
 from fulmar_core.tasks.observation import Observer
 from training.bodies import KnownBodies
 from training.dreamer_network import DreamerNetwork, DreamerPlan
+from training.image_network import ImageController, ImageNetwork, ImagePlan
 from training.incremental_actions import KINDS, incremental_shares
 from training.policy_network import PolicyNetwork
 
@@ -280,6 +281,7 @@ def load_network(path: Path) -> PolicyNetwork:
         pickle.UnpicklingError,
         LookupError,
         TypeError,
+        ValueError,
         AttributeError,
     ) as error:
         raise ConfigError(
@@ -291,6 +293,8 @@ def load_network(path: Path) -> PolicyNetwork:
 def _network_of(plain: dict[str, Any]) -> PolicyNetwork:
     if "classes" in plain:
         return DreamerNetwork(DreamerPlan(**plain))
+    if "image" in plain:
+        return ImageNetwork(ImagePlan.from_plain(plain))
     return DeployedNetwork(_plan_of(plain))
 
 
@@ -329,3 +333,12 @@ class NetworkController:
     def metadata(self) -> dict[str, Any]:
         """Its kind; an unfinished network has no identity to record."""
         return {"controller": self.name}
+
+
+def controller_of(
+    network: PolicyNetwork, robot: Robot, task: Task, control_hz: float
+) -> NetworkController | ImageController:
+    """A network behind the controller interface; rate in Hz."""
+    if isinstance(network, ImageNetwork):
+        return ImageController(network, robot, task, control_hz)
+    return NetworkController(network, robot, task, control_hz)

@@ -163,7 +163,41 @@ class Dreamer:
         shares(gamma=self.gamma)
 
 
-Algorithm = Ppo | RecurrentPpo | Sac | Td3 | Dreamer
+@dataclass(frozen=True, kw_only=True)
+class Clone:
+    """Learning to see a goal from images, for a fixed law that steers there (`training.image_cloning`)."""
+
+    kind: Literal["clone"] = "clone"
+    reading: Literal["camera_depth", "camera_image"] = "camera_depth"
+    every: int  # of so many pixels along each side of an image one is taken; odd
+    channels: tuple[int, ...]  # of the convolutions
+    features: int  # of the layer behind them
+    views: int  # drawn to begin with
+    buffer: int  # views remembered
+    keep_every: int  # control steps of a flight between two views that are kept
+    flights: int  # of a check on held-out episodes
+    minibatch: int
+    gradient_steps: int  # of an update
+    learning_rate: float
+    speed: float  # of the approach [m/s]
+    turn_rate: float  # [rad/s]
+
+    def __post_init__(self) -> None:
+        at_least_1(
+            every=self.every,
+            channels=self.channels,
+            features=self.features,
+            views=self.views,
+            buffer=self.buffer,
+            keep_every=self.keep_every,
+            flights=self.flights,
+            minibatch=self.minibatch,
+            gradient_steps=self.gradient_steps,
+        )
+        positive(learning_rate=self.learning_rate, speed=self.speed, turn_rate=self.turn_rate)
+
+
+Algorithm = Ppo | RecurrentPpo | Sac | Td3 | Dreamer | Clone
 
 
 @dataclass(frozen=True)
