@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import cast
@@ -32,10 +33,11 @@ from fulmar_bringup.system import (
     system_of,
 )
 from fulmar_bringup.task_choice import task_of
-from fulmar_core.config.errors import ConfigError, UnknownNameError
+from fulmar_core.config.errors import BundleError, ConfigError, UnknownNameError
 from fulmar_core.config.own_class import is_own
 from fulmar_core.config.recording import MODES, Mode, Recording
 from fulmar_core.estimators.kinds import default_estimator, estimator_kind
+from fulmar_core.loop.policy_bundle import read_passport
 from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.robots.topics import ODOMETRY
@@ -79,10 +81,20 @@ def completed(plan: RunPlan) -> RunPlan:
         policy=str(policy.absolute()) if policy else "",
         adapter=adapter_path(plan.robot, plan.adapter),
         guards=_guards(plan, robot),
+        extras=tuple(dict.fromkeys((*plan.extras, *_eyes(plan, policy)))),
     )
     # A controller of one's own may read the gyroscope too.
     check_scenario(robot, plan.scenario, estimated=bool(plan.guards.files) or is_own(plan.controller))
     return _with_goal(_as_its_system(plan), robot, task)
+
+
+def _eyes(plan: RunPlan, policy: Path | None) -> tuple[str, ...]:
+    """The simulated camera, where a policy needs its images; a real robot has its own."""
+    if policy is None or plan.backend == "hardware":
+        return ()
+    with contextlib.suppress(BundleError):  # whatever loads the bundle says what is wrong with it
+        return (CAMERA,) if read_passport(policy).image is not None else ()
+    return ()
 
 
 def _check_asked(plan: RunPlan, robot: Robot) -> None:

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fulmar_bringup.camera_row import CAMERA
 from fulmar_bringup.run_plan import RunPlan
+from fulmar_core.config.errors import ConfigError
 from fulmar_core.config.own_class import is_own
 from fulmar_core.controllers.controller import Controller
 from fulmar_core.loop.fallback import warm_up
@@ -105,6 +107,11 @@ def runs_of(
     if trial.through == "ros":
         from fulmar_evaluation.ros_evaluation import roll_out_through_ros
 
+        if CAMERA in plan.extras:
+            raise ConfigError(
+                f"'{plan.policy or plan.controller}' takes images, and evaluations --through ros run no camera. "
+                f"Evaluate it with --through mujoco, or fly it: fulmar run {plan.robot} --task {plan.task} --lockstep."
+            )
         if pool is not None:
             yield pool.roll_out(plan, episodes=trial.episodes, progress=progress)
         else:
