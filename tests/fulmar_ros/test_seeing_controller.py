@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from rclpy.serialization import serialize_message
 
+from fulmar_core.config.errors import BundleError
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.robots.topics import CAMERA_DEPTH
 from fulmar_core.safety.arbiter import Mode
@@ -40,13 +41,22 @@ class OpensByDepth:
         return {"controller": self.name, "sha256": "0"}
 
 
+class Blind(OpensByDepth):
+    """The same without eyes."""
+
+    readings = ()
+
+    def act(self, inputs):
+        return np.zeros((1, 8))
+
+
 class Driven:
     """The node, whose messages a test sends itself, by the clock or in lock step."""
 
-    def __init__(self, *, lockstep=True):
+    def __init__(self, *, lockstep=True, controller=OpensByDepth):
         parameters = ("robot:=cubesat_8", "task:=dock", f"lockstep:={str(lockstep).lower()}", "estop:=false")
         arguments = ["--ros-args", "-r", "__ns:=/cubesat_8", *(w for p in parameters for w in ("-p", p))]
-        self.node = ControllerNode(lambda *_: OpensByDepth(), print, cli_args=arguments)
+        self.node = ControllerNode(lambda *_: controller(), print, cli_args=arguments)
         self.sent = []
         self.node.wires.publish_command = lambda command, _stamp: self.sent.append(np.array(command))
         self._times = itertools.count(STEP_NS, STEP_NS)
@@ -159,3 +169,12 @@ def test_by_the_clock_a_camera_that_never_spoke_is_said():
     driven.node._step()
     assert driven.node.guard.flags.image_problem == "camera_depth: no image yet. Does the camera run?"
     assert driven.sent[-1].tolist() == [0.0] * 8
+
+
+def test_a_policy_that_sees_does_not_take_over_in_a_node_that_receives_no_images():
+    driven = Driven(controller=Blind)
+    driven.node._make_controller = lambda *_: OpensByDepth()
+    with pytest.raises(
+        BundleError, match="policy 'other' takes camera_depth, which this node does not receive"
+    ):
+        driven.node._load("other")

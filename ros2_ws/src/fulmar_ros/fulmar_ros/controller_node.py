@@ -13,7 +13,7 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackRet
 from std_msgs.msg import Bool, String
 from visualization_msgs.msg import MarkerArray
 
-from fulmar_core.config.errors import FAILED, FulmarError, TaskError
+from fulmar_core.config.errors import FAILED, BundleError, FulmarError, TaskError
 from fulmar_core.controllers.controller import Controller, Inputs
 from fulmar_core.estimators.actuator_health.applied import AppliedHistory
 from fulmar_core.estimators.actuator_health.beliefs import DEAD, Beliefs
@@ -227,7 +227,13 @@ class ControllerNode(LifecycleNode):
         self._publish_status()  # at once: an operator repeats the request until then
 
     def _load(self, folder: str) -> Standby:
-        return load_other(self._make_controller, self.robot, self.task, self.settings, folder)
+        candidate = load_other(self._make_controller, self.robot, self.task, self.settings, folder)
+        unheard = set(candidate.controller.readings) - self._readings.newest.kinds.keys()
+        if unheard:  # subscriptions are made when the node is configured
+            raise BundleError(
+                f"policy '{folder}' takes {min(unheard)}, which this node does not receive. Start a run with it."
+            )
+        return candidate
 
     def _announce(self) -> None:
         """Publish the identity of the controller that acts from now on; estimates begin anew."""
