@@ -8,6 +8,8 @@ import numpy as np
 import torch
 from torch import nn
 
+from fulmar_core.config.errors import ConfigError
+from fulmar_core.robots.robot import Robot
 from fulmar_core.states.rotation import Array
 
 
@@ -39,6 +41,17 @@ class PolicyNetwork(nn.Module):
             before = torch.zeros(len(seen), self.plan.memory) if memory is None else torch.as_tensor(memory)
             command, raw, after = self(seen, before)
         return command.numpy(), raw.numpy(), after.numpy()
+
+    def for_robot(self, robot: Robot) -> PolicyNetwork:
+        """The same weights for another robot.
+
+        Raises:
+            ConfigError: They are for the robot that it learned on alone, or not for this one.
+        """
+        raise ConfigError(
+            f"this network is not for '{robot.name}': it chooses actuators of the robot that it learned on. Train one "
+            "with 'action_space: wrench' and 'body_inputs: true'."
+        )
 
     def clear(self, observation: np.ndarray, memory: np.ndarray) -> np.ndarray:
         """Where no choice of the network is so near a tie that another processor may choose otherwise, (worlds,)."""

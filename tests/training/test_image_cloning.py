@@ -207,6 +207,11 @@ def test_a_robot_that_cannot_be_steered_so_is_refused(robot, words):
         ImageNetwork(plan_of(robot, SMALL.algorithm)).take_allocation(robot)
 
 
+def test_its_network_is_for_no_other_robot(run, tmp_path):
+    with pytest.raises(ConfigError, match="this network is not for 'spacecraft_16'"):
+        export(run[0], tmp_path, "spacecraft_16")
+
+
 def test_a_task_without_a_berth_is_refused(tmp_path):
     with pytest.raises(
         ConfigError, match="tasks with a berth that a camera sees, such as dock, not 'go_to_pose_3d'"
