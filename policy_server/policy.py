@@ -137,7 +137,7 @@ def _open(bundle: Bundle) -> onnxruntime.InferenceSession:
 def _check_shapes(session: onnxruntime.InferenceSession, passport: Passport, folder: Path) -> None:
     inputs = {node.name: node for node in session.get_inputs()}
     outputs = {node.name: node for node in session.get_outputs()}
-    wanted = [
+    wanted: list[tuple[dict[str, Any], str, tuple[int, ...]]] = [
         (inputs, "observation", (len(passport.observation_names),)),
         (outputs, "command", (len(passport.actuator_names),)),
         (outputs, "logits", (len(passport.actuator_names),)),

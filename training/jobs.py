@@ -115,7 +115,9 @@ def _train(
     shared: dict[str, Any] = {**_limits(job), **made_by, "watcher": watcher}
     if isinstance(job.settings.algorithm, Dreamer):
         return train_dreamer(robot, task, job.settings, **shared)
-    if isinstance(job.settings.algorithm, Clone):  # it has no checkpoint: a run that was broken off begins anew
+    if isinstance(
+        job.settings.algorithm, Clone
+    ):  # it has no checkpoint: a run that was broken off begins anew
         from training.image_cloning import train_from_images  # only here: it needs a renderer
 
         begin_run(robot, task, job.settings, **_limits(job))

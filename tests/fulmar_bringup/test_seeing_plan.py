@@ -32,6 +32,6 @@ def test_no_camera_runs_with_a_law(plan):
 def test_an_evaluation_through_ros_refuses_a_policy_that_sees(plan):
     whole = replace(completed(plan), duration_s=1.0)
     with pytest.raises(
-        ConfigError, match="takes images, and evaluations --through ros run no camera. Evaluate it with"
+        ConfigError, match=r"takes images, and evaluations --through ros run no camera. Evaluate it with"
     ):
         next(runs_of(Trial(whole, "ros", 1)))

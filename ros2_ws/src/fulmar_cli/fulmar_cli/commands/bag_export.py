@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Annotated
 
 from fulmar_bags.bag_reading import BagReading
+from fulmar_bags.contents import Bag
 from fulmar_bringup.console import print_json, warn, write_line
 from fulmar_cli.commands.arguments import JsonOption, argument, option
 from fulmar_cli.commands.bag_reading import with_bag_options
@@ -61,21 +62,7 @@ def export(
         file, left_out = write_frames(opened[0], out or beside / "frames")
         files = [file]
     else:
-        from fulmar_bags.control_steps import control_steps_of
-        from fulmar_bags.lerobot import write_lerobot
-        from fulmar_bags.lerobot_images import seen_in
-        from fulmar_evaluation.rerun.embedded_configs import knowing_what_it_carries
-
-        for bag in opened:
-            if bag.info is None:
-                raise BagError(
-                    f"{bag.path}: others recorded it, without the observations of a controller. Use --to csv or npz."
-                )
-        with knowing_what_it_carries(*opened):
-            records = [control_steps_of(bag) for bag in opened]
-            titles = [record.task.title for record in records]
-            seen = [seen_in(bag) for bag in opened]
-            folder, notes = write_lerobot(records, titles, out or beside / "lerobot", seen)
+        folder, notes = _write_dataset(opened, out or beside / "lerobot")
         files, left_out = [folder], []
         warn(notes)
     warn(f"left out: {line}" for line in left_out)
@@ -86,3 +73,22 @@ def export(
         for file in files:
             write_line(str(file))
     raise finish(*opened)
+
+
+def _write_dataset(opened: list[Bag], out: Path) -> tuple[Path, list[str]]:
+    """The folder of a dataset for LeRobot, and notes."""
+    from fulmar_bags.control_steps import control_steps_of
+    from fulmar_bags.lerobot import write_lerobot
+    from fulmar_bags.lerobot_images import seen_in
+    from fulmar_evaluation.rerun.embedded_configs import knowing_what_it_carries
+
+    for bag in opened:
+        if bag.info is None:
+            raise BagError(
+                f"{bag.path}: others recorded it, without the observations of a controller. Use --to csv or npz."
+            )
+    with knowing_what_it_carries(*opened):
+        records = [control_steps_of(bag) for bag in opened]
+        titles = [record.task.title for record in records]
+        seen = [seen_in(bag) for bag in opened]
+        return write_lerobot(records, titles, out, seen)

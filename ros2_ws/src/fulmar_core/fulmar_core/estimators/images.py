@@ -44,7 +44,7 @@ def nothing_seen(robot: Robot, names: Iterable[str]) -> dict[str, np.ndarray]:
     if camera is None:
         return {}
     size = (1, camera.height, camera.width)
-    nothing = {
+    nothing: dict[str, np.ndarray] = {
         "camera_depth": np.full(size, np.inf, np.float32),
         "camera_image": np.zeros((*size, 3), np.uint8),
     }

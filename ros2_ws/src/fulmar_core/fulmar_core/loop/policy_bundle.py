@@ -16,7 +16,7 @@ import difflib
 import hashlib
 import io
 import json
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any, Literal, get_args
@@ -149,7 +149,7 @@ def write_bundle(folder: Path, network: bytes, golden: Golden, passport: Passpor
     """
     folder.mkdir(parents=True, exist_ok=True)
     vectors = io.BytesIO()
-    save = np.savez if golden.images is None else np.savez_compressed
+    save: Callable[..., None] = np.savez if golden.images is None else np.savez_compressed
     save(vectors, **golden.arrays())
     values = passport.plain() | {
         "network_sha256": _sha256(network),
