@@ -344,6 +344,15 @@ class RunMessages:
         message = self._new("std_msgs/msg/Float64MultiArray", layout=layout, data=spread)
         self._write("inertia/covariance", message, log_ns)
 
+    def pressure(self, name: str, pascal: float, time_s: float, log_ns: int) -> None:
+        message = self._new(
+            "sensor_msgs/msg/FluidPressure",
+            header=self._header(time_s),
+            fluid_pressure=float(pascal),
+            variance=0.0,
+        )
+        self._write(name, message, log_ns)
+
     def health(self, name: str, part: str, values: dict[str, str], log_ns: int) -> None:
         status = self._new(
             "diagnostic_msgs/msg/DiagnosticStatus",

@@ -27,6 +27,18 @@ class Series:
 
 
 @dataclass(frozen=True)
+class Pressures:
+    """Measured pressure of the gas supply over time."""
+
+    stamp_s: np.ndarray  # (n,) [s]
+    pascal: np.ndarray  # (n,) absolute [Pa]
+
+    def __len__(self) -> int:
+        """Number of samples."""
+        return len(self.stamp_s)
+
+
+@dataclass(frozen=True)
 class Inertias:
     """Estimates of a satellite's inertia over time."""
 
@@ -40,6 +52,7 @@ class Inertias:
 
 
 NO_SERIES = Series(np.zeros(0), (), np.zeros((0, 0)))
+NO_PRESSURES = Pressures(np.zeros(0), np.zeros(0))
 NO_INERTIAS = Inertias(np.zeros(0), np.zeros((0, 6)), np.zeros((0, 6)))
 
 
@@ -47,6 +60,15 @@ def series(reader: WireReader, wire: Wire, field: str) -> Series:
     """A wire of JointState messages; `field` is the one that has its numbers."""
     found = reader.vectors(wire, field)
     return Series(found.stamp_ns / NS, found.names, found.values)
+
+
+def pressures_of(reader: WireReader) -> Pressures:
+    """Readings of the gauge of the gas supply."""
+    received = reader.received(SENSOR_WIRES["supply"], lambda message, _: (message.fluid_pressure, ""))
+    return Pressures(
+        np.array([each.stamp_ns / NS for each in received]),
+        np.array([each.value for each in received], dtype=float),
+    )
 
 
 def gyroscope_s(reader: WireReader) -> tuple[float, ...]:

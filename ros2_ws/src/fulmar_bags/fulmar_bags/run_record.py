@@ -14,7 +14,18 @@ from fulmar_bags.decode import NS, Odometries, Vectors, odometries
 from fulmar_bags.figures import controller_of
 from fulmar_bags.frame_messages import FRAME_TYPES
 from fulmar_bags.gathered import Topic, json_object
-from fulmar_bags.other_readings import NO_INERTIAS, NO_SERIES, Inertias, Series, gyroscope_s, inertias, series
+from fulmar_bags.other_readings import (
+    NO_INERTIAS,
+    NO_PRESSURES,
+    NO_SERIES,
+    Inertias,
+    Pressures,
+    Series,
+    gyroscope_s,
+    inertias,
+    pressures_of,
+    series,
+)
 from fulmar_bags.wire_reader import Received, WireReader
 from fulmar_bags.writer import RUN_RECORD
 from fulmar_core.config.errors import BagError, ConfigError
@@ -95,21 +106,6 @@ class Surfaces:
 
 
 NO_SURFACES = Surfaces(np.zeros(0), (), np.zeros((0, 0)))
-
-
-@dataclass(frozen=True)
-class Pressures:
-    """Measured pressure of the gas supply over time."""
-
-    stamp_s: np.ndarray  # (n,) [s]
-    pascal: np.ndarray  # (n,) absolute [Pa]
-
-    def __len__(self) -> int:
-        """Number of samples."""
-        return len(self.stamp_s)
-
-
-NO_PRESSURES = Pressures(np.zeros(0), np.zeros(0))
 
 
 @dataclass(frozen=True)
@@ -259,7 +255,7 @@ def _record(bag: Bag, info: dict[str, Any]) -> RunRecord:
         health=_health(reader, bag.name),
         warnings=tuple(reader.warnings),
         surfaces=Surfaces(surfaces.stamp_ns / NS, surfaces.names, surfaces.values),
-        supply=_pressures(reader),
+        supply=pressures_of(reader),
         fuel=series(reader, SENSOR_WIRES["fuel"], "position"),
         wheels=series(reader, SENSOR_WIRES["wheels"], "velocity"),
         air_data=series(reader, SENSOR_WIRES["air_data"], "position"),
@@ -297,14 +293,6 @@ def _measured(reader: WireReader) -> Odometries:
         return odometries(reader.bag.odometry())
     except BagError:
         return found
-
-
-def _pressures(reader: WireReader) -> Pressures:
-    received = reader.received(SENSOR_WIRES["supply"], lambda message, _: (message.fluid_pressure, ""))
-    return Pressures(
-        np.array([each.stamp_ns / NS for each in received]),
-        np.array([each.value for each in received], dtype=float),
-    )
 
 
 def _places(poses: tuple[Received, ...]) -> Places:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from fulmar_bags.fuel import thrust_share
 from fulmar_bags.run_record import Actuation, GivenGoal, Motion, Places, RunRecord
 from fulmar_core.config.errors import BagError
 from fulmar_core.loop.mission import LONGEST_AHEAD_NS, SLACK_NS
@@ -151,6 +152,8 @@ def evaluate_run(record: RunRecord) -> RunResult | None:
     log = TrajectoryLog(robot, task, float(time_s[0]))
     log.add(states[samples], goal, _applied(record.actuation, robot, motion.stamp_s[0] + time_s - time_s[0]))
     run = log.trajectories().mapped(lambda array: np.swapaxes(array, 0, 1))
+    if run.thrust is not None:
+        run = replace(run, thrust=run.thrust * thrust_share(robot, record.supply, motion.stamp_s[samples]))
     figures = with_coverage(episode_metrics(run, task), run, robot, task)
     if task.keep_outs:
         last = states[samples[-1:]].to_rigid()
