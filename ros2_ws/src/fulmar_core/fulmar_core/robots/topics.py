@@ -87,7 +87,7 @@ CAMERA_IMAGE, CAMERA_DEPTH, CAMERA_SEGMENTATION = CAMERA_IMAGES = tuple(
     )
 )  # fmt: skip
 # What a recorder makes of each of `CAMERA_IMAGES`; of depth two, since RViz reads the one and Foxglove the other.
-CAMERA_COMPRESSED = tuple(
+IMAGE_JPEG, DEPTH_FLOAT, DEPTH_PNG, IDS_PNG = CAMERA_COMPRESSED = tuple(
     Wire(
         f"{image.name}/{ending}", "sensor_msgs/msg/CompressedImage", "camera", "stream", "with each image, in bags",
         f"the same as `{image.name}`; `format` is `{form}`{more}", unit=unit, frame=image.frame,
