@@ -20,6 +20,7 @@ LEARNERS = ("ppo", "td3", "sac", "dreamer")
 CLOSED = "closed_valves"  # doing nothing, which is worth a good part of what learning is
 DEVIATIONS = 2.0  # standard deviations over seeds that a learner must be above closed valves
 EPISODES, POINTS = 64, 8
+LEARNS_S = 10.0  # processor time of learning between two checks, at least, as a check takes a few seconds [s]
 HEADS = ("return", "± std", "closed", "success", "samples", "gradient steps", "cpu s", "")
 BUDGETS = {"equal_cpu_time": "equal processor time", "equal_samples": "equal samples"}
 
@@ -56,7 +57,8 @@ class LearnerCell(Cell):
             nothing = ClosedValves(robot)
             value, success = worth(nothing, robot, task, load_scenario(SCENARIO), episodes=EPISODES)
             return {"points": [{"returns": value, "success_rate": success}]}
-        budget = Budget(self.samples, self.cpu_s, POINTS, EPISODES)
+        points = max(2, min(POINTS, round(self.cpu_s / LEARNS_S)))
+        budget = Budget(self.samples, self.cpu_s, points, EPISODES)
         with tempfile.TemporaryDirectory() as folder:
             points = run_learner(
                 self.learner, self.robot, self.task, seed=self.seed, budget=budget, out=Path(folder)
