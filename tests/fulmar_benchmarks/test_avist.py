@@ -145,7 +145,7 @@ def inspected(**more):
     """Figures of a law on one path, in order unless said otherwise."""
     good = {
         "success_rate": 1.0, "path_error_m": {"mean": 0.005, "max": 0.01}, "pointing_error_deg": {"mean": 0.1},
-        "least_distance_m": 0.4, "coverage": None, "reason": None,
+        "least_distance_m": 0.4, "coverage": None, "coverage_possible": None, "reason": None,
     }  # fmt: skip
     return good | more
 
@@ -188,17 +188,17 @@ def test_a_round_is_asked_for_about_each_thing_along_each_path_for_as_long_as_it
     assert trial.plan.duration_s == trial.task.episode_of(trial.robot) > cells[1].trial.plan.duration_s
 
 
-def test_figures_of_rounds_are_means_and_the_worst_and_what_is_no_number_is_null():
+def test_figures_of_rounds_are_means_and_the_worst_and_what_was_not_computed_is_left_out():
     nothing = np.zeros((2, 2))
     figures = {
         "path_error_m": np.array([0.01, 0.03]), "path_error_most_m": np.array([0.05, 0.02]),
         "pointing_error_deg": np.array([1.0, 2.0]), "least_distance_m": np.array([0.3, 0.2]),
-        "coverage": np.array([np.nan, np.nan]),
+        "coverage": np.array([0.4, np.nan]),
     }  # fmt: skip
     found = inspection_of(PairResult({}, np.array([True, False]), figures, *([nothing] * 7)))
     assert found == {
         "success_rate": 0.5, "path_error_m": {"mean": 0.02, "max": 0.05}, "pointing_error_deg": {"mean": 1.5},
-        "least_distance_m": 0.2, "coverage": None, "episodes": 2, "reason": None,
+        "least_distance_m": 0.2, "coverage": 0.4, "coverage_possible": None, "episodes": 2, "reason": None,
     }  # fmt: skip
 
 

@@ -77,7 +77,7 @@ class TrialCell(Cell):
         trial, weight = _long(self.trial), STEP_COSTS[self.trial.through]
         short = self.trial.task
         steps = episode_steps(short, _control_dt(trial))
-        tally, errors, kept, extra = Tally(short), [], _Kept(), self.extra()
+        tally, errors, kept, extra = Tally(short, trial.robot), [], _Kept(), self.extra()
         goals: list[np.ndarray] = []
         for run in runs_of(trial, lambda done: progress(weight * done), pool=pool):
             beginning = first_steps(run, steps)

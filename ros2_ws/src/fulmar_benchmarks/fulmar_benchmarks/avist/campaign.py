@@ -25,7 +25,7 @@ from fulmar_benchmarks.avist.targets import (
 from fulmar_benchmarks.pairs import Pair, plan_of, with_law, with_policy
 from fulmar_benchmarks.rans3d.document import figures_of
 from fulmar_benchmarks.rans3d.unit import SpaceCell, SpaceTrial
-from fulmar_benchmarks.results import Outcome, outcome_of
+from fulmar_benchmarks.results import Outcome, outcome_of, statistics
 from fulmar_benchmarks.shape import Benchmark, Cell, Check, Figures, Found
 from fulmar_benchmarks.tables import Shown, display_name
 from fulmar_benchmarks.unit import costs, said_of, where_of
@@ -226,15 +226,23 @@ def updates_of(training: Mapping[str, Any]) -> int | None:
     return round(training["steps"] / each) if each else None
 
 
+EMPTY = dict.fromkeys(
+    (
+        "success_rate",
+        "path_error_m",
+        "pointing_error_deg",
+        "least_distance_m",
+        "coverage",
+        "coverage_possible",
+    )
+)
+
+
 def inspection_of(outcome: Outcome) -> dict[str, Any]:
     """Figures of some rounds about a thing; null where there is none, with the reason."""
     if isinstance(outcome, str):
-        empty = dict.fromkeys(
-            ("success_rate", "path_error_m", "pointing_error_deg", "least_distance_m", "coverage")
-        )
-        return {**empty, "episodes": 0, "reason": outcome}
+        return {**EMPTY, "episodes": 0, "reason": outcome}
     its = outcome.figures
-    seen = its.get("coverage")
     return {
         "success_rate": float(outcome.succeeded.mean()),
         "path_error_m": {
@@ -243,7 +251,9 @@ def inspection_of(outcome: Outcome) -> dict[str, Any]:
         },
         "pointing_error_deg": {"mean": float(its["pointing_error_deg"].mean())},
         "least_distance_m": float(its["least_distance_m"].min()),
-        "coverage": float(seen.mean()) if seen is not None and np.isfinite(seen).all() else None,
+        **{
+            name: statistics(its.get(name, np.zeros(0)))["mean"] for name in ("coverage", "coverage_possible")
+        },
         "episodes": len(outcome.succeeded),
         "reason": None,
     }

@@ -24,7 +24,15 @@ SHOWN = (
     ("success_rate", 3), ("position_error_m", 3), ("attitude_error_deg", 1), ("velocity_error_m_s", 3),
     ("rate_error_deg_s", 1), ("duty", 2), ("updates", 0), ("cpu_s", 0),
 )  # fmt: skip
-INSPECTED = ("success", "path error [m]", "largest [m]", "pointing [°]", "from keep-out [m]", "coverage")
+INSPECTED = (
+    "success",
+    "path error [m]",
+    "largest [m]",
+    "pointing [°]",
+    "from keep-out [m]",
+    "coverage",
+    "possible",
+)
 WHO = ("generalist", "single")
 
 
@@ -89,7 +97,7 @@ def _round(path: str, by: str, one: Mapping[str, Any]) -> Row:
     error = one["path_error_m"]
     figures = (
         (one["success_rate"], 3), (error["mean"], 4), (error["max"], 3), (one["pointing_error_deg"]["mean"], 2),
-        (one["least_distance_m"], 2), (one["coverage"], 2),
+        (one["least_distance_m"], 2), (one["coverage"], 2), (one["coverage_possible"], 2),
     )  # fmt: skip
     return Row((Entry(path), Entry(by), *(Entry(number(value, digits)) for value, digits in figures)))
 
