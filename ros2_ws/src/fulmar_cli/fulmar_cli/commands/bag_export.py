@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from fulmar_bags.bag_reading import BagReading
-from fulmar_bags.contents import Bag
 from fulmar_bringup.console import print_json, warn, write_line
 from fulmar_cli.commands.arguments import JsonOption, argument, option
 from fulmar_cli.commands.bag_reading import with_bag_options
 from fulmar_cli.commands.damage import finish, open_and_warn
 from fulmar_core.config.errors import BagError, ConfigError, UnknownNameError
+
+if TYPE_CHECKING:
+    from fulmar_bags.contents import Bag
 
 FORMATS = ("csv", "npz", "lerobot", "frames")
 
