@@ -135,7 +135,7 @@ def test_in_the_place_of_the_walk_it_follows_any_path_with_x_along_it(path):
     start, goal = task.draw(draws, robot, training=False)
     first = goal.targets[:, 0, :3]
     assert np.linalg.norm(np.stack(start.position, axis=-1) - first, axis=-1).max() < 3.01
-    pose, motion, _ = followed(task, goal, np.arange(7.0, task.episode_of(robot) - 7.0, 0.7))
+    pose, motion, _ = followed(task, goal, np.arange(11.0, task.episode_of(robot) - 11.0, 0.7))
     x, y, z, w = quat_of(pose)
     ahead = np.stack((1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)), axis=-1)
     way = motion[..., :3] / np.linalg.norm(motion[..., :3], axis=-1, keepdims=True)

@@ -32,7 +32,7 @@ class Pace:
     speed: float  # at most, and no more than the robot's own [m/s]
     share: float = 0.5  # of the acceleration that the robot sustains, at most, in the tightest bend [-]
     fixed: float = 0.0  # speed in the place of these two; 0: by them [m/s]
-    ease_s: float = 6.0  # from rest to that speed, and back in the end [s]
+    ease_s: float = 10.0  # from rest to that speed, and back in the end [s]
 
     def __post_init__(self) -> None:
         if min(self.speed, self.share) <= 0.0 or min(self.fixed, self.ease_s) < 0.0:
