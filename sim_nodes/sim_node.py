@@ -13,6 +13,7 @@ from fulmar_core.worlds.scenario import load_scenario
 from fulmar_ros.plant_node import PlantNode
 from fulmar_ros.plant_settings import PlantSettings
 from fulmar_ros.runtime import run_node
+from sim_nodes.camera.opengl import check_variable
 from sim_nodes.on_air import CanStand, OnAir
 
 BACKENDS = ("mujoco", "mock", JSBSIM)
@@ -28,6 +29,7 @@ def _simulator(robot: Robot, settings: PlantSettings) -> CanStand:
     """The simulator that the parameters name; only that one is imported."""
     task = load_task(settings.task, settings.thing)
     if settings.backend == "mujoco":
+        check_variable()
         from sim_nodes.mujoco_backend import MujocoBackend
 
         return MujocoBackend.of(robot, task, load_scenario(settings.scenario))

@@ -3,11 +3,18 @@
 import os
 import signal
 import subprocess
+from types import SimpleNamespace
 
 import pytest
 
 from fulmar_core.config.errors import ConfigError
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_core.tasks import load_task
+from fulmar_core.worlds.scenario import load_scenario
+from fulmar_evaluation import evaluation
+from fulmar_ros.plant_settings import PlantSettings
 from sim_nodes.camera import opengl
+from sim_nodes.sim_node import make_backend
 
 
 @pytest.fixture(autouse=True)
@@ -89,3 +96,13 @@ def test_the_probe_leaves_the_environment_as_it_is():
     before = dict(os.environ)
     opengl.problem_of("egl")
     assert dict(os.environ) == before
+
+
+def test_a_simulator_is_not_loaded_with_a_platform_that_ends_it(monkeypatch):
+    monkeypatch.setenv("MUJOCO_GL", "elg")
+    robot = load_robot("floating_platform")
+    with pytest.raises(ConfigError, match="MUJOCO_GL = 'elg'"):
+        make_backend(robot, PlantSettings(robot=robot.name, task="go_to_pose", backend="mujoco"))
+    trial = SimpleNamespace(through="mujoco")
+    with pytest.raises(ConfigError, match="MUJOCO_GL = 'elg'"):
+        evaluation._simulator(trial, robot, load_task("go_to_pose"), load_scenario("nominal"))

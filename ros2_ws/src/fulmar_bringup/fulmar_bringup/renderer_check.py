@@ -25,7 +25,7 @@ def check_renderer(plan: RunPlan, robot: Robot) -> None:
     if CAMERA in plan.extras:
         _check_camera(plan, robot)
         find_platform()
-    elif plan.backend == "mujoco":
+    elif plan.backend == "mujoco" or plan.emulated:
         check_variable()
         platform = os.environ.get(VARIABLE, "").strip().lower()
         problem = problem_of(platform) if platform in PLATFORMS else ""
