@@ -87,7 +87,8 @@ def _write_dataset(opened: list[Bag], out: Path) -> tuple[Path, list[str]]:
     for bag in opened:
         if bag.info is None:
             raise BagError(
-                f"{bag.path}: others recorded it, without the observations of a controller. Use --to csv or npz."
+                f"{bag.path}: others recorded it, without the observations of a controller. "
+                "Use --to csv, npz or frames."
             )
     with knowing_what_it_carries(*opened):
         records = [control_steps_of(bag) for bag in opened]
