@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fulmar_core.controllers.wrench_shares import WrenchShares, body_terms
+from fulmar_core.controllers.wrench_shares import WrenchShares, body_terms, effect_of
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.states.counter_rng import WORLD, Draws
 from fulmar_core.worlds.shaped_world import draw_bodies
@@ -15,10 +15,6 @@ ROBOT = load_robot("cubesat_8")
 
 def wrench(effect, openings):
     return np.einsum("...ij,...j->...i", effect, openings)
-
-
-def effect_of(robot):
-    return robot.actuators.full_thrust * robot.actuators.wrench_per_newton.T
 
 
 def test_limits_are_those_of_the_layout():
@@ -80,6 +76,14 @@ def test_bodies_side_by_side_get_the_openings_of_each_alone():
     together = WrenchShares.of(effect).openings(shares)
     alone = [WrenchShares.of(effect[i]).openings(shares[i]) for i in range(5)]
     np.testing.assert_allclose(together, alone, atol=1e-12)
+
+
+def test_a_force_does_not_turn_a_body_whose_centre_of_mass_lies_aside():
+    robot = load_robot("int_ball2")
+    actuators, openings = robot.actuators, WrenchShares.of_robot(robot).openings(0.5 * np.eye(6)[0])
+    force, torque = (np.asarray(part) for part in actuators.wrench_in_body(openings))
+    assert np.linalg.norm(torque) > 1e-5, "about the body's origin"
+    np.testing.assert_allclose(torque, np.cross(robot.body.com, force), atol=1e-12)
 
 
 def test_nothing_asked_for_opens_nothing():

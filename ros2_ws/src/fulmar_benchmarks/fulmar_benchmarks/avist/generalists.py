@@ -23,7 +23,8 @@ from fulmar_core.worlds.shaped_world import BRANCH, draw_bodies, robot_with
 
 SEED = 1  # of learning
 EPISODES = 64
-BODIES_TASK, BODIES_SETTINGS, ANY_BODY = "go_to_pose_3d", "free_flyer_bodies", "morphologies"
+SETTINGS = "free_flyer_bodies"  # of learning, but for what one body alone does not need
+BODIES_TASK, ANY_BODY = "go_to_pose_3d", "morphologies"
 OWN_BODIES = 2  # random bodies that have policies of their own
 ALL = ""  # path, or body, of a generalist
 NOMINAL = "nominal"  # body of the robot's file
@@ -102,7 +103,8 @@ class PathsCell(LearnedCell):
         robot, task = load_robot(self.robot), load_task("inspect", self.thing)
         assert isinstance(task, Inspect)
         task = replace(task, training_paths=(self.path,) if self.path else self.paths)
-        return robot, task, load_training_settings(robot, task)
+        settings = load_training_settings(robot, task, SETTINGS)
+        return robot, task, replace(settings, scenario=NOMINAL, body_inputs=False)  # its body never changes
 
     def found(self, network: Any) -> Figures:
         """Success and errors on each path."""
@@ -131,7 +133,7 @@ class BodiesCell(LearnedCell):
         from training.settings import load_training_settings
 
         robot, task = body_of(self.robot, self.body or NOMINAL), load_task(BODIES_TASK)
-        settings = load_training_settings(robot, task, BODIES_SETTINGS)
+        settings = load_training_settings(robot, task, SETTINGS)
         if self.body != ALL:  # what its body can do never changes
             settings = replace(settings, scenario=NOMINAL, body_inputs=False)
         return robot, task, settings

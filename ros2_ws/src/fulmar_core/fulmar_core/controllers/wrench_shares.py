@@ -22,7 +22,7 @@ FLAT = 1e-6  # an opening that changes by less than this with the force does not
 
 @dataclass(frozen=True)
 class WrenchShares:
-    """Allocation of one body, or of one body for each world in front."""
+    """Allocation of one body, or of one body for each world in front; torques are about its centre of mass."""
 
     openings_per_wrench: Array  # smallest openings for a wrench, shape (..., n, 6) [1/N, 1/(N·m)]
     resting: Array  # openings that make no wrench, the widest 1, shape (..., n) [-]
@@ -62,7 +62,7 @@ class WrenchShares:
                 f"'{robot.name}': its {actuators.kind} must open by degrees and share no pressure line."
             )
         try:
-            return cls.of(actuators.full_thrust * actuators.wrench_per_newton.T)
+            return cls.of(effect_of(robot))
         except ValueError as error:
             raise ValueError(f"'{robot.name}': {error}") from None
 
@@ -97,6 +97,14 @@ class WrenchShares:
         """
         xp = array_namespace(moments)
         return xp.concat((self.limits[..., :3] / mass[..., None], self.limits[..., 3:] / moments), axis=-1)
+
+
+def effect_of(robot: Robot) -> np.ndarray:
+    """Wrench of each actuator at full command about the robot's centre of mass, shape (6, n) [N, N·m]."""
+    actuators = robot.actuated_by(Pushing)
+    wrenches = (actuators.full_thrust[:, None] * actuators.wrench_per_newton).copy()
+    wrenches[:, 3:] -= np.cross(robot.body.com, wrenches[:, :3])
+    return np.asarray(wrenches.T)
 
 
 def body_terms(robot: Robot) -> np.ndarray:
