@@ -29,7 +29,7 @@ KINDS = [Image, Image, Image, CameraInfo]
 
 
 class Drawer:
-    """Draws no image: every pixel of depth has the robot's x. OpenGL stays out of the process of the tests."""
+    """Draws nothing: every pixel of depth has the robot's x. OpenGL stays out of the process of the tests."""
 
     def __init__(self, camera: Any, *_structures: Any, **_more: Any) -> None:
         self.size, self.closed = (camera.height, camera.width), False
