@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 
 import numpy as np
@@ -78,6 +79,23 @@ def test_a_patient_recorder_loses_no_frame_where_memory_is_small(tmp_path):
     account = thread.stop()
     assert (account.received, account.lost) == (120, 0)
     assert len(frames_in(tmp_path / "bag")[f"{COLOUR}/compressed"]) == 40
+
+
+def test_who_ends_a_recorder_sees_that_a_frame_waits_for_room(tmp_path):
+    bag, held = bag_for_frames(tmp_path / "bag"), threading.Event()
+    wait = bag.tick
+    bag.tick = lambda now: (held.wait(20.0), wait(now))
+    thread = BagThread(bag, on_error=pytest.fail, max_waiting=10_000, patient=True)
+    put_frames(thread.put, 1)
+    waits = threading.Thread(target=put_frames, args=(thread.put, 1, 1))
+    waits.start()
+    until = time.monotonic() + 20.0
+    while thread.received < 4 and time.monotonic() < until:
+        time.sleep(0.01)
+    assert thread.is_full
+    held.set()
+    waits.join(20.0)
+    assert thread.stop().lost == 0
 
 
 def test_in_real_time_nobody_waits_and_what_finds_no_room_is_counted_by_its_topic(tmp_path):

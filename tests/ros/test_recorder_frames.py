@@ -45,7 +45,7 @@ def test_frames_of_lock_step_that_come_faster_than_they_are_packed_are_all_kept_
     recorder.wait_until_recording()
     sent = camera(node)
     pixels = scene(size=(320, 240))
-    count = 300
+    count = 150  # 100 MB, more than may wait
     for number in range(count):
         for wire, publisher in sent.items():
             message = image(pixels[wire.name], ENCODINGS[wire.name], number)

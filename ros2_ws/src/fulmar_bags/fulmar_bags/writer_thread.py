@@ -113,9 +113,9 @@ class BagThread:
     def put(self, topic: str, data: bytes, log_ns: int, publish_ns: int | None = None) -> None:
         """Offer a message, from one thread only; arguments as in `BagWriter.write`."""
         self._received += 1
-        while self._patient and self._is_full() and self._thread.is_alive():
+        while self._patient and self.is_full and self._thread.is_alive():
             time.sleep(PAUSE_S)
-        if self._is_full():
+        if self.is_full:
             self._crowded_out[topic] += 1
             self._report_once(
                 "full", "the disk is too slow and memory is full: further messages are dropped."
@@ -124,7 +124,9 @@ class BagThread:
         self._put_bytes += len(data)
         self._queue.put((topic, data, log_ns, publish_ns))
 
-    def _is_full(self) -> bool:
+    @property
+    def is_full(self) -> bool:
+        """Whether there is no room: what comes is dropped, or, where `put` is patient, waits."""
         waiting = self._put_bytes - self._taken_bytes
         return self._queue.qsize() >= self._max_queued or waiting >= self._max_waiting
 

@@ -246,7 +246,7 @@ class RecorderNode(Node):
         deadline = time.monotonic() + LONGEST_GOODBYE_S
         self._provenance.join(LONGEST_GOODBYE_S)
         before = -1
-        while self._thread.received != before and time.monotonic() < deadline:
+        while (self._thread.received != before or self._thread.is_full) and time.monotonic() < deadline:
             before = self._thread.received
             time.sleep(QUIET_S)
         account = self._thread.stop()
