@@ -57,8 +57,8 @@ class LearnerCell(Cell):
             nothing = ClosedValves(robot)
             value, success = worth(nothing, robot, task, load_scenario(SCENARIO), episodes=EPISODES)
             return {"points": [{"returns": value, "success_rate": success}]}
-        points = max(2, min(POINTS, round(self.cpu_s / LEARNS_S)))
-        budget = Budget(self.samples, self.cpu_s, points, EPISODES)
+        count = max(2, min(POINTS, round(self.cpu_s / LEARNS_S)))
+        budget = Budget(self.samples, self.cpu_s, count, EPISODES)
         with tempfile.TemporaryDirectory() as folder:
             points = run_learner(
                 self.learner, self.robot, self.task, seed=self.seed, budget=budget, out=Path(folder)
