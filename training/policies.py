@@ -22,7 +22,7 @@ from fulmar_core.worlds.scenario import Scenario, load_scenario
 from training.executors import Executor, Watch
 from training.fallback_policy import fallback_settings
 from training.jobs import Job, Outcome
-from training.settings import TrainingSettings, load_training_settings
+from training.settings import Clone, TrainingSettings, load_training_settings
 
 UPDATES_A_SECOND = 5.0  # of one run on one idle core, where nothing better is known
 
@@ -75,7 +75,7 @@ def recipe(policy: ShippedPolicy, settings: TrainingSettings) -> str:
     """
     scenario = load_scenario(settings.scenario)
     ingredients = {
-        "robot": _as_trained(load_robot(policy.robot), scenario),
+        "robot": _as_trained(load_robot(policy.robot), scenario, sees=isinstance(settings.algorithm, Clone)),
         "task": _chosen(load_task(policy.task)),
         "scenario": _chosen(scenario),
         "settings": _chosen(settings),
@@ -87,12 +87,13 @@ def recipe(policy: ShippedPolicy, settings: TrainingSettings) -> str:
     return hashlib.sha256(json.dumps(ingredients, sort_keys=True, default=str).encode()).hexdigest()[:16]
 
 
-def _as_trained(robot: Robot, scenario: Scenario) -> Any:
+def _as_trained(robot: Robot, scenario: Scenario, *, sees: bool) -> Any:
     """A robot as batches have it: on air, its supply full, and without what the scenario or a policy does not read."""
     tank = robot.actuators.tank
     # A tank that is a part of the body empties in batches too.
     actuators: Any = robot.actuators if tank is None or tank.weighs else replace(robot.actuators, tank=None)
-    sensors = replace(robot.sensors, supply=None, fuel=None, camera=None)
+    camera = robot.sensors.camera if sees else None
+    sensors = replace(robot.sensors, supply=None, fuel=None, camera=camera)
     spans = robot.morphology if scenario.body == "morphology" else None
     same = replace(robot, air_bearing=False, usual_controller="", morphology=spans)
     found = _chosen(replace(same, actuators=actuators, sensors=sensors))

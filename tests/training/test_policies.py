@@ -204,3 +204,14 @@ def test_a_policy_s_run_has_a_folder_of_its_own_for_everything_it_is_made_from(t
     )
     assert job.out.name == f"floating_platform_go_to_pose_{recipe(ONE, settings)[:8]}"
     assert (job.bundle, job.episodes, job.updates) == (tmp_path / "bundles" / ONE.name, 256, 2)
+
+
+@pytest.mark.parametrize(("task", "differs"), [("dock", True), ("go_to_pose_3d", False)])
+def test_a_policy_that_sees_and_no_other_is_made_anew_for_another_camera(task, differs, monkeypatch):
+    robot = policies.load_robot("cubesat_8")
+    line = policies.ShippedPolicy("cubesat_8", task, 1, 10, 0.9)
+    settings = policies.load_training_settings(robot, policies.load_task(task))
+    before = policies.recipe(line, settings)
+    sensors = replace(robot.sensors, camera=replace(robot.sensors.camera, field_of_view=60.0))
+    monkeypatch.setattr(policies, "load_robot", lambda _name: replace(robot, sensors=sensors))
+    assert (policies.recipe(line, settings) != before) == differs
