@@ -50,6 +50,7 @@ def test_the_table_names_every_policy_that_shall_ship():
     wanted |= {
         f"cubesat_8_{task}" for task in (positions, poses, "track_velocities_3d", "follow_pose_3d", "inspect")
     }
+    wanted |= {"cubesat_8_dock"}
     wanted |= {"airship_v7_fly_hold", "airship_v7_fly_b", "airship_v7_fly_c", "volantex_ranger_fly_attitude"}
     assert names == wanted
 
