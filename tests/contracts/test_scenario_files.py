@@ -20,7 +20,12 @@ from fulmar_core.worlds.world import FIELDS
 
 PLATFORM, TASK = load_robot("floating_platform"), load_task("drift_go_to_pose")
 SCENARIOS = {name: load_scenario(name) for name in config_names("scenarios")}
-OF_OTHER_ROBOTS = {"surface_stuck", "wheel_dead", "propeller_lost", "morphologies"}  # that the platform has not
+OF_OTHER_ROBOTS = {
+    "surface_stuck",
+    "wheel_dead",
+    "propeller_lost",
+    "morphologies",
+}  # that the platform has not
 EACH = pytest.mark.parametrize("name", [name for name in SCENARIOS if name not in OF_OTHER_ROBOTS])
 COUNT = 256
 

@@ -301,7 +301,9 @@ def test_a_whole_episode_noted_at_once_is_what_its_steps_are(task):
         single.add(truth, goal, command)
     whole.add_episode(truths, goals, commands)
     one, other = single.trajectories(), whole.trajectories()
-    assert set(one.columns) == set(COLUMNS) - {*OF_FUEL, *BESIDE} - (set(IN_SPACE) if kind is PlanarState else set())
+    assert set(one.columns) == set(COLUMNS) - {*OF_FUEL, *BESIDE} - (
+        set(IN_SPACE) if kind is PlanarState else set()
+    )
     for name in one.columns:
         left, right = getattr(one, name), getattr(other, name)
         assert left.dtype == right.dtype
