@@ -14,6 +14,7 @@ from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.sensors.camera import CameraConfig
 from fulmar_core.states.state import State
 from fulmar_core.tasks import Task
+from sim_nodes.camera.opengl import find_platform
 
 
 class CameraSight:
@@ -35,6 +36,7 @@ class CameraSight:
             ConfigError: Nothing can draw here, with what to install.
         """
         # Only here: most evaluations draw nothing.
+        find_platform()  # before MuJoCo is imported, which a wrong MUJOCO_GL ends
         from sim_nodes.camera.backdrop import backdrop_of
         from sim_nodes.camera.renderer import Renderer
 

@@ -168,10 +168,7 @@ class Session:
 
     def _succeeds(self) -> bool:
         enough = self.settings.stop_at_success
-        if enough is None:
-            return False
-        last = self.history.checks[-enough.checks :]
-        return len(last) == enough.checks and all(check["success_rate"] >= enough.rate for check in last)
+        return enough is not None and enough.reached([check["success_rate"] for check in self.history.checks])
 
 
 class World(gymnasium.Wrapper[np.ndarray, np.ndarray, np.ndarray, np.ndarray]):

@@ -254,6 +254,9 @@ def train_from_images(
                     watcher.evaluated(elapsed, checks[-1].success_rate)
                     if checks[-1].score == max(check.score for check in checks):
                         save_network(learner.network, out / NETWORK_FILE)
+                    enough = settings.stop_at_success
+                    if enough is not None and enough.reached([check.success_rate for check in checks]):
+                        break
         finally:
             watcher.end()
     if not checks:

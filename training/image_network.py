@@ -22,6 +22,7 @@ from fulmar_core.config.errors import ConfigError
 from fulmar_core.controllers.classical import gains_of
 from fulmar_core.controllers.controller import Inputs
 from fulmar_core.controllers.space_pd import SpacePdGains
+from fulmar_core.controllers.wrench_shares import effect_of
 from fulmar_core.loop.image_input import DEPTH, ImageInput
 from fulmar_core.robots.actuators.pushing import Pushing
 from fulmar_core.robots.robot import Robot
@@ -120,10 +121,11 @@ class ImageNetwork(PolicyNetwork):
             ConfigError: They do not push by degrees, or not every one is part of what all may open together.
         """
         actuators = robot.actuated_by(Pushing)
-        full = actuators.full_thrust[:, None] * actuators.wrench_per_newton
+        full = effect_of(robot).T
         shares = np.linalg.pinv(full)
         together = np.ones(len(full)) @ (np.eye(len(full)) - full @ shares)
-        if actuators.binary or np.linalg.matrix_rank(full) < POSE or together.min() < LEAST_SHARE:
+        one_by_one = actuators.one_way and not (actuators.binary or actuators.shared_pressure)
+        if not one_by_one or np.linalg.matrix_rank(full) < POSE or together.min() < LEAST_SHARE:
             raise ConfigError(
                 f"'{robot.name}': a policy that sees steers nozzles that open by degrees, push and turn in every "
                 "direction, and cancel when all are open. Train another kind of policy for it."

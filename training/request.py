@@ -17,7 +17,7 @@ from training.executors import Executor, LocalExecutor
 from training.jobs import Job
 from training.ray_executor import RayExecutor
 from training.run_folder import CALIBRATION_FILE, SETTINGS_FILE, read_start, write_start
-from training.settings import Dreamer, StopAtSuccess, load_training_settings
+from training.settings import Clone, Dreamer, StopAtSuccess, load_training_settings
 from training.train import check_seed
 
 
@@ -71,6 +71,8 @@ def job_of(request: TrainingRequest) -> Job:
         settings.learner_of(load_robot(job.robot))  # rejects a rate that the robot cannot keep
     if isinstance(settings.algorithm, Dreamer):
         _check_dreamer(request)
+    if isinstance(settings.algorithm, Clone) and request.wandb:
+        raise ConfigError("--wandb takes no curves of cloning from images. Leave it out.")
     robot = load_robot(job.robot)
     hz = settings.control_hz or robot.timing.control_hz
     check_count("--seeds", request.seeds)

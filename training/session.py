@@ -191,10 +191,7 @@ class Session(BaseCallback):
     def _learned(self) -> bool:
         """Whether the last checks all reached the success rate."""
         enough = self._settings.stop_at_success
-        if enough is None:
-            return False
-        last = self.history.checks[-enough.checks :]
-        return len(last) == enough.checks and all(check.success_rate >= enough.rate for check in last)
+        return enough is not None and enough.reached([check.success_rate for check in self.history.checks])
 
     def save(self) -> None:
         """Write a checkpoint."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -254,6 +255,11 @@ class StopAtSuccess:
     def __post_init__(self) -> None:
         if not 0.0 < self.rate <= 1.0 or self.checks < 1:
             raise ValueError("'rate' must lie in (0, 1] and 'checks' be at least 1.")
+
+    def reached(self, rates: Sequence[float]) -> bool:
+        """Whether the last checks, of these success rates, were all good enough."""
+        last = rates[-self.checks :]
+        return len(last) == self.checks and all(rate >= self.rate for rate in last)
 
 
 @dataclass(frozen=True)

@@ -40,6 +40,20 @@ def check_variable() -> None:
         )
 
 
+def check_loadable() -> None:
+    """Refuse a MUJOCO_GL with which MuJoCo cannot be imported, or loads no library of this machine.
+
+    Raises:
+        ConfigError: It has one.
+    """
+    check_variable()
+    problem = problem_of(_value()) if _value() in PLATFORMS else ""
+    if problem:
+        raise ConfigError(
+            f"{VARIABLE} = '{os.environ[VARIABLE]}', and MuJoCo cannot be loaded with it ({problem}). Unset it."
+        )
+
+
 def find_platform() -> str:
     """The platform that draws images here: that of MUJOCO_GL, else the first one that can.
 

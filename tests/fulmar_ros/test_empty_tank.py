@@ -64,7 +64,7 @@ def flown(name, task, *, share, seconds):
 
 @pytest.mark.parametrize(("name", "task"), ROBOTS)
 def test_an_empty_tank_is_a_failure_that_closes_the_valves_for_good(name, task):
-    guard, feedback, states, applied = flown(name, task, share=0.0, seconds=1.0)
+    guard, feedback, states, applied = flown(name, task, share=0.0, seconds=3.0)
     assert guard.failed.startswith(f"{EMPTY}; it drifts on with ")
     assert guard.failed == feedback.supply.empty.words
     assert not applied[-1].any()

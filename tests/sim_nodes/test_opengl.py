@@ -14,6 +14,7 @@ from fulmar_core.worlds.scenario import load_scenario
 from fulmar_evaluation import evaluation
 from fulmar_ros.plant_settings import PlantSettings
 from sim_nodes.camera import opengl
+from sim_nodes.sight import CameraSight
 from sim_nodes.sim_node import make_backend
 
 
@@ -104,5 +105,10 @@ def test_a_simulator_is_not_loaded_with_a_platform_that_ends_it(monkeypatch):
     with pytest.raises(ConfigError, match="MUJOCO_GL = 'elg'"):
         make_backend(robot, PlantSettings(robot=robot.name, task="go_to_pose", backend="mujoco"))
     trial = SimpleNamespace(through="mujoco")
-    with pytest.raises(ConfigError, match="MUJOCO_GL = 'elg'"):
-        evaluation._simulator(trial, robot, load_task("go_to_pose"), load_scenario("nominal"))
+    for value, words in (("elg", "MUJOCO_GL = 'elg'"), ("osmesa", "cannot be loaded with it")):
+        monkeypatch.setenv("MUJOCO_GL", value)
+        monkeypatch.setattr(opengl, "problem_of", lambda platform: "its library is not installed")
+        with pytest.raises(ConfigError, match=words):
+            evaluation._simulator(trial, robot, load_task("go_to_pose"), load_scenario("nominal"))
+        with pytest.raises(ConfigError, match=value):
+            CameraSight(load_robot("cubesat_8"), load_task("dock"))

@@ -166,3 +166,13 @@ def test_a_pressure_is_checked_once_and_its_warning_stays_until_the_next():
         warnings.append(check.warning)
     assert warnings == [*["at 200000 Pa"] * 3, *["at 100000 Pa"] * 2]
     assert asked == [2e5, 1e5]
+
+
+def test_the_first_readings_of_a_gauge_empty_no_tank():
+    check = SupplyCheck(PLATFORM)
+    for pressure in (0.0, *[2e7] * 60):
+        check.see(0.2, {"supply": Reading(pressure)})
+        assert check.empty is None
+    for _ in range(200):
+        check.see(0.2, {"supply": Reading(0.0)})
+    assert check.empty is not None

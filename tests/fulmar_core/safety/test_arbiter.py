@@ -119,3 +119,11 @@ def test_it_acts_exactly_when_nothing_is_wrong(configured, activated, fault, goa
     decision = arbitrate(flags, NOW)
     assert decision.may_act == (fine and not problem and distance <= 8.0)
     assert decision.may_act == (decision.mode is Mode.ACTIVE) == (not decision.reason)
+
+
+@pytest.mark.parametrize(
+    "reason", [{"has_goal": False}, {"outside": "out"}, {"image_problem": "no image yet"}]
+)
+def test_the_guard_of_volumes_may_brake_unless_an_e_stop_held_the_robot_and_no_goal_came_since(reason):
+    assert arbitrate(replace(FINE, **reason), NOW).may_brake
+    assert not arbitrate(replace(FINE, **reason, rests=True), NOW).may_brake

@@ -175,6 +175,9 @@ def test_nothing_moves_a_robot_that_the_e_stop_holds_near_a_volume_either() -> N
     guard._estop.receive(True, S)
     _, inputs = guard.begin_step(guard.newest, S)
     assert inputs is None and not guard.loop.previous.any()
+    guard._estop.receive(False, S)
+    guard.begin_step(guard.newest, S)
+    assert not guard.loop.previous.any(), "after a reset nothing moves before a new goal"
 
 
 @pytest.mark.slow

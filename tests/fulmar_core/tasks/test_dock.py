@@ -81,3 +81,11 @@ def test_what_is_no_berth_is_refused(changes, words):
 def test_a_start_behind_its_own_berth_is_refused():
     with pytest.raises(ValueError, match="'behind' must be"):
         replace(TASK.start, behind=(2.0, 1.0))
+
+
+def test_a_goal_other_than_the_berth_and_another_thing_are_refused_in_one_line():
+    berth = np.array(TASK.berth)
+    assert not TASK.goal_problem(berth[None])
+    assert "from the berth of 'dock'" in TASK.goal_problem(np.zeros((1, 7)))
+    with pytest.raises(ConfigError, match="has a berth at 'gateway', not at 'iss'"):
+        load_task("dock", "iss")

@@ -174,3 +174,10 @@ def test_without_a_thing_trajectories_have_no_column_of_one():
     run = roll_out_in_batch(controller, ROBOT, task, load_scenario("nominal"), episodes=1, seed=1)
     assert run.keep_out_distance is None and "qw" not in run.columns
     assert "path_error_m" not in episode_metrics(run, task)
+
+
+def test_a_path_shorter_than_its_ease_is_flown_without_a_jump():
+    flight = replace(TASK, pace=Pace(speed=0.2, ease_s=90.0)).along("line").flight(ROBOT)
+    rounds = flight.rounds(np.arange(0.0, flight.duration_s, 0.05))
+    assert (np.diff(rounds) >= -1e-12).all()
+    assert np.diff(rounds).max() < 2.0 * 0.05 / flight.target.round_s

@@ -27,7 +27,7 @@ PACKAGES = {
     "ros": (*_BATCH, "sim_nodes", *_NODES),
     "training": (*_BATCH, "training"),
 }
-FAMILIES = ("robots", "tasks", "scenarios", "controllers", "goals", "estimators")  # of configs
+FAMILIES = ("robots", "tasks", "scenarios", "controllers", "goals", "estimators", "things")  # of configs
 COMPUTING = ("numpy", "onnxruntime", "mujoco")  # libraries whose version is part of a key
 ARRAY, KEY, VALUE = "array", "key", "value"
 

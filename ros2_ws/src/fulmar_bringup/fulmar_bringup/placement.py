@@ -73,7 +73,7 @@ def placed(plan: RunPlan, file: GoalFile | None, task: Task) -> tuple[Goal, Pose
             "the drawn start", starts, area, farthest
         )
         if task.structures:
-            problem = problem or task.kept_out("the goal", targets) or task.kept_out("the start", starts)
+            problem = problem or task.goal_problem(targets) or task.kept_out("the start", starts)
         if not problem:
             return mission, drawn
         if mission.obstacles.size or task.things or problem == before:  # the same each time, as of wings

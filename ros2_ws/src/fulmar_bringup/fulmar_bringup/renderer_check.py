@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib.util
-import os
 
 from fulmar_bringup.camera_row import CAMERA
 from fulmar_bringup.run_plan import RunPlan
@@ -11,7 +10,7 @@ from fulmar_core.config.errors import ConfigError
 from fulmar_core.config.paths import config_names
 from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.robot_file import load_robot
-from sim_nodes.camera.opengl import PLATFORMS, VARIABLE, check_variable, find_platform, problem_of
+from sim_nodes.camera.opengl import check_loadable, find_platform
 
 
 def check_renderer(plan: RunPlan, robot: Robot) -> None:
@@ -26,13 +25,7 @@ def check_renderer(plan: RunPlan, robot: Robot) -> None:
         _check_camera(plan, robot)
         find_platform()
     elif plan.backend == "mujoco" or plan.emulated:
-        check_variable()
-        platform = os.environ.get(VARIABLE, "").strip().lower()
-        problem = problem_of(platform) if platform in PLATFORMS else ""
-        if problem:
-            raise ConfigError(
-                f"{VARIABLE} = '{os.environ[VARIABLE]}', and MuJoCo cannot be loaded with it ({problem}). Unset it."
-            )
+        check_loadable()
 
 
 def _check_camera(plan: RunPlan, robot: Robot) -> None:

@@ -29,7 +29,7 @@ from fulmar_evaluation.coverage.of_runs import EPISODES as EPISODES_COVERED
 from fulmar_evaluation.coverage.of_runs import with_coverage
 from fulmar_evaluation.waypoint_score import bound_figures, has_bound, waypoint_bound
 from policy_server.own_controller import OwnController
-from sim_nodes.camera.opengl import check_variable
+from sim_nodes.camera.opengl import check_loadable
 
 if TYPE_CHECKING:
     from fulmar_evaluation.ros_evaluation import RosPool
@@ -150,7 +150,7 @@ def runs_of(
 def _simulator(trial: Trial, robot: Robot, task: Task, scenario: Scenario) -> Callable[[], Backend]:
     """What builds one simulator of a trial through MuJoCo or JSBSim."""
     if trial.through == "mujoco":
-        check_variable()
+        check_loadable()
         from sim_nodes.mujoco_backend import MujocoBackend
 
         return lambda: MujocoBackend.of(robot, task, scenario)

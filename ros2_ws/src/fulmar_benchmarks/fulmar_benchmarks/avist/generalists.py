@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 from abc import abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -41,8 +41,8 @@ class LearnedCell(Cell):
     runs: str  # folder of run folders
 
     def parts(self) -> dict[str, Any]:
-        """Not where runs lie."""
-        return {**super().parts(), "runs": ""}
+        """With its settings, which no other package's hash has, and not where runs lie."""
+        return {**super().parts(), "runs": "", "settings": asdict(self.learned()[2])}
 
     @abstractmethod
     def learned(self) -> tuple[Robot, Task, Any]:

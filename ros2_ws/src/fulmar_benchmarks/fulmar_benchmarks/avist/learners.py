@@ -112,9 +112,11 @@ def _entry(cells: Sequence[LearnerCell], found: Found, closed: float | None) -> 
     curves = [[dict(point) for point in each["points"]] for each in every if not isinstance(each, str)]
     if not curves or closed is None:
         return {"reason": reason or "closed valves could not be evaluated"}
-    last = _at([curve[-1] for curve in curves], closed)
-    few = [min(curve, key=lambda one: abs(one["samples"] - cells[0].samples)) for curve in curves]
-    return {**last, "equal_samples": _at(few, closed), "curves": curves, "reason": reason}
+    timed, few = (
+        _at([min(curve, key=lambda one: abs(one[budget] - limit)) for curve in curves], closed)
+        for budget, limit in (("cpu_s", cells[0].cpu_s), ("samples", cells[0].samples))
+    )
+    return {**timed, "equal_samples": few, "curves": curves, "reason": reason}
 
 
 def _at(points: Sequence[Mapping[str, Any]], closed: float) -> dict[str, Any]:

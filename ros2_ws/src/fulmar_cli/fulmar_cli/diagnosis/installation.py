@@ -44,6 +44,8 @@ def check_module(module: str, extra: str) -> Finding:
         return Finding(module, "wrong", str(error), fix)
     except OSError as error:  # such as Matplotlib's, where it may write nowhere
         return Finding(module, "wrong", str(error), "export TMPDIR=DIR   # a folder that you may write")
+    except (RuntimeError, AttributeError) as error:  # such as MuJoCo's, of a MUJOCO_GL that it cannot load
+        return Finding(module, "wrong", str(error), "unset MUJOCO_GL" if module == "mujoco" else "")
     try:
         return Finding(module, "ok", version(module))
     except PackageNotFoundError:

@@ -214,7 +214,7 @@ class GuardedLoop:
                     self._change(outside=self._outside(), unconverged="")
             elif self.loop.task.goal_topic == "goal_velocity" and not 0 <= since_ns <= STREAM_NS:
                 self._change(unconverged="")
-            self._follow_mission()
+            self._follow_mission(rests=False)
             if self._settings.lockstep:
                 self._gate.forget()
         return ""
@@ -388,7 +388,7 @@ class GuardedLoop:
                 self.refusal = Refusal(self.mission.goal_stamp_ns, stopped)
             self.mission.drop()
             self._follow_mission()
-            self._change(outside=self._outside(), unconverged="")
+            self._change(outside=self._outside(), unconverged="", rests=True)
         self._change(estop=stopped, active_s=self.acted * self._control_ns / 1e9)
         decision = arbitrate(self._flags, now_ns)
         self._heed_distance(decision)
@@ -422,7 +422,7 @@ class GuardedLoop:
         """How a goal lies outside the area or within a keep-out volume; empty if it does not, or is no place."""
         if self.loop.task.goal_topic == "goal_velocity":
             return ""
-        problem = self.loop.task.kept_out("the goal", goal.targets) or unreachable(
+        problem = self.loop.task.goal_problem(goal.targets) or unreachable(
             "the goal", goal.targets.tolist(), self._settings.area, farthest_goal(self.loop.robot)
         )
         return problem and OUT_OF_BOUNDS + problem

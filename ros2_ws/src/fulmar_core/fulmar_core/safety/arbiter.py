@@ -33,6 +33,7 @@ class Flags:
     goal_distance: float = 0.0  # [m]
     geofence: float = float("inf")  # [m]
     lacking: str = "goal"  # what there is none of yet, where `has_goal` is false
+    rests: bool = False  # an emergency stop held it, and no goal came since: nothing may move it
     estop: str = ""  # why the emergency stop holds, empty if it does not
     outside: str = ""  # how the robot left the area that it may be in, empty if it did not
     contested: str = ""  # which nodes publish one of the inputs, where more than one does
@@ -84,15 +85,15 @@ def arbitrate(flags: Flags, now_ns: int) -> Decision:
     if flags.input_problem:
         return Decision(Mode.ARMED, False, flags.input_problem)
     if flags.image_problem:
-        return Decision(Mode.ARMED, False, flags.image_problem)
+        return Decision(Mode.ARMED, False, flags.image_problem, may_brake=not flags.rests)
     if flags.outside:
-        return Decision(Mode.ARMED, False, flags.outside, may_brake=True)
+        return Decision(Mode.ARMED, False, flags.outside, may_brake=not flags.rests)
     if flags.bearing_off:
         return Decision(Mode.ARMED, False, BEARING_OFF)
     if flags.unconverged:
         return Decision(Mode.ARMED, False, flags.unconverged, may_brake=True)
     if not flags.has_goal:
-        return Decision(Mode.ARMED, False, f"no {flags.lacking} yet", may_brake=True)
+        return Decision(Mode.ARMED, False, f"no {flags.lacking} yet", may_brake=not flags.rests)
     if not flags.goal_distance <= flags.geofence:  # so that a distance that is not a number is beyond it too
         return Decision(
             Mode.ARMED,

@@ -96,6 +96,11 @@ def _among(task: Task, thing: str) -> Task:
         raise ConfigError(
             f"task '{task.name}' is a class of your own, which takes no thing in space. Leave it out."
         )
+    if thing and task.keeps_thing and thing != task.thing:
+        raise ConfigError(
+            f"task '{task.name}' has a berth at '{task.thing}', not at '{thing}'. Leave --thing out, or write a task "
+            "with a berth there."
+        )
     among = cast(Task, replace(cast(Any, task), thing=thing)) if thing else task  # all others are dataclasses
     if among.structures and FREE_FLYER not in task.kinds:
         raise ConfigError(

@@ -63,6 +63,7 @@ class Dock(FileTask[SpatialState]):
     reward_weights: DockReward
 
     goal_topic: ClassVar[str] = "goal_pose"
+    keeps_thing: bool = True
     state_type = SpatialState
     observation_names: ClassVar[tuple[str, ...]] = MOTION_TERMS
 
@@ -76,6 +77,16 @@ class Dock(FileTask[SpatialState]):
     def keep_outs(self) -> tuple[KeepOut, ...]:
         """None: who docks enters the volume about its port."""
         return ()
+
+    def goal_problem(self, places: Array) -> str:
+        """How a goal is not the berth: it may lie within the thing, and no camera shows it; see `Task.goal_problem`."""
+        if not len(places):
+            return ""
+        away = np.linalg.norm(np.asarray(places, dtype=float)[:, :3] - np.array(self.berth[:3]), axis=1)
+        if not (away > self.tolerance.position).any():
+            return ""
+        berth = ", ".join(f"{axis} = {each:g} m" for axis, each in zip("xyz", self.berth[:3], strict=True))
+        return f"the goal lies {away.max():.2f} m from the berth of '{self.name}', {berth}."
 
     def farthest_start(self, *, training: bool) -> tuple[str, float]:
         """See `Task.farthest_start`."""

@@ -41,6 +41,7 @@ class Task(ABC, Generic[S]):
         state_type: Form of the states that its methods take.
         thing: Of `configs/things`, in its world; empty: none.
         moves: Whether its target moves by the clock; its goals have more of it than `Goal.current`, see `moving_pose`.
+        keeps_thing: Whether it is for its own thing alone.
         observes_numbers: Whether `observe` answers the state of one robot in plain numbers by plain numbers.
     """
 
@@ -53,6 +54,7 @@ class Task(ABC, Generic[S]):
     state_type: type[State] = PlanarState
     thing: str = ""
     moves: bool = False
+    keeps_thing: bool = False
     observes_numbers: bool = False
 
     # A class, a property or a field has these two: dataclasses would take a property of this class for a default.
@@ -250,6 +252,10 @@ class Task(ABC, Generic[S]):
                     f"volume of '{structure.name}'."
                 )
         return ""
+
+    def goal_problem(self, places: Array) -> str:
+        """Why no robot may go to some places, as those of `kept_out`; empty where it may."""
+        return self.kept_out("the goal", places)
 
     def penalty(self, state: S, goal: Goal, robot: Robot) -> Array | None:
         """What a state costs a learner beside the reward, shape (...,); None: nothing."""

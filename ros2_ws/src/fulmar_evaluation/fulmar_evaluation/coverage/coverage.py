@@ -17,6 +17,7 @@ from fulmar_core.robots.sensors.camera import CameraConfig
 from fulmar_core.states.rotation import rotate_inverse
 from fulmar_core.worlds.structures import SEMANTIC_IDS, Structure
 from fulmar_evaluation.coverage.surface import Surface, surface_of
+from sim_nodes.camera.opengl import check_loadable
 
 STEEPEST_DEG = 60.0  # between the normal of a surface and the way to the camera
 SAME_DEPTH = 0.03  # by which the depth of a pixel may differ from that of a sample in it [-]
@@ -122,6 +123,7 @@ class _Rays:
     """Rays among the parts of a structure."""
 
     def __init__(self, structure: Structure) -> None:
+        check_loadable()
         import mujoco
 
         from sim_nodes.mujoco_model.structures import add_structure

@@ -41,7 +41,7 @@ class SupplyCheck:
         self.warning = self._low = ""
         self.pressure: float | None = None
         self.empty: Finding | None = None
-        self._mean = 0.0  # of the pressure [Pa]
+        self._mean, self._seen_s = 0.0, 0.0  # of the pressure [Pa], and since its first reading [s]
 
     def see(
         self, seconds: float, readings: Mapping[str, Reading], motion: RigidBodyState | None = None
@@ -63,11 +63,13 @@ class SupplyCheck:
 
     def _average(self, seconds: float, pressure: float) -> None:
         before = pressure if self.pressure is None else self._mean
+        self._seen_s += 0.0 if self.pressure is None else seconds
         self._mean = before + (pressure - before) * -math.expm1(-seconds / MEAN_S)
 
     def _find_empty(self, motion: RigidBodyState | None) -> None:
         tank = self._robot.actuators.tank
-        if self.empty is None and tank is not None and tank.is_empty(self._mean):
+        known = self._seen_s >= MEAN_S  # the first readings alone are no mean
+        if self.empty is None and known and tank is not None and tank.is_empty(self._mean):
             self.empty = Finding("", f"{EMPTY}{_drift(motion)}")
 
     def _words(self) -> str:

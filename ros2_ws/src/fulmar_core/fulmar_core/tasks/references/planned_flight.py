@@ -186,12 +186,13 @@ def planned_flight(
     curve = named_path(path, nearest)
     point = ORIGIN if facing == "point" else None
 
-    def flown(speed: float) -> MovingTarget:
-        return MovingTarget(curve, speed, facing, (0.0, 0.0, 0.0), 1, point, pace.ease_s)
+    def flown(speed: float, ease_s: float = 0.0) -> MovingTarget:
+        return MovingTarget(curve, speed, facing, (0.0, 0.0, 0.0), 1, point, ease_s)
 
     bend = flown(1.0).acceleration()
     most = min(pace.speed, can.speed)
     if bend > 1e-9:
         most = min(most, math.sqrt(pace.share * can.turning_acceleration / bend))
         most = min(most, STEADY * can.yaw_rate / bend) if facing == "along_path" else most
-    return Flight(path, flown(pace.fixed or most), looks)
+    speed = pace.fixed or most
+    return Flight(path, flown(speed, min(pace.ease_s, flown(speed).round_s)), looks)
