@@ -15,6 +15,7 @@ from fulmar_core.config.errors import ConfigError
 from fulmar_core.config.paths import config_names
 from fulmar_core.controllers.by_kind import LAWS, laws_of
 from fulmar_core.estimators.actuator_health.filters import HealthSettings
+from fulmar_core.estimators.images import nothing_seen
 from fulmar_core.loop.control_loop import ControlLoop
 from fulmar_core.loop.policy_bundle import read_passport
 from fulmar_core.robots.actuators.families import BASES, FAMILIES, row_of
@@ -110,11 +111,15 @@ def measured(robot, task, controller, simulation, *, steps=0):
     loop.begin(goal_in_float64(simulation.goal))
     loop.reset()
     rng, size = np.random.default_rng(1), loop.previous.shape
+    images = {
+        name: np.repeat(image, simulation.worlds, axis=0)
+        for name, image in nothing_seen(robot, controller.readings).items()
+    }
     for number in range(steps):
-        inputs = loop.inputs(simulation.measured, simulation.readings, round(1e9 * number * loop.dt))
+        inputs = loop.inputs(simulation.measured, simulation.readings | images, round(1e9 * number * loop.dt))
         simulation.move(loop.take(inputs, robot.actuators.scale * rng.uniform(-1.0, 1.0, size)).command)
         loop.goal = goal_in_float64(loop.goal.among(simulation.things))
-    return loop.inputs(simulation.measured, simulation.readings, round(1e9 * steps * loop.dt))
+    return loop.inputs(simulation.measured, simulation.readings | images, round(1e9 * steps * loop.dt))
 
 
 @pytest.fixture(scope="module")

@@ -14,7 +14,7 @@ from fulmar_bags.run_record import read_any_run
 from fulmar_evaluation.report.bag_report import write_bag_report
 from fulmar_evaluation.report.frame_plot import COLUMNS, frame_plot, strip_of
 from fulmar_evaluation.report.run_report import write_report
-from fulmar_evaluation.report.style import as_svg
+from fulmar_evaluation.report.style import as_svg, house_style
 from tests.bags_with_frames import packed_messages, theirs, with_images
 from tests.foreign_bag import write_foreign
 from tests.frames import COLOUR, NS, compressed, raw, scene
@@ -59,7 +59,8 @@ def test_the_sheets_of_runs_and_of_bags_have_the_frames_too(run, tmp_path):
 
 def test_the_frames_of_two_runs_are_shown_below_the_name_of_each(run):
     strip = strip_of(read_any_run(run).images, np.zeros(0), np.zeros((0, 3)))
-    page = as_svg(frame_plot([("first", strip), ("second", strip)]).figure)
+    with house_style():
+        page = as_svg(frame_plot([("first", strip), ("second", strip)]).figure)
     assert page.count("data:image/png") == 6 * COLUMNS
     assert ">first</text>" in page
     assert ">second</text>" in page

@@ -67,7 +67,7 @@ def test_a_gyroscope_that_an_estimator_reads_may_die():
 
 
 def test_every_scenario_that_is_shipped_acts_on_some_robot():
-    robots = [load_robot(kind.usual_robot) for kind in KINDS.values()]
+    robots = [load_robot(kind.usual_robot) for kind in KINDS.values()] + [load_robot("cubesat_8")]
     for name in config_names("scenarios"):
         assert any(not without_effect(robot, load_scenario(name)) for robot in robots), name
 
