@@ -13,8 +13,19 @@ from fulmar_core.simulation.backend import Sample
 FILES = ("period", "duty_cycle", "enable")
 
 
+def takes(period_ns: int, duty_ns: int) -> bool:
+    """Whether Linux lets a channel have these; it answers EINVAL to others (pwm_apply_state, drivers/pwm/core.c).
+
+    So a new channel, whose period is 0, takes nothing before a period, not even a duty of 0.
+    """
+    return period_ns > 0 and duty_ns <= period_ns
+
+
 class PwmBank:
-    """Valves that open by the duty of their channel; they keep it when the driver dies."""
+    """Valves that open by the duty of their channel; they keep it when the driver dies.
+
+    Files of a folder cannot refuse a number: a channel stays as it was while its files hold what Linux does not take.
+    """
 
     def __init__(self, path: Path, *, channels: Sequence[int], order: Sequence[int]) -> None:
         """Make the chip, with all channels off.
@@ -27,6 +38,7 @@ class PwmBank:
         self._path, self._order = path, np.array(order)
         self._channels = [path / f"pwm{number}" for number in channels]
         self._values = {channel / name: 0 for channel in self._channels for name in FILES}
+        self._openings = dict.fromkeys(self._channels, 0.0)
         half_made = path.with_suffix(".new")
         for file in self._values:
             place = half_made / file.relative_to(path)
@@ -49,8 +61,11 @@ class PwmBank:
         shutil.rmtree(self._path, ignore_errors=True)
 
     def _opening(self, channel: Path) -> float:
-        period, duty, enabled = (self._number(channel / name) for name in FILES)
-        return min(1.0, duty / period) if enabled and period else 0.0
+        # The period last: a driver sets it first, so that no half of what it writes looks like a state to refuse.
+        enabled, duty_ns, period_ns = (self._number(channel / name) for name in reversed(FILES))
+        if takes(period_ns, duty_ns):
+            self._openings[channel] = duty_ns / period_ns if enabled else 0.0
+        return self._openings[channel]
 
     def _number(self, file: Path) -> int:
         """What stands in a file; what stood there before while a driver writes it."""

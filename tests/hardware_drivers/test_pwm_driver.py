@@ -18,6 +18,7 @@ from tests.hardware_drivers.bench import episode_at
 
 ROBOT, HARDWARE = load_robot("cubesat_8"), load_hardware("cubesat_8")
 ORDER = (3, 1, 0, 2, 7, 5, 6, 4)
+PERIOD_NS = round(1e9 / HARDWARE.driver.frequency_hz)
 
 
 @pytest.fixture
@@ -58,6 +59,14 @@ def test_a_duty_that_another_program_sets_is_a_refusal(rig, tmp_path):
     assert driver.step(0.5 * np.ones(8)).refusal.endswith(
         "pwm4 has not the duty that was set: another program?"
     )
+
+
+def test_a_chip_keeps_a_valve_as_it_is_where_linux_refuses_the_duty(rig, tmp_path):
+    bank, driver = rig
+    driver.step(0.5 * np.ones(8))
+    assert bank.command(0.0).tolist() == [0.5] * 8
+    (tmp_path / "pwmchip" / "pwm4" / "duty_cycle").write_text(str(2 * PERIOD_NS))
+    assert bank.command(0.0).tolist() == [0.5] * 8
 
 
 def test_a_chip_or_a_channel_that_is_not_there_is_one_line(tmp_path):
