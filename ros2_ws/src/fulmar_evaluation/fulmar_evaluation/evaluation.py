@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fulmar_bringup.camera_row import CAMERA
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_core.config.errors import ConfigError
 from fulmar_core.config.own_class import is_own
 from fulmar_core.controllers.controller import Controller
+from fulmar_core.estimators.readings import readings_of
 from fulmar_core.loop.fallback import warm_up
+from fulmar_core.loop.policy_bundle import read_passport
 from fulmar_core.loop.rollout import WORLDS, batches, roll_out_in_backends
 from fulmar_core.robots.jsbsim_models import jsbsim_model
 from fulmar_core.robots.robot import Robot
@@ -99,7 +101,8 @@ def runs_of(
         What happened, for the next so many episodes.
 
     Raises:
-        ConfigError: An episode is shorter than one control step, or may start beyond the robot's geofence.
+        ConfigError: An episode is shorter than one control step, or may start beyond the robot's geofence; or, through
+            ros, the controller takes images.
         RunFailed: Through ros, the controller ended or refused to start.
         LockstepError: Through ros, it did not answer in time.
     """
@@ -108,7 +111,7 @@ def runs_of(
     if trial.through == "ros":
         from fulmar_evaluation.ros_evaluation import roll_out_through_ros
 
-        if CAMERA in plan.extras:
+        if _takes_images(trial):
             raise ConfigError(
                 f"'{plan.policy or plan.controller}' takes images, and evaluations --through ros run no camera. "
                 f"Evaluate it with --through mujoco, or fly it: fulmar run {plan.robot} --task {plan.task} --lockstep."
@@ -145,6 +148,17 @@ def runs_of(
             progress=progress,
             sight=sight,
         )
+
+
+def _takes_images(trial: Trial) -> bool:
+    """Whether the controller of a trial sees: its policy by the passport, one of the user's own by its readings."""
+    plan = trial.plan
+    if plan.policy:
+        return read_passport(Path(plan.policy)).image is not None
+    if not is_own(plan.controller):
+        return False
+    known = readings_of(trial.robot)
+    return any(name in known and known[name].image for name in trial.controller().readings)
 
 
 def _simulator(trial: Trial, robot: Robot, task: Task, scenario: Scenario) -> Callable[[], Backend]:
