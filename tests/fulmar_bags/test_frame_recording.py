@@ -126,6 +126,26 @@ def test_a_frame_that_cannot_be_packed_stays_raw_and_is_reported_once(tmp_path):
     assert "stay as they are" in line
 
 
+def test_a_frame_too_wide_for_its_codec_stays_raw_and_the_recording_goes_on(tmp_path):
+    reported = []
+    thread = BagThread(
+        PackedFrames(bag_for_frames(tmp_path / "bag"), TOPICS, reported.append), on_error=pytest.fail
+    )
+    data = raw(np.zeros((1, 70_000), np.uint8), "mono8")
+    for number in range(3):
+        thread.put(f"/robot/{COLOUR}", data, START_NS + number)
+    thread.put(f"/robot/{COLOUR}", raw(scene()[COLOUR], "rgb8"), START_NS + 3)
+    account = thread.stop()
+    assert (account.recorded, account.lost, account.complete) == (4, 0, True)
+    topics = open_bag(tmp_path / "bag").topics
+    assert list(topics[f"/robot/{COLOUR}"].data) == [data] * 3
+    assert len(topics[f"/robot/{COLOUR}/compressed"]) == 1
+    [line] = reported
+    assert line.startswith(f"/robot/{COLOUR}: a frame cannot be packed: ")
+    assert line.endswith(" Its frames stay as they are.")
+    assert "\n" not in line
+
+
 def test_of_a_camera_that_packs_its_frames_itself_there_are_none_twice(tmp_path):
     bag = PackedFrames(bag_for_frames(tmp_path / "bag"), TOPICS, pytest.fail)
     theirs = compressed(b"theirs", "rgb8; jpeg compressed bgr8")

@@ -123,6 +123,27 @@ def test_the_bag_states_what_became_of_every_message(disk, tmp_path):
     assert recording == {"complete": True, "received": 50, "dropped": account.dropped}
 
 
+def test_a_thread_that_died_is_said_and_what_it_left_behind_is_lost(disk):
+    """Whatever a bag raises that is no matter of the disk."""
+    write, reported = disk.write, []
+
+    def fail_at_ten(topic, data, **times):
+        if data == word("word 10"):
+            raise ValueError("no such thing")
+        write(topic, data, **times)
+
+    disk.write = fail_at_ten
+    thread = BagThread(disk, on_error=reported.append)
+    offer(thread, 50)
+    wait_until(lambda: reported)
+    offer(thread, 50, first=50)
+    account = thread.stop()
+    assert reported == [account.problem] == ["the recording broke off: ValueError: no such thing"]
+    assert (account.received, account.complete) == (100, False)
+    assert account.recorded + account.lost == 100
+    assert thread.stop() == account
+
+
 @pytest.mark.skipif(
     os.getuid() != 0, reason="only root may mount a small disk; the tests above refuse writes instead"
 )

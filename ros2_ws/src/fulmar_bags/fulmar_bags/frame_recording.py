@@ -53,10 +53,10 @@ class PackedFrames:
     def _packed(self, topic: str, data: bytes) -> list[tuple[str, bytes]]:
         try:
             return packed(data, topic)
-        except BagError as error:
+        except Exception as error:  # noqa: BLE001 - a codec raises what it pleases, as of a frame too wide for it
             if topic not in self._refused:
                 self._refused.add(topic)
-                self._on_error(f"{error} Its frames stay as they are.")
+                self._on_error(f"{_words(topic, error)} Its frames stay as they are.")
             return [(topic, data)]
 
     def attach(self, name: str, data: bytes) -> None:
@@ -74,3 +74,10 @@ class PackedFrames:
     def close(self) -> None:
         """As `BagWriter.close`."""
         self._bag.close()
+
+
+def _words(topic: str, error: Exception) -> str:
+    """One line about a frame that cannot be packed."""
+    if isinstance(error, BagError):
+        return str(error)
+    return f"{topic}: a frame cannot be packed: {type(error).__name__}: {' '.join(str(error).split())}."

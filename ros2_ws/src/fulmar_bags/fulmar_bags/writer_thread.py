@@ -101,6 +101,7 @@ class BagThread:
         self._refused: Counter[str] = Counter()  # by the thread
         self._reported: set[str] = set()
         self._problem, self._slowest_s = "", 0.0
+        self._ended = False  # by the thread, once it has closed the bag
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="bag", daemon=True)
         self._thread.start()
@@ -151,12 +152,22 @@ class BagThread:
         )
 
     def stop(self) -> Account:
-        """Write what waits, close the bag, and return the final account."""
+        """Write what waits, close the bag, and return the final account; what a dead thread left behind is lost."""
         self._stop.set()
         self._thread.join()
-        return self.account(complete=True)
+        while not self._ended and not self._queue.empty():
+            self._crowded_out[self._queue.get()[0]] += 1
+        return self.account(complete=self._ended)
 
     def _run(self) -> None:
+        try:
+            self._write()
+            self._ended = True
+        except Exception as error:  # noqa: BLE001 - whatever ends the recording is to be said
+            self._problem = f"the recording broke off: {type(error).__name__}: {' '.join(str(error).split())}"
+            self._on_error(self._problem)
+
+    def _write(self) -> None:
         with contextlib.suppress(OSError, AttributeError):
             os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), BEHIND)  # compression and disk
         while not self._stop.wait(EMPTY_EVERY_S):
@@ -176,7 +187,11 @@ class BagThread:
             if self._bag.waiting >= self._max_waiting:
                 self._refused[topic] += 1
                 continue
-            self._bag.write(topic, data, log_ns=log_ns, publish_ns=publish_ns)
+            try:
+                self._bag.write(topic, data, log_ns=log_ns, publish_ns=publish_ns)
+            except Exception:
+                self._refused[topic] += 1
+                raise
 
     def _note(self, *, complete: bool) -> None:
         account = self.account(complete=complete)

@@ -261,7 +261,7 @@ class RecorderNode(Node):
         sys.stdout.flush()
         if account.lost:
             self.get_logger().error(f"{account.lost} of {account.received} messages are not in the bag.")
-        return FAILED if account.lost else DONE
+        return DONE if account.complete and not account.lost else FAILED
 
 
 def once(keep: Keep, remembered: int, part: slice = slice(None)) -> Keep:
