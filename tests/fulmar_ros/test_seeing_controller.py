@@ -15,6 +15,7 @@ from fulmar_core.safety.arbiter import Mode
 from fulmar_core.states.spatial import SpatialState
 from fulmar_core.tasks import load_task
 from fulmar_core.tasks.goal import goal_at
+from fulmar_ros import graph
 from fulmar_ros.controller_node import ControllerNode
 from fulmar_ros.convert import OdometryWriter
 from fulmar_ros.goal_messages import goal_message
@@ -169,6 +170,31 @@ def test_by_the_clock_a_camera_that_never_spoke_is_said():
     driven.node._step()
     assert driven.node.guard.flags.image_problem == "camera_depth: no image yet. Does the camera run?"
     assert driven.sent[-1].tolist() == [0.0] * 8
+
+
+def test_two_cameras_hold_the_robot_with_a_warning_and_it_goes_on_when_one_is_gone(monkeypatch):
+    """As discovery shows them, when the launcher starts a camera anew that was killed."""
+    found, said = ["/cubesat_8/camera"] * 2, []
+    monkeypatch.setattr(graph, "writers_of", lambda _, wire: found if "depth" in wire.topic_name else [])
+    driven = Driven(lockstep=False)
+    node = driven.node
+    node._beat.halt()
+    monkeypatch.setattr(node.wires.health, "publish", lambda *given, **more: said.append((given[0], more)))
+    driven.be()
+    driven.look()
+    node._step()
+    words = f"2 nodes publish {CAMERA_DEPTH.name}, and only one may: /cubesat_8/camera, /cubesat_8/camera"
+    assert node.guard.flags.contested == words
+    assert driven.sent[-1].tolist() == [0.0] * 8
+    assert {level for level, _ in said} == {"warn"}
+    assert said[-1][1]["warnings"] == [words]
+    found.clear()
+    monkeypatch.setattr(node._writer_watch, "look", lambda _now, look=node._writer_watch.look: look(1 << 62))
+    driven.be()
+    driven.look()
+    node._step()
+    assert node.guard.flags.contested == ""
+    assert driven.sent[-1].tolist() == [0.5] * 8
 
 
 def test_a_policy_that_sees_does_not_take_over_in_a_node_that_receives_no_images():

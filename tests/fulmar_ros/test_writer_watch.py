@@ -47,6 +47,21 @@ def test_a_node_of_unknown_name_holds_at_once_and_is_reported_when_its_name_has_
     assert watch.look(3 * S) == watch.alarm == "2 nodes publish odom, and only one may: /a, /b"
 
 
+def test_two_nodes_of_an_input_that_is_started_anew_hold_and_are_a_warning_until_one_is_gone(monkeypatch):
+    found = {"odom": [], "image": BOTH}
+    monkeypatch.setattr(graph, "writers_of", lambda _node, subscription: found[subscription])
+    inputs = {"odom": ["odom"], "image": ["image"]}
+    watch = WriterWatch(SimpleNamespace(), inputs, restarted=["image"])
+    words = "2 nodes publish image, and only one may: /a, /b"
+    assert (watch.look(S), watch.alarm, watch.warning) == (words, "", words)
+    found["image"] = []
+    assert (watch.look(S + SETTLE_NS), watch.alarm, watch.warning) == (words, "", words)
+    assert (watch.look(S + SETTLE_NS + 1), watch.alarm, watch.warning) == ("", "", "")
+    found.update(odom=BOTH, image=BOTH)
+    wrong = "2 nodes publish odom, and only one may: /a, /b"
+    assert (watch.look(9 * S), watch.alarm, watch.warning) == (wrong, wrong, words)
+
+
 @pytest.fixture
 def arguments(ros_domain: RosDomain, monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
     """ROS arguments of a node that nobody serves."""

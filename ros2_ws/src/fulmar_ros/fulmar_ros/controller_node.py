@@ -148,7 +148,8 @@ class ControllerNode(LifecycleNode):
         )
         self.wires.publish_metadata(switch.current.metadata)
         self._wire_watch = WireWatch(self, self.wires.subscribed | self._readings.subscribed)
-        self._writer_watch = WriterWatch(self, self.wires.followed | self._readings.followed)
+        followed = self.wires.followed | self._readings.followed
+        self._writer_watch = WriterWatch(self, followed, restarted=self._readings.images)
         # Lock step has no beat of its own; a wall-clock timer keeps the status alive between messages.
         self._status_timer = self.create_timer(PERIOD_S / 4, self._publish_idle_status)
         return DONE
@@ -440,6 +441,7 @@ class ControllerNode(LifecycleNode):
         """Follow no odometry while more than one node publishes an input."""
         contested = self._writer_watch.look(time.monotonic_ns())
         self._status.contested = self._writer_watch.alarm
+        self._status.two_cameras = self._writer_watch.warning
         if contested != self._guarded.flags.contested:
             self._guarded.contest(contested)
 

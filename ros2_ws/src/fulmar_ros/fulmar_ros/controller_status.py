@@ -25,6 +25,7 @@ class ControllerStatus:
         inference_ms: Time that the controller took to act.
         wire_problems: Publishers from which nothing arrives, in words.
         contested: Which nodes publish one input, where more than one does, in words.
+        two_cameras: The same of images, which is a warning alone: a camera that died is started anew.
         inputs_refused: How many readings beside the odometry were refused, and why the newest of them was; empty if it
             was not.
     """
@@ -35,7 +36,7 @@ class ControllerStatus:
         self.steps = 0
         self.inference_ms = Spread()
         self.wire_problems: list[str] = []
-        self.contested = ""
+        self.contested = self.two_cameras = ""
         self.inputs_refused = 0, ""
         self._said: tuple[object, ...] = ()
         self._said_at = 0.0
@@ -80,6 +81,7 @@ class ControllerStatus:
             bool(held),
             guard.input_warning,
             self.contested,
+            self.two_cameras,
             self._swap.requests,
         )
         now = time.monotonic()
@@ -130,6 +132,6 @@ class ControllerStatus:
         warnings = BETWEEN.join([*self.wire_problems, *beliefs.words])
         message = decision.reason or held or warnings or decision.mode.value
         entered = HAD_ENTERED if ENTERED in held else HAD_HELD if held else ""
-        its = unconverged, entered, self.contested, guard.input_warning
+        its = unconverged, entered, self.contested, self.two_cameras, guard.input_warning
         warned = [*beliefs.warnings, *(words for words in its if words)]
         health.publish(level, message, values, warnings=warned)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
@@ -48,30 +48,47 @@ def writers_of(node: Node, subscription: Subscription) -> list[str]:
 class WriterWatch:
     """Looks whether more than one node publishes an input that is followed: which of them is right, nobody knows."""
 
-    def __init__(self, node: Node, inputs: Mapping[str, Iterable[Subscription]]) -> None:
-        """Watch inputs by the names that people know them by, each with its subscriptions."""
-        self._node = node
-        self._inputs = [(subscriptions, OneWriter(name)) for name, subscriptions in inputs.items()]
+    def __init__(
+        self,
+        node: Node,
+        inputs: Mapping[str, Iterable[Subscription]],
+        *,
+        restarted: Collection[str] = (),
+    ) -> None:
+        """Watch inputs.
+
+        Args:
+            node: Its owner.
+            inputs: Subscriptions of each, by the name that people know it by.
+            restarted: Names of those whose node is started anew when it dies. Discovery lists the dead one for some
+                seconds more, so that two are a warning and no alarm.
+        """
+        self._node, self._restarted = node, frozenset(restarted)
+        self._inputs = [(name, subscriptions, OneWriter(name)) for name, subscriptions in inputs.items()]
         self._unnamed_since_ns: int | None = None
-        self.alarm = ""
+        self.alarm = self.warning = ""
 
     def look(self, now_ns: int) -> str:
         """Why no input is followed at a time of a steady clock; empty if all may be; takes 2 us [ns].
 
         `alarm` has the same words for reports. It waits a second for the name of a node that is not discovered yet.
+        `warning` has them, at once, where the input is one of those whose node is started anew.
         """
-        reason = ""
-        for subscriptions, writers in self._inputs:
+        reason = self.warning = ""
+        for name, subscriptions, writers in self._inputs:
             for subscription in subscriptions:
                 writers.see(writers_of(self._node, subscription), now_ns)
-            reason = reason or writers.reason(now_ns)
+            if name in self._restarted:
+                self.warning = self.warning or writers.reason(now_ns)
+            else:
+                reason = reason or writers.reason(now_ns)
         if UNNAMED not in reason:
             self._unnamed_since_ns, self.alarm = None, reason
         elif self._unnamed_since_ns is None:
             self._unnamed_since_ns = now_ns
         elif now_ns - self._unnamed_since_ns > NAMING_NS:
             self.alarm = reason
-        return reason
+        return reason or self.warning
 
 
 class WireWatch:

@@ -28,6 +28,7 @@ class ReadingInputs:
     Attributes:
         newest: What came.
         followed: Subscriptions by topic.
+        images: Those of the topics that carry images.
         subscribed: The wires; the values say whether a best-effort publisher is refused.
     """
 
@@ -58,6 +59,7 @@ class ReadingInputs:
         self._asked = 0
         self.newest = NewestReadings(robot, names, in_step=lockstep)
         self.followed: dict[str, list[Subscription]] = {}
+        self.images = [kind.wire.name for kind in self.newest.kinds.values() if kind.image]
         self.subscribed = {
             kind.wire: lockstep and kind.comes_with_its_step for kind in self.newest.kinds.values()
         }
