@@ -9,10 +9,12 @@ import numpy as np
 
 from fulmar_core.config.errors import ConfigError
 from fulmar_core.controllers.controller import Controller, Readings
+from fulmar_core.dynamics.things import Poses
 from fulmar_core.loop.image_input import ImageInput
 from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.sensors.camera import CameraConfig
-from fulmar_core.states.state import State
+from fulmar_core.states.planar import at_rest
+from fulmar_core.states.state import RigidBodyState, State
 from fulmar_core.tasks import Task
 from sim_nodes.camera.opengl import find_platform
 
@@ -29,7 +31,7 @@ class CameraSight:
 
         Args:
             robot: The robot.
-            task: Has the structures.
+            task: Has the structures, and the blocks that move.
             camera: In the place of the robot's own.
 
         Raises:
@@ -42,13 +44,27 @@ class CameraSight:
 
         own = camera or robot.sensors.camera
         assert own is not None, "a policy that sees was checked against the robot's camera"
-        self._renderer = Renderer(own, task.structures, backdrop=backdrop_of(robot))
+        self._blocks = {thing.name: thing.body for thing in task.things if thing.body is not None}
+        self._renderer = Renderer(own, task.structures, backdrop=backdrop_of(robot), blocks=self._blocks)
 
-    def __call__(self, state: State) -> Readings:
-        """Images of each state, shapes (n,): depth (n, h, w) float32 [m] and colours (n, h, w, 3) uint8."""
+    def __call__(self, state: State, things: Poses | None = None) -> Readings:
+        """Images of each state, shapes (n,): depth (n, h, w) float32 [m] and colours (n, h, w, 3) uint8.
+
+        Args:
+            state: Of the robots.
+            things: Where the task's things are, each (n, 3); those left out stand where they were.
+        """
         rigid = state.to_rigid()
-        poses = np.concatenate((np.asarray(rigid.position_in_world), np.asarray(rigid.quat_xyzw)), axis=-1)
-        frames = [self._renderer.render(pose) for pose in np.atleast_2d(poses)]
+        poses = _poses(rigid)
+        blocks = {
+            name: _poses(at_rest(*np.moveaxis(np.atleast_2d(pose), -1, 0)).to_rigid())
+            for name, pose in (things or {}).items()
+            if name in self._blocks
+        }
+        frames = [
+            self._renderer.render(pose, {name: of[number] for name, of in blocks.items()})
+            for number, pose in enumerate(poses)
+        ]
         return {
             "camera_depth": np.stack([frame.depth for frame in frames]),
             "camera_image": np.stack([frame.rgb for frame in frames]),
@@ -63,6 +79,11 @@ class CameraSight:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def _poses(rigid: RigidBodyState) -> np.ndarray:
+    """Places [m] and attitudes (x, y, z, w) of bodies, shape (n, 7)."""
+    return np.atleast_2d(np.concatenate((rigid.position_in_world, rigid.quat_xyzw), axis=-1))
 
 
 def sight_of(

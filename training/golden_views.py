@@ -32,7 +32,7 @@ def golden_views(network: ImageNetwork, robot: Robot, task: Task) -> Golden:
     image, taken = network.plan.image, []
     with CameraSight(robot, task, image.camera) as sight:
         for number in range(round(MOMENTS_S[-1] / loop.dt) + 1):
-            seen = sight(simulation.truth)
+            seen = sight(simulation.truth, simulation.things)
             inputs = loop.inputs(simulation.measured, seen, round(1e9 * number * loop.dt))
             if number in [round(moment / loop.dt) for moment in MOMENTS_S]:
                 taken.append((inputs.observation.astype(np.float32), image.taken(seen[image.reading])))

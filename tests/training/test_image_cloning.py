@@ -52,7 +52,7 @@ class Numbers:
     def __init__(self, _robot, task, camera):
         self._task, self._size = task, (camera.height, camera.width)
 
-    def __call__(self, state):
+    def __call__(self, state, _things=None):
         count = len(np.asarray(state.x))
         goal = image_cloning.goals_at(np.tile(np.array(self._task.berth), (count, 1)))
         depth = np.full((count, *self._size), 2.0, np.float32)

@@ -30,7 +30,7 @@ WORLDS = 2048  # of a batch at once: nearly as fast as more, and their record st
 
 Progress = Callable[[int], None]  # called with the number of control steps done
 # What cameras of robots in some true states see, shapes (n,): images by the name of their reading, each (n, ...).
-Sight = Callable[[State], Readings]
+Sight = Callable[[State, Poses], Readings]
 
 
 def roll_out_in_batch(
@@ -216,7 +216,9 @@ def _roll_out(
     for number in range(episode_steps(task, loop.dt)):
         assert loop.goal is not None
         loop.goal = goal_in_float64(loop.goal.among(worlds.things))
-        readings = worlds.readings if sight is None else {**worlds.readings, **sight(worlds.truth)}
+        readings = (
+            worlds.readings if sight is None else {**worlds.readings, **sight(worlds.truth, worlds.things)}
+        )
         step = loop.step(worlds.measured, readings, round(1e9 * number * loop.dt))
         worlds.move(step.command)
         log.add(worlds.truth, counter.update(worlds.truth, worlds.things), step.command)
