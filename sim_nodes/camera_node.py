@@ -159,7 +159,9 @@ class CameraNode(Node):
         made, missed = self._times.made, self._times.missed
         values = {"frames": str(made), "frames_missed": str(missed)}
         values["drawing_ms_mean"] = f"{1e3 * self._spent_s / max(1, made):.1f}"
-        warnings = ["the camera draws fewer images than its rate asks for, see frames_missed"] if missed else []
+        warnings = (
+            ["the camera draws fewer images than its rate asks for, see frames_missed"] if missed else []
+        )
         words = "drawing" if made else "waiting for the plant"
         self._health.publish("warn" if missed else "ok", words, values, warnings=warnings)
 
