@@ -21,6 +21,7 @@ from fulmar_core.config.strict_yaml import load_config
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.robots.sensors.camera import CameraConfig
 from fulmar_core.robots.topics import CAMERA_IMAGES, CAMERA_INFO, TRUTH
+from sim_nodes.camera import opengl
 
 PLAN = RunPlan("spacecraft_16", "go_to_pose_3d", "pd", "mujoco", 10.0, extras=("camera",))
 LOCKSTEP = replace(PLAN, lockstep=True)
@@ -113,7 +114,7 @@ def test_without_a_renderer_nothing_starts(monkeypatch):
 )
 def test_a_wrong_platform_is_refused_also_where_a_simulator_alone_would_end_by_it(value, words, monkeypatch):
     monkeypatch.setenv("MUJOCO_GL", value)
-    monkeypatch.setattr(renderer_check, "problem_of", lambda _platform: "gone")
+    monkeypatch.setattr(opengl, "problem_of", lambda _platform: "gone")
     plan = replace(PLAN, extras=())
     assert words in refusal(plan, load_robot("spacecraft_16"))
     with pytest.raises(ConfigError):
