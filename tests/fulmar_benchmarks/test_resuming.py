@@ -10,7 +10,7 @@ from fulmar_benchmarks.campaign import run
 from fulmar_benchmarks.catalogue import choice, rows
 from fulmar_benchmarks.pool import figures_of
 
-TIMES = ("computation_s", "wall_s", "command", "steps_per_s", "cpu_s", "update_ms")
+TIMES = ("computation_s", "sky_s", "wall_s", "command", "steps_per_s", "cpu_s", "update_ms")
 SMALL: dict[str, dict[str, Any]] = {
     "drift": {"through": "batch", "episodes": 2, "controllers": "lqr", "rows": "ideal,torque"},
     "events": {"runs": 4, "parts": "table,sensitivity"},
