@@ -147,11 +147,11 @@ class Session:
         self._ending, self.interrupted = over or stopped, stopped and not over
 
     def _progress(self) -> float:
-        """Share of the run that is over [-]."""
+        """Share of the run that is over [-]; 0 where a budget ends it in place of limits."""
         request = self.request
         shares = [self.elapsed_s / request.time_limit_s] if request.time_limit_s else []
         shares += [self.history.updates / request.updates] if request.updates else []
-        return min(1.0, max(shares))
+        return min(1.0, max(shares, default=0.0))
 
     def _after(self, progress: float) -> float:
         return (math.floor(progress / self._check_every + 1e-9) + 1) * self._check_every

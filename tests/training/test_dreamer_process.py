@@ -16,7 +16,7 @@ from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.tasks import load_task
 from tests.training.dreamer_runs import drawn_network
 from training import dreamer_process, dreamer_training
-from training.dreamer_learning import load_checkpoint
+from training.dreamer_learning import Session, load_checkpoint
 from training.dreamer_process import DreamerError, Learner, dreamer_python
 from training.dreamer_request import Request
 from training.jobs import Job, run_job
@@ -200,3 +200,8 @@ def test_the_process_finds_this_checkout_s_modules_and_none_of_the_folder_it_sta
     variables = dreamer_process._environment()
     assert str(Path(dreamer_training.__file__).parents[1]) in variables["PYTHONPATH"].split(":")
     assert variables["PYTHONSAFEPATH"] == "1"
+
+
+def test_a_run_that_a_budget_ends_has_no_share_of_limits():
+    request = Request("cubesat_8", "follow_pose_3d", 1, "settings.yaml", "out", budget=Budget(10, 1.0, 2, 2))
+    assert Session._progress(SimpleNamespace(request=request, elapsed_s=5.0)) == 0.0
