@@ -83,7 +83,7 @@ parts:
     ("old", "new", "words"),
     [
         ("kind: box", "kind: bix", "'kind' = 'bix' is not known. Did you mean 'box'?"),
-        ("semantic: bus", "semantic: buss", "Did you mean 'bus'?"),
+        ("semantic: bus", "semantic: busz", "Did you mean 'bus'?"),
         ("size: [2, 4, 2]", "size: [2, -4, 2]", "'size entry 2' must be greater than 0."),
         ("source: mine", "source: yours", "part 'box' has the source 'yours', which is none of: mine."),
         ("[[0, 0, 0]]", "[]", "part 'box' stands nowhere; give 'at' a place."),
@@ -115,6 +115,6 @@ def test_a_thing_without_parts_and_an_unknown_one_are_refused(
     monkeypatch.setenv(OWN_FOLDERS, str(tmp_path))
     with pytest.raises(ConfigError, match="a thing without a surface cannot be inspected"):
         load_structure("empty")
-    with pytest.raises(UnknownNameError, match="unknown thing 'gatway'") as unknown:
-        load_structure("gatway")
+    with pytest.raises(UnknownNameError, match="unknown thing 'gatewai'") as unknown:
+        load_structure("gatewai")
     assert str(unknown.value).endswith("Did you mean 'gateway'?")

@@ -36,7 +36,7 @@ def own_files(tmp_path, monkeypatch):
     ("options", "words"),
     [
         (("--path", "circl"), "unknown path 'circl'. Did you mean 'circle'?"),
-        (("--thing", "gatway"), "unknown thing 'gatway'. Did you mean 'gateway'?"),
+        (("--thing", "gatewai"), "unknown thing 'gatewai'. Did you mean 'gateway'?"),
     ],
 )
 def test_an_unknown_path_or_thing_is_said_with_the_nearest_name(fulmar, command, options, words):

@@ -38,7 +38,7 @@ def test_the_original_s_camera_goes_by_its_name(tmp_path):
     ("camera", "words"),
     [
         ("rl_avits", "Did you mean 'rl_avist'?"),
-        ("{widht: 64}", "Did you mean 'width'?"),
+        ("{widhth: 64}", "Did you mean 'width'?"),
         ("{width: 0}", "1 to 4096 px"),
         ("{height: 100000}", "1 to 4096 px"),
         ("{near: 5.0, far: 1.0}", "0 < near < far"),
