@@ -129,7 +129,7 @@ REFUSED = {
         COMPRESSED,
         "'bayer_rggb8'",
     ),
-    "an encoding that nobody knows": (raw(GREY, "theirs"), IMAGE, "'theirs' of frames is not read.*rgb8"),
+    "an unknown encoding": (raw(GREY, "theirs"), IMAGE, "'theirs' of frames is not read.*rgb8"),
     "a length that is none": (raw(GREY, "mono8")[:-9], IMAGE, "no sensor_msgs/msg/Image"),
     "pixels that are missing": (raw(GREY, "rgb8"), IMAGE, "damaged: 4 × 4 of 'rgb8' with 4 bytes a row"),
     "an image that ends too early": (

@@ -88,7 +88,7 @@ class BagThread:
             max_queued: Messages that may wait for the thread.
             max_waiting: Bytes that may wait for the thread, and as many for the disk.
             before: What `RECORDING` says of an interrupted bag that goes on; its counts are added in the bag.
-            patient: Whether `put` waits for room, in lock step, where whoever publishes waits, too.
+            patient: Whether `put` waits for room, in lock step, where publishers wait, too.
         """
         self._patient = patient
         self._before = dict(before or {})

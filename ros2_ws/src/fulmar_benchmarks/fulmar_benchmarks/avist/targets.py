@@ -47,7 +47,7 @@ MOST_PATH_ERROR_M, MOST_OFF_PATH_M, MOST_POINTING_DEG = 0.01, 0.05, 0.5  # mean,
 
 
 def of_inspection(found: dict[str, dict[str, dict[str, Any]]]) -> list[Check]:
-    """The worst of each law over things and paths; nobody may enter a keep-out volume."""
+    """The worst of each law over things and paths; no robot may enter a keep-out volume."""
     checks = []
     for by in CONTROLLERS:
         flown = [each[by] for paths in found.values() for each in paths.values() if by in each]

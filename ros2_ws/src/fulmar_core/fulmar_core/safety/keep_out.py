@@ -75,7 +75,7 @@ class KeepOutGuard:
         return float(along.min()), float(along.max())
 
     def reset(self) -> None:
-        """Hold nobody: a new episode, or a jump."""
+        """Brake no robot: a new episode, or a jump."""
         self._holds[:] = False
 
     def holds(self, state: Any) -> np.ndarray:

@@ -12,7 +12,7 @@ from fulmar_core.states.spatial import SpatialState, quat_of
 
 @dataclass(frozen=True)
 class Reference:
-    """A target at one moment: pose (..., 7), motion and its change (..., 6), as of `moving_pose`."""
+    """A target at one moment: pose (..., 7), motion and its change (..., 6); units and frames: see `moving_pose`."""
 
     pose: Array
     motion: Array

@@ -68,7 +68,7 @@ def tank_empty(live: LiveSystem) -> Outcome:
     wait_for(lambda: said() is not None, EMPTIES_S)
     status = said()
     if status is None:
-        return Outcome("", "nobody said that the tank is empty", False)
+        return Outcome("", "no node reported that the tank is empty", False)
     wait_for(lambda: resting(live, status.received_s)[0], AFTER_S)
     closed, closed_s = resting(live, status.received_s)
     trips = max(int(each.values.get("watchdog_trips", 0)) for each in live.observer.statuses_since(since_s))

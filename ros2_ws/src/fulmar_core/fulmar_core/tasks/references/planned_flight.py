@@ -176,8 +176,8 @@ def planned_flight(
         path: One of `named_paths.NAMED`.
         nearest: How near it comes to the origin [m].
         pace: How fast it is flown.
-        facing: As of `MovingTarget`; a point is the origin.
-        looks: As of `Flight`.
+        facing: See `MovingTarget`; the point that it faces is the origin.
+        looks: See `Flight`.
         can: Of the robot: speed, acceleration and turn rate.
 
     Raises:
