@@ -12,6 +12,7 @@ from fulmar_core.config.provenance import git_revision
 from fulmar_core.robots.robot_file import load_robot, use_calibration
 from fulmar_core.simulation.counts import check_count, check_episodes
 from fulmar_core.tasks import load_task
+from sim_nodes.camera.opengl import check_loadable
 from training.dreamer_process import dreamer_python
 from training.executors import Executor, LocalExecutor
 from training.jobs import Job
@@ -64,6 +65,7 @@ def job_of(request: TrainingRequest) -> Job:
     if request.time_limit_s is not None or request.updates is not None:
         job = replace(job, time_limit_s=request.time_limit_s, updates=request.updates)
     settings = job.settings
+    check_loadable()  # it is evaluated in MuJoCo in the end
     if request.stop_at_success is not None:
         settings = replace(settings, stop_at_success=StopAtSuccess(request.stop_at_success))
     if request.control_hz is not None:

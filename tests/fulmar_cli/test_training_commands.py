@@ -348,3 +348,10 @@ def test_runs_that_ended_are_kept_and_those_that_failed_run_again(asked, tmp_pat
     for more in ((), ("--resume",), ("--resume",)):
         call(training, "--seeds", 2, "--seconds", 8, "--out", tmp_path, *more)
     assert [job.seed for job in asked] == [1, 1, 2, 2, 2, 2, 2, 2]
+
+
+def test_a_training_is_refused_where_its_evaluation_could_not_load_mujoco(monkeypatch, tmp_path):
+    monkeypatch.setenv("MUJOCO_GL", "elg")
+    with pytest.raises(ConfigError, match="MUJOCO_GL = 'elg'"):
+        call(train, *PLATFORM, "--out", tmp_path / "run")
+    assert not (tmp_path / "run").exists()

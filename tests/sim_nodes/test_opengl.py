@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from fulmar_cli.installation.extras import require
 from fulmar_core.config.errors import ConfigError
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.tasks import load_task
@@ -112,3 +113,10 @@ def test_a_simulator_is_not_loaded_with_a_platform_that_ends_it(monkeypatch):
             evaluation._simulator(trial, robot, load_task("go_to_pose"), load_scenario("nominal"))
         with pytest.raises(ConfigError, match=value):
             CameraSight(load_robot("cubesat_8"), load_task("dock"))
+
+
+def test_a_command_that_needs_mujoco_is_refused_before_anything_begins(monkeypatch):
+    monkeypatch.setenv("MUJOCO_GL", "elg")
+    require("matplotlib")
+    with pytest.raises(ConfigError, match="Did you mean 'egl'"):
+        require("matplotlib", "mujoco")

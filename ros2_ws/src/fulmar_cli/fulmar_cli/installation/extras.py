@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from fulmar_bringup.console import log_line
 from fulmar_cli.installation.installed_as import install_command
 from fulmar_core.config.errors import ConfigError
+from sim_nodes.camera.opengl import check_loadable
 
 if TYPE_CHECKING:
     from fulmar_bringup.run_plan import RunPlan
@@ -53,11 +54,13 @@ def require(*modules: str) -> None:
     """Refuse to begin work that would fail later for lack of a module.
 
     Raises:
-        ConfigError: For all modules that are not installed.
+        ConfigError: For all modules that are not installed, or for a MUJOCO_GL that MuJoCo cannot be loaded with.
     """
     missing = [module for module in dict.fromkeys(modules) if find_spec(module) is None]
     if missing:
         raise ConfigError(_advice(missing))
+    if "mujoco" in modules:
+        check_loadable()
 
 
 def check_plan(plan: RunPlan, *, through: str = "ros") -> None:
