@@ -1,0 +1,1 @@
+"""Bags on the page: read and sampled once, sent once, played there."""
