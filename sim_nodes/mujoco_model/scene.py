@@ -105,6 +105,15 @@ class Scene:
             if thing.body is not None:
                 place_block(self.model, self.data, thing.name, float(pose[0]), float(pose[1]))
 
+    def place(self, state: Any) -> None:
+        """Put the robot into a state of its form, without a batch axis; things stay where they are."""
+        poses = self.things
+        self.robot_model.place(self.model, self.data, state)
+        for thing in self._things:
+            if thing.body is not None:
+                x, y, _ = poses[thing.name]
+                place_block(self.model, self.data, thing.name, float(x), float(y))
+
     def lighten(self, share: float) -> None:
         """Leave the robot's body a share of the mass and inertia with which the episode began."""
         mass, moments = self._whole

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
-import mujoco
+from pathlib import Path
 
+import mujoco
+import numpy as np
+
+from fulmar_core.robots.look import COLORS
+from fulmar_core.robots.mesh_file import read_mesh
 from fulmar_core.robots.robot import Robot
-from fulmar_core.robots.urdf import HULL_COLOUR
 
 BODY, IMU_SITE = "base_link", "imu_link"
+DRAWN, HIDDEN = 2, 3  # groups of geoms that MuJoCo's viewer shows, and that it does not
 FLOOR_BIT, THING_BIT = 1, 2  # what touches the floor, and what touches one another above it
 
 
@@ -62,7 +67,39 @@ def add_body(
     body.ipos, body.iquat = [0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]
     body.mass, body.inertia = robot.body.mass, list(robot.body.inertia[:3])
     _add_hull(body, robot)
+    _add_meshes(spec, body, robot)
     return body
+
+
+def _add_meshes(spec: mujoco.MjSpec, body: mujoco.MjsBody, robot: Robot) -> None:
+    """Draw the meshes of a robot's look, and then its hull no more: they weigh nothing and touch nothing.
+
+    MuJoCo takes vertices and triangles, so that what one reader of files takes is what all draw.
+    """
+    for number, part in enumerate(robot.look):
+        if part.shape != "mesh":
+            continue
+        mesh, name = read_mesh(Path(part.file)), f"look_{number}"
+        spec.add_mesh(
+            name=name,
+            uservert=(mesh.vertices * np.array(part.scale)).ravel(),
+            userface=mesh.triangles.ravel(),
+            inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL,  # of a sheet and of what is open, too
+        )
+        x, y, z, w = part.quat_xyzw
+        body.add_geom(
+            name=name,
+            type=mujoco.mjtGeom.mjGEOM_MESH,
+            meshname=name,
+            pos=list(part.at),
+            quat=[w, x, y, z],
+            rgba=list(part.rgba),
+            mass=0.0,
+            contype=0,
+            conaffinity=0,
+            group=DRAWN,
+        )
+        body.geoms[0].group = HIDDEN
 
 
 def _add_hull(body: mujoco.MjsBody, robot: Robot) -> None:
@@ -78,7 +115,7 @@ def _add_hull(body: mujoco.MjsBody, robot: Robot) -> None:
         type=shape,
         size=size,
         pos=[outline.footprint_x, 0.0, 0.5 * (low + high)],
-        rgba=list(HULL_COLOUR),
+        rgba=list(COLORS["own"]),
         mass=0.0,
         contype=THING_BIT,
         conaffinity=THING_BIT,

@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from visualization_msgs.msg import Marker
 
 from fulmar_core.config.paths import config_names
+from fulmar_core.robots.look import Part
+from fulmar_core.robots.look_primitives import primitives_of
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.tasks import load_task
+from fulmar_core.wires.robot_name import PLAIN
+from fulmar_ros.marker_messages import marker_of
 from fulmar_ros.scene.scene import Scene
 from fulmar_ros.scene.shape import Shape
 from tests.spaces import task_for
@@ -36,12 +42,23 @@ def groups(shapes: dict[tuple[str, int], Shape]) -> set[str]:
 @pytest.mark.parametrize("robot", config_names("robots"))
 def test_every_robot_shows_its_body_at_once_and_nothing_that_was_not_received(robot):
     shapes = drawn(scene_of(robot, task_for(load_robot(robot), "go_to_pose").name))
+    parts = primitives_of(load_robot(robot).look)
+    assert [*shapes] == [("body", number) for number in range(len(parts))]
+    for part, shape in zip(parts, shapes.values(), strict=True):
+        assert shape.in_body
+        assert (shape.kind, shape.position, shape.color) == (part.shape, part.at, part.rgba)
+        assert (shape.size[0], shape.size[-1]) == (part.size[0], part.size[-1])
+        assert shape.quat == part.quat_xyzw
+
+
+def test_a_robot_without_a_look_shows_its_outline():
+    robot = replace(load_robot("kingfisher"), look=())
+    shapes = drawn(Scene(robot, load_task("go_to_pose")))
     assert [*shapes] == [("body", 0)]
-    body = load_robot(robot).body
-    assert shapes["body", 0].in_body
-    low, high = load_robot(robot).hull_span
-    assert shapes["body", 0].size == (*(body.footprint or (2.0 * body.radius,) * 2), high - low)
-    assert shapes["body", 0].position == (body.footprint_x, 0.0, 0.5 * (low + high))
+    low, high = robot.hull_span
+    width = robot.body.footprint or (2.0 * robot.body.radius,) * 2
+    assert shapes["body", 0].size == (*width, high - low)
+    assert shapes["body", 0].position == (robot.body.footprint_x, 0.0, 0.5 * (low + high))
 
 
 def test_nothing_is_drawn_again_before_it_changes():
@@ -229,3 +246,17 @@ def test_a_goal_without_a_stamp_is_shown_while_the_controller_acts(mode, is_show
     scene.give_goal(POSE, 0)
     scene.give_status({"goal_stamp_ns": "0", "mode": mode})
     assert (("goal", 0) in drawn(scene)) is is_shown
+
+
+def test_a_mesh_is_drawn_from_its_file(tmp_path):
+    part = Part(
+        "mesh", (), (0.1, 0.0, 0.2), (0.0, 0.0, 90.0), file=str(tmp_path / "hull.stl"), scale=(0.001,) * 3
+    )
+    robot = replace(load_robot("floating_platform"), look=(part,))
+    shape = drawn(Scene(robot, load_task("go_to_pose")))["body", 0]
+    assert (shape.kind, shape.size, shape.position) == ("mesh", part.scale, part.at)
+    assert shape.quat == part.quat_xyzw
+    marker = marker_of(shape, PLAIN)
+    assert marker.type == Marker.MESH_RESOURCE
+    assert marker.mesh_resource == (tmp_path / "hull.stl").as_uri()
+    assert marker.scale.x == 0.001

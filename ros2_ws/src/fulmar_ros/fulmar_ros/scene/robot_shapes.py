@@ -10,10 +10,14 @@ import numpy as np
 from fulmar_core.robots.actuators.pushing import Pushing
 from fulmar_core.robots.actuators.reaction_wheels import ReactionWheels
 from fulmar_core.robots.actuators.rolling import Rolling
+from fulmar_core.robots.look import Part
+from fulmar_core.robots.look_of import hull_of
+from fulmar_core.robots.look_primitives import primitives_of
 from fulmar_core.robots.robot import Robot
 from fulmar_ros.scene.shape import Color, Kind, Shape, arrow, circle, line
 
 BODY, THRUST, DRIVE = "body", "thrust", "drive"
+KINDS: dict[str, Kind] = {"box": "box", "cylinder": "cylinder", "sphere": "sphere", "mesh": "mesh"}
 GREY: Color = (0.6, 0.6, 0.65, 0.35)  # the model of `robot_description` shows through
 FLAME: Color = (1.0, 0.5, 0.1, 0.9)
 WATER: Color = (0.2, 0.7, 0.9, 0.9)
@@ -23,15 +27,21 @@ AHEAD_S = 1.0  # a velocity is drawn as what it goes in this time [s]
 
 
 def body_shapes(robot: Robot) -> list[Shape]:
-    """The outline of the body: a box, a ball or a cylinder, where the URDF has the hull."""
-    body, (low, high) = robot.body, robot.hull_span
-    width, in_space = 2.0 * body.radius, robot.state_type.AXES == 3
-    kind: Kind = "sphere" if in_space else "cylinder"
-    across = (width, width)
-    if body.footprint is not None:
-        kind, across = "box", body.footprint
-    place = (body.footprint_x, 0.0, 0.5 * (low + high))
-    return [Shape(BODY, 0, kind, True, (*across, high - low), GREY, place)]
+    """The robot's look, in the primitives that viewers draw; without one its outline, faint, beside the URDF's."""
+    if robot.look:
+        return [_shape_of(number, part, part.rgba) for number, part in enumerate(primitives_of(robot.look))]
+    return [_shape_of(number, part, GREY) for number, part in enumerate(hull_of(robot))]
+
+
+def _shape_of(number: int, part: Part, color: Color) -> Shape:
+    """A box, a cylinder, a sphere or a mesh on the body."""
+    if part.shape == "mesh":
+        kind, scale = KINDS[part.shape], part.scale
+        return Shape(BODY, number, kind, True, scale, color, part.at, quat=part.quat_xyzw, file=part.file)
+    x, y, z = (
+        (part.size[0], *part.size) if part.shape == "cylinder" else (*part.size, *part.size, *part.size)[:3]
+    )
+    return Shape(BODY, number, KINDS[part.shape], True, (x, y, z), color, part.at, quat=part.quat_xyzw)
 
 
 def plumes(robot: Robot, actuators: Pushing, effort: Sequence[float]) -> list[Shape]:

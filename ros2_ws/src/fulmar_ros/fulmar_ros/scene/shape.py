@@ -10,7 +10,7 @@ from typing import Literal
 
 Point = tuple[float, ...]  # x, y, z [m]
 Color = tuple[float, float, float, float]  # red, green, blue, opacity, each 0 to 1
-Kind = Literal["arrow", "box", "sphere", "cylinder", "line", "segments", "spheres"]
+Kind = Literal["arrow", "box", "sphere", "cylinder", "line", "segments", "spheres", "mesh"]
 
 LINE_M = 0.02  # width of lines, our value [m]
 FLAT_M = 0.01  # height of discs on the floor, our value [m]
@@ -32,6 +32,7 @@ class Shape:
         position: Of its middle [m].
         points: Of arrows and lines [m].
         quat: How it is turned: x, y, z, w.
+        file: Of a mesh, whose `size` is metres per unit along its x, y, z.
     """
 
     group: str
@@ -43,6 +44,7 @@ class Shape:
     position: Point = (0.0, 0.0, 0.0)
     points: tuple[Point, ...] = ()
     quat: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 1.0)
+    file: str = ""
 
     @property
     def key(self) -> tuple[str, int]:
