@@ -78,13 +78,13 @@ class Peer:
         paused: As of the last SIMU.
     """
 
-    def __init__(self, receive: Callable[[bytes], object] = lambda _datagram: None) -> None:
-        """Listen on a free port; `receive` gets every datagram."""
+    def __init__(self, receive: Callable[[bytes], object] = lambda _datagram: None, port: int = 0) -> None:
+        """Listen on a port, 0: on a free one; `receive` gets every datagram."""
         self._receive = receive
         self.paused = False
         self.lie: Callable[[bytes], bytes] = lambda answer: answer
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._socket.bind(("127.0.0.1", 0))
+        self._socket.bind(("127.0.0.1", port))
         self._socket.settimeout(0.05)
         self.port = self._socket.getsockname()[1]
         self.address = f"udp://127.0.0.1:{self.port}"

@@ -1,0 +1,257 @@
+"""Driver of a fixed wing with ArduPlane, by MAVLink."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+import time
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from fulmar_core.config.errors import DeviceError
+from fulmar_core.robots.robot import Robot
+from fulmar_core.safety.command_end import CommandEnd
+from fulmar_core.states.state import RigidBodyState
+from hardware_drivers.driver import DeviceDriver
+from hardware_drivers.feedback import Feedback, Report
+from hardware_drivers.flight_set_points import FlightSetPoints
+from hardware_drivers.mavlink_autopilot import BEATLESS_S, ERROR
+from hardware_drivers.mavlink_commands import Commands
+from hardware_drivers.mavlink_link import Address, heartbeat, open_link, wait_for_autopilot
+from hardware_drivers.mavlink_parameters import Parameters
+from hardware_drivers.mavlink_signing import read_key
+from hardware_drivers.mavlink_telemetry import Telemetry
+from hardware_drivers.placed_reports import PlacedReports
+from hardware_drivers.plane_air import PlaneAir
+from hardware_drivers.plane_autopilot import GUIDED, LOITER, PlaneAutopilot, attitude_target, protection
+from hardware_drivers.plane_settings import MavlinkPlane
+from hardware_drivers.settings import UNARMED
+from hardware_drivers.takeover import OBEYS_S, Doing, Takeover
+
+HEARTBEAT_S = 0.5  # twice within the shortest time that ArduPlane takes for their loss
+ANSWERS_S = 2.0  # for each parameter
+AGAIN_S = 0.3  # a mode that does not show is asked for again after so long
+STANDS_S = 0.15  # our value: positions of the same time for so long stand still
+RATES_HZ = {
+    "ATTITUDE": 50.0, "LOCAL_POSITION_NED": 50.0, "RAW_IMU": 25.0, "VFR_HUD": 10.0, "AOA_SSA": 10.0, "HEARTBEAT": 4.0,
+}  # fmt: skip
+
+
+class PlaneDriver(DeviceDriver):
+    """Asks for roll, pitch and thrust in GUIDED mode, and measures by the autopilot's own estimate.
+
+    It takes a craft over in flight with the first command. A decision, such as the e-stop, sets LOITER at once. After a
+    silence set points and heartbeats stop, and ArduPlane's own failsafe acts. Without `arm: true` it only measures.
+    """
+
+    def __init__(self, robot: Robot, settings: MavlinkPlane, *, patience_s: float) -> None:
+        """Open the link, wait for the autopilot, and set and check its failsafe where the driver may take over.
+
+        Raises:
+            ConfigError: The file with the key of its signatures cannot be used.
+            DeviceError: No ArduPlane answers, or its failsafe cannot be confirmed.
+        """
+        self._robot, self._settings, self._safe = robot, settings, robot.actuators.safe_command
+        self._name = f"autopilot at {settings.port}"
+        self._feedback, self._telemetry = Feedback(self._name, settings.silent_s), Telemetry()
+        self._plane, self._air = PlaneAutopilot(), PlaneAir(robot)
+        self._reports = PlacedReports(self._feedback, robot.limits, turns_freely=True)
+        self._set_points = FlightSetPoints(robot, settings.lead_s)
+        self._takeover = Takeover("the autopilot", "GUIDED", proof_s=0.0)
+        self._end, self._begun, self._asked_s, self._began_s = (
+            CommandEnd.WAITING,
+            False,
+            -1e9,
+            time.monotonic(),
+        )
+        self._state: RigidBodyState | None = None
+        self._newest_ms, self._newer_s = -1, time.monotonic()
+        self._over = threading.Event()
+        key = read_key(settings.signing_key) if settings.signing_key else b""
+        self._link = open_link(settings.port, settings.baud, key, patience_s)
+        self._commands: Commands | None = None
+        self._parameters: Parameters | None = None
+        self._thread = threading.Thread(target=self._run, name="mavlink reader", daemon=True)
+        self._thread.start()
+        try:
+            self._autopilot: Address = wait_for_autopilot(self._link, settings.port, patience_s)
+            self._prepare()
+            self._feedback.wait(patience_s)
+        except OSError as error:
+            self._close_link()
+            raise DeviceError(f"{self._name}: the link is gone ({error}).") from error
+        except BaseException:
+            self._close_link()
+            raise
+
+    def take_end(self, end: CommandEnd) -> None:
+        """See `TakesEnds`."""
+        self._end = end
+
+    def begin(self, x: float, y: float, heading: float) -> None:
+        """Set the craft's position in `odom`; see `DeviceDriver`.
+
+        Raises:
+            DeviceError: It is not armed, and this driver takes over in flight.
+        """
+        self._reports.begin(x, y)
+        if not self._settings.arm:
+            return
+        if not self._plane.armed:
+            words = self._plane.words(time.monotonic())
+            says = f" It says {words}." if words else ""
+            raise DeviceError(
+                f"{self._name}: it is not armed, in mode {self._plane.mode_name}, and this driver takes over in "
+                f"flight: take off in a mode of its own, then start it.{says}"
+            )
+        self._begun = True
+
+    def write(self, command: np.ndarray) -> np.ndarray | None:
+        """Ask for what deflections and throttles would do; sends nothing if it must not take over."""
+        if not self._begun:
+            return self._safe
+        now_s = time.monotonic()
+        doing = self._takeover.doing(self._end, self._plane.mode == GUIDED, now_s)
+        if doing is Doing.HOLD:
+            self._ask(LOITER)
+        elif doing is Doing.ASK:
+            self._ask(GUIDED)
+        elif doing is Doing.FLY:
+            assert self._state is not None  # as of the first report
+            point = self._set_points.of(self._state, command)
+            self._link.send(attitude_target(point, round(1e3 * (now_s - self._began_s)), self._autopilot))
+            return None
+        return self._safe
+
+    def read(self) -> Report:
+        """See `DeviceDriver`."""
+        return self._feedback.read()
+
+    def refusal(self) -> str:
+        """See `Answering`."""
+        plane, now_s = self._plane, time.monotonic()
+        if not self._begun:
+            return ""
+        if plane.beaten_before_s(now_s) > BEATLESS_S:
+            return f"the autopilot has sent no heartbeat for {BEATLESS_S:g} s: its mode is not known"
+        if plane.stranger:
+            return f"the autopilot is {plane.stranger}: what its modes mean is not known"
+        if not plane.armed:
+            return "the autopilot is not armed: it does not fly"
+        answer = self._commands.refused if self._commands else ""
+        return self._takeover.refusal(
+            self._end, plane.mode == GUIDED, now_s, mode=plane.mode_name, answer=answer
+        )
+
+    def health(self) -> dict[str, str]:
+        """Battery, mode, arming and words of the autopilot; see `DeviceDriver`."""
+        now_s, plane = time.monotonic(), self._plane
+        said = plane.words(now_s, worst=ERROR)
+        warning = (
+            self._feedback.refusal
+            or (UNARMED if not self._settings.arm else self.refusal())
+            or ("a failsafe of the autopilot acts" if plane.failsafe else "")
+            or (f"the autopilot says {said}" if said else "")
+        )
+        return {
+            "battery_v": self._telemetry.voltage,
+            "airspeed_m_s": self._air.airspeed_words,
+            "armed": str(plane.armed).lower(),
+            "autopilot_mode": plane.mode_name,
+            "autopilot_says": plane.words(now_s),
+            "refused_commands": self._commands.refused if self._commands else "",
+            "refused_messages": str(self._link.refused),
+            "refused_positions": str(self._reports.refused),
+            "warning": warning,
+        }
+
+    def close(self) -> None:
+        """Set LOITER where the driver has the craft, and close the link; see `DeviceDriver`."""
+        try:
+            if self._begun and self._plane.mode == GUIDED and self._commands is not None:
+                self._set_mode(LOITER)
+        except OSError:
+            pass  # it is gone; the autopilot flies on by its own failsafe
+        finally:
+            self._close_link()
+
+    def _prepare(self) -> None:
+        """Ask for telemetry, and set and check the failsafe where the driver may take over."""
+        self._commands = commands = Commands(self._link.send, self._autopilot)
+        self._parameters = Parameters(self._link.send, self._autopilot, bytewise=False)
+        for name, rate in RATES_HZ.items():
+            kind = getattr(mavlink, f"MAVLINK_MSG_ID_{name}")
+            commands.tell(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, float(kind), 1e6 / rate)
+        if not self._settings.arm:
+            return
+        end_s = time.monotonic() + OBEYS_S
+        while not self._plane.beats and time.monotonic() < end_s:
+            time.sleep(0.02)
+        if self._plane.stranger:
+            raise DeviceError(
+                f"{self._name}: the autopilot is {self._plane.stranger}. Nothing is set or taken over."
+            )
+        problem = self._parameters.protect(protection(self._settings), ANSWERS_S)
+        if problem:
+            raise DeviceError(f"{self._name}: {problem}. Nothing is taken over.")
+
+    def _ask(self, mode: int) -> None:
+        now_s = time.monotonic()
+        if now_s - self._asked_s >= AGAIN_S:
+            self._asked_s = now_s
+            self._set_mode(mode)
+
+    def _set_mode(self, mode: int) -> None:
+        assert self._commands is not None
+        custom = float(mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED)
+        self._commands.tell(mavlink.MAV_CMD_DO_SET_MODE, custom, float(mode))
+
+    def _close_link(self) -> None:
+        self._over.set()
+        self._thread.join(0.5)
+        with contextlib.suppress(OSError):
+            self._link.close()
+
+    def _run(self) -> None:
+        beaten_s, known = 0.0, False
+        while not self._over.is_set():
+            now_s, there = time.monotonic(), self._link.autopilot is not None
+            try:
+                # In silence none: without them ArduPlane's failsafe acts. At once to one that has just spoken.
+                due = now_s - beaten_s >= HEARTBEAT_S or known is not there
+                if due and self._end is not CommandEnd.SILENT:
+                    beaten_s, known = now_s, there
+                    self._link.send(heartbeat())
+                for message in self._link.receive():
+                    self._take(message)
+            except OSError as error:
+                self._feedback.fail(f"the link is gone ({type(error).__name__}: {error})")
+                return
+
+    def _take(self, message: Any) -> None:
+        """Take a message of the autopilot."""
+        self._plane.take(message, time.monotonic())
+        for part in (self._commands, self._parameters):
+            if part is not None:
+                part.take(message)
+        self._air.take(message)
+        report = self._telemetry.take(message, time.time_ns())
+        if report is None or report.odometry is None or self._stands_still(message):
+            return
+        self._state = report.odometry
+        others = self._air.readings(report.odometry, report.stamp_ns)
+        imu = report.imu if "imu" in self._robot.sensors.specs else None
+        self._reports.take(replace(report, imu=imu, others=others))
+
+    def _stands_still(self, message: Any) -> bool:
+        """Whether a position is of the same time as the one before."""
+        now_s = time.monotonic()
+        if message.time_boot_ms != self._newest_ms:
+            self._newest_ms, self._newer_s = message.time_boot_ms, now_s
+            return False
+        if now_s - self._newer_s > STANDS_S:
+            self._feedback.refuse("its position has the same time again and again: it stands still")
+        return True
