@@ -16,7 +16,7 @@ from fulmar_core.loop.control_loop import ControlLoop
 from fulmar_core.loop.newest_readings import NewestReadings
 from fulmar_core.robots.robot import Robot
 from fulmar_core.simulation.backend import Backend, Sample
-from fulmar_core.simulation.episode import draw_episodes, episode_steps
+from fulmar_core.simulation.episode import Alter, draw_episodes, episode_steps
 from fulmar_core.simulation.metrics import TargetCounter, Trajectories, TrajectoryLog, join
 from fulmar_core.simulation.simulation import BatchSimulation
 from fulmar_core.states.rotation import Array
@@ -62,6 +62,8 @@ def batches(
     worlds: int = WORLDS,
     progress: Progress = lambda steps: None,
     sight: Sight | None = None,
+    first: int = 0,
+    alter: Alter | None = None,
 ) -> Iterator[Trajectories]:
     """Run some episodes of a seed in the core's own dynamics, some at once.
 
@@ -75,6 +77,8 @@ def batches(
         worlds: How many run at once, >= 1; what happens does not depend on it.
         progress: Receives the number of control steps done.
         sight: The robots' cameras.
+        first: Number of the first episode, >= 0.
+        alter: Changes the episodes, as in `draw_episodes`.
 
     Yields:
         What happened, from the true states, for the next so many episodes.
@@ -91,8 +95,9 @@ def batches(
             scenario,
             worlds=count,
             seed=seed,
-            first=done,
+            first=first + done,
             control_hz=controller.control_hz,
+            alter=alter,
         )
         before = done * episode_steps(task, simulation.control_dt)
 
@@ -112,6 +117,8 @@ def roll_out_in_backends(
     seed: int,
     progress: Progress = lambda steps: None,
     sight: Sight | None = None,
+    first: int = 0,
+    alter: Alter | None = None,
 ) -> Trajectories:
     """Run some episodes of a seed, each in a backend of its own, stepped side by side.
 
@@ -124,6 +131,8 @@ def roll_out_in_backends(
         seed: Seed of the draws.
         progress: Receives the number of control steps done.
         sight: The robots' cameras.
+        first: Number of the first episode, >= 0.
+        alter: Changes the episodes, as in `draw_episodes`.
 
     Returns:
         What happened, from the true states.
@@ -138,7 +147,7 @@ def roll_out_in_backends(
             backends.append(make_backend())
             stack.callback(backends[-1].close)
         for number in range(0, episodes, SIDE_BY_SIDE):
-            numbers = range(number, min(number + SIDE_BY_SIDE, episodes))
+            numbers = range(first + number, first + min(number + SIDE_BY_SIDE, episodes))
             done = sum(run.position_error.size for run in runs)
 
             def further(steps: int, done: int = done) -> None:
@@ -146,12 +155,14 @@ def roll_out_in_backends(
 
             robot = backends[0].robot
             _check_sight(controller, robot, sight)
-            drawn = draw_episodes(robot, task.fitted(robot), scenario, seed=seed, numbers=np.asarray(numbers))
+            drawn = draw_episodes(
+                robot, task.fitted(robot), scenario, seed=seed, numbers=np.asarray(numbers), alter=alter
+            )
             samples = [
                 backend.reset(drawn[i], seed=seed, number=each)
                 for i, (backend, each) in enumerate(zip(backends, numbers, strict=False))
             ]
-            worlds = _Backends(backends, samples, controller, task.state_type)
+            worlds = SteppedBackends(backends, samples, controller, task.state_type)
             runs.append(_roll_out(controller, robot, task, worlds, drawn.goal, further, sight))
     return join(runs)
 
@@ -226,7 +237,7 @@ def _roll_out(
     return log.trajectories()
 
 
-class _Backends:
+class SteppedBackends:
     """Simulators that are stepped side by side."""
 
     def __init__(

@@ -1,0 +1,1 @@
+"""Operating envelopes: the conditions under which a controller is certified to succeed."""
