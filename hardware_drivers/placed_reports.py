@@ -20,9 +20,9 @@ class PlacedReports:
         refused: How many positions could not be true.
     """
 
-    def __init__(self, feedback: Feedback, limits: Limits) -> None:
-        """Put them into `feedback`, within the limits of the robot."""
-        self._feedback, self._limits = feedback, limits
+    def __init__(self, feedback: Feedback, limits: Limits, *, turns_freely: bool = False) -> None:
+        """Put them into `feedback`, within the limits of the robot; `turns_freely` is as in `unbelievable`."""
+        self._feedback, self._limits, self._turns_freely = feedback, limits, turns_freely
         self._placing = threading.Lock()  # no report is moved by a shift that has just changed
         self._shift = np.zeros(3)  # from where the device's frame begins to where `odom` does [m]
         self._believed: tuple[Report, int] | None = None  # and when, by the steady clock [ns]
@@ -35,7 +35,9 @@ class PlacedReports:
         with self._placing:
             last = self._believed
             before = None if last is None or last[0].odometry is None else (last[0].odometry, last[1])
-            reason = unbelievable(report.odometry, steady_ns, before, self._limits)
+            reason = unbelievable(
+                report.odometry, steady_ns, before, self._limits, turns_freely=self._turns_freely
+            )
             if reason:
                 self.refused += 1
                 self._feedback.refuse(reason)
