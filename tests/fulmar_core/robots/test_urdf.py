@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import io
+from dataclasses import replace
 from xml.etree import ElementTree
 
 import mujoco
 import numpy as np
 import pytest
 import yourdfpy
+from scipy.spatial.transform import Rotation
 
 from fulmar_core.config.paths import config_names
 from fulmar_core.robots.actuators.pushing import Pushing
 from fulmar_core.robots.actuators.reaction_wheels import ReactionWheels
 from fulmar_core.robots.actuators.rolling import Rolling
+from fulmar_core.robots.look_primitives import primitives_of
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.robots.urdf import body_frames, urdf_of
 from fulmar_core.wires.robot_name import frames_of
@@ -67,7 +70,8 @@ def test_each_actuator_has_a_frame_at_its_place_along_its_force(name):
     ("name", "places"), [("turtlebot2", (-0.135, 0.135)), ("jetbot", (-0.06,)), ("leatherback", ())]
 )
 def test_casters_touch_the_floor_on_which_the_wheels_stand(name, places):
-    robot, model = load_robot(name), read(load_robot(name))
+    robot = replace(load_robot(name), look=())  # a look has balls of its own
+    model = read(robot)
     casters = {link.name: link for link in model.robot.links if link.name.endswith("caster_link")}
     assert tuple(model.get_transform(caster, "base_link")[0, 3] for caster in casters) == places
     for caster, link in casters.items():
@@ -108,6 +112,33 @@ def test_the_hull_has_the_size_of_the_outline(name):
     else:
         np.testing.assert_array_equal(collision.geometry.box.size, (*robot.body.footprint, high - low))
     assert collision.origin[2, 3] == 0.5 * (low + high)
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_base_link_is_drawn_as_the_look_and_links_draw_nothing_twice(name):
+    robot, model = load_robot(name), read(load_robot(name))
+    parts, visuals = primitives_of(robot.look), model.link_map["base_link"].visuals
+    assert robot.look and len(visuals) == len(parts)
+    for part, visual in zip(parts, visuals, strict=True):
+        kind = visual.geometry
+        size = {"box": kind.box, "cylinder": kind.cylinder, "sphere": kind.sphere}[part.shape]
+        diameter = 2.0 * size.radius if part.shape != "box" else size.size[0]
+        assert diameter == pytest.approx(part.size[0], rel=1e-12)
+        np.testing.assert_allclose(visual.origin[:3, 3], part.at, atol=1e-12)
+        np.testing.assert_allclose(
+            visual.origin[:3, :3], Rotation.from_quat(part.quat_xyzw).as_matrix(), atol=1e-12
+        )
+        np.testing.assert_allclose(visual.material.color.rgba, part.rgba)
+    assert not any(link.visuals for link in model.robot.links if link.name != "base_link")
+
+
+def test_a_robot_without_a_look_is_drawn_as_its_hull_with_its_nozzles():
+    robot = replace(load_robot("floating_platform"), look=())
+    model = read(robot)
+    (visual,) = model.link_map["base_link"].visuals
+    assert visual.geometry.cylinder.radius == robot.body.radius
+    for push in robot.actuators.pushes:
+        assert len(model.link_map[f"{push.name}_link"].visuals) == 1
 
 
 @pytest.mark.parametrize("name", ["floating_platform", "turtlebot2", "cubesat_wheels"])

@@ -1,7 +1,8 @@
-"""`fulmar new`: make the file of a robot from less than all that it needs."""
+"""`fulmar new`: make the file of a robot from less than all that it needs, and classes of one's own."""
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -9,14 +10,17 @@ import typer
 
 from fulmar_bringup.console import print_json, write_line
 from fulmar_cli.commands.arguments import JsonOption, argument, flag, option
+from fulmar_cli.commands.new_part import add_parts
 from fulmar_core.config.errors import ConfigError
 
-new = typer.Typer(help="Make a robot's file from a few numbers.", no_args_is_help=True, rich_markup_mode=None)
+new = typer.Typer(
+    help="Make a robot's file, or a class of your own.", no_args_is_help=True, rich_markup_mode=None
+)
 
 
 @new.callback()
 def _group() -> None:
-    """Makes a group of the only command."""
+    """Makes a group."""
 
 
 @new.command()
@@ -63,3 +67,75 @@ def airframe(
     for name, each in terms.items():
         write_line(f"  {name}  " + "  ".join(f"{factor} {value:.4g}" for factor, value in each.items()))
     write_line(f"wrote {out}; check it: fulmar check robot {out}")
+
+
+@new.command()
+def robot(
+    name: Annotated[str, argument("NAME", "Of the new robot, and of its file.")],
+    like: Annotated[
+        str, option("ROBOT", "The most similar one of `fulmar list robots`: what nothing else says is its.")
+    ],
+    urdf: Annotated[Path | None, option("FILE", "Take what a URDF says; a xacro has to be expanded.")] = None,
+    mjcf: Annotated[Path | None, option("FILE", "Take what a MuJoCo model (.xml) says.")] = None,
+    root: Annotated[
+        str, option("LINK", "Whose frame is the robot's; base_link or the outermost by default.")
+    ] = "",
+    actuators: Annotated[
+        str, option("NAMES", "Links, sites or joints that move it, with commas; patterns such as jet_*.")
+    ] = "",
+    settings: Annotated[
+        list[str] | None, option("KEY=VALUE", "A value of the file, such as body.mass=8.1.", "--set")
+    ] = None,
+    out: Annotated[
+        Path | None, option("DIR", "Folder to write robots/NAME.yaml into; FULMAR_CONFIGS, or mine.")
+    ] = None,
+    force: Annotated[bool, flag("--force", "Replace the file.")] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Write a commented robot file, and say what to measure with which command.
+
+    Mass, inertia, centre of mass, outline, camera, wheels, thrusters and propellers of a URDF or a MuJoCo model are
+    taken; what was not is listed with what to write. Spans, performance and limits follow from body and actuators.
+
+    Try:
+
+    fulmar new robot mybot --like floating_platform --set body.mass=8.1
+
+    fulmar new robot husky --like turtlebot2 --urdf husky.urdf
+    """
+    from fulmar_evaluation.new_robot.new_robot import make_robot
+    from fulmar_evaluation.new_robot.settings import read_settings
+    from fulmar_evaluation.new_robot.sources import read_description
+    from fulmar_evaluation.new_robot.written import check_new_name, usual_folder, write_robot
+
+    folder = out or usual_folder()
+    path = check_new_name(name, folder, replaces=force)
+    names = _split(actuators)
+    description = read_description(urdf, mjcf, root)
+    values = read_settings(settings or [])
+    found = make_robot(name, like, values, description, names)
+    if found.unnamed and not as_json and sys.stdin.isatty():
+        asked = typer.prompt(
+            f"{found.unnamed} (NAME,NAME; nothing: as {like})", default="", show_default=False
+        )
+        if names := _split(asked):
+            found = make_robot(name, like, values, description, names)
+    write_robot(found, path)
+    if as_json:
+        gaps = [vars(gap) for gap in found.gaps]
+        print_json({"robot": name, "file": str(path), "not_taken": gaps, "steps": list(found.steps)})
+        return
+    write_line(f"wrote {path}; it loads. Let Fulmar find it: export FULMAR_CONFIGS={folder.absolute()}")
+    for gap in found.gaps:
+        write_line(f"  not taken: {gap}")
+    write_line("measure, in this order:")
+    for step in found.steps:
+        write_line(f"  {step}")
+
+
+def _split(names: str) -> list[str]:
+    """Names with commas between them."""
+    return [each.strip() for each in names.split(",") if each.strip()]
+
+
+add_parts(new)

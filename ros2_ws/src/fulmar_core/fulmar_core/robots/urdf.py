@@ -4,20 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import atan2, hypot, pi
+from math import atan2, hypot, pi, radians
+from pathlib import Path
 from xml.etree import ElementTree
 
 from scipy.spatial.transform import Rotation
 
 from fulmar_core.robots.actuators.parts import Fixture
+from fulmar_core.robots.look import Part
+from fulmar_core.robots.look_of import hull_of
+from fulmar_core.robots.look_primitives import primitives_of
 from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.sensors.camera import LINK, OPTICAL, CameraConfig
 from fulmar_core.states.attitude import euler_of
 from fulmar_core.wires.robot_name import PLAIN, Frames
 
 IMU = "imu_link"
-HULL_COLOUR = (0.25, 0.45, 0.7, 1.0)  # red, green, blue, opacity
-PART_COLOUR = (0.9, 0.4, 0.2, 1.0)
+PART_COLOUR = (0.9, 0.4, 0.2, 1.0)  # red, green, blue, opacity
 WHEEL_COLOUR = (0.15, 0.15, 0.17, 1.0)
 NOZZLE = 0.04  # length and, halved, diameter of the cylinder that shows an actuator; our value [m]
 
@@ -70,6 +73,9 @@ def urdf_of(robot: Robot, frames: Frames = PLAIN) -> str:
     nothing for 1 kg; zero is read as zero by PyBullet, Drake (which asks for a joint that is fixed), MuJoCo (which
     merges such links), urdfdom and KDL.
 
+    `base_link` is drawn as the robot's `look`; without one its hull is, and each actuator in its link. What touches is
+    the hull.
+
     Args:
         robot: The robot.
         frames: Names of its frames, which its links have too.
@@ -80,18 +86,17 @@ def urdf_of(robot: Robot, frames: Frames = PLAIN) -> str:
     root = ElementTree.Element("robot", name=robot.name)
     base = ElementTree.SubElement(root, "link", name=frames.base)
     _add_inertial(base, robot.body.com, robot.body.mass, robot.body.tensor)
+    for each in primitives_of(robot.look or hull_of(robot)):
+        _add_look(ElementTree.SubElement(base, "visual"), each)
     low, high = robot.hull_span
-    for purpose in ("visual", "collision"):
-        part = ElementTree.SubElement(base, purpose)
-        _place(part, (robot.body.footprint_x, 0.0, 0.5 * (low + high)))
-        _add_hull(ElementTree.SubElement(part, "geometry"), robot, high - low)
-        if purpose == "visual":
-            _colour(part, "hull", HULL_COLOUR)
+    collision = ElementTree.SubElement(base, "collision")
+    _place(collision, (robot.body.footprint_x, 0.0, 0.5 * (low + high)))
+    _add_hull(ElementTree.SubElement(collision, "geometry"), robot, high - low)
     for frame in body_frames(robot):
         name = frames.named(frame.name)
         link = ElementTree.SubElement(root, "link", name=name)
         _add_inertial(link, (0.0,) * 3, 0.0, (0.0,) * 6)
-        if frame.part is not None:
+        if frame.part is not None and not robot.look:  # the look has wheels and nozzles of its own
             _add_part(ElementTree.SubElement(link, "visual"), frame.part)
         joint = ElementTree.SubElement(root, "joint", name=f"{name}_joint", type="fixed")
         _place(joint, frame.position, frame.rpy)
@@ -116,6 +121,23 @@ def _add_hull(geometry: ElementTree.Element, robot: Robot, height: float) -> Non
         _cylinder(geometry, robot.body.radius, height)
     else:
         ElementTree.SubElement(geometry, "box", size=_numbers((*robot.body.footprint, height)))
+
+
+def _add_look(visual: ElementTree.Element, part: Part) -> None:
+    """Show a box, a cylinder, a sphere or a mesh of a look."""
+    _place(visual, part.at, [radians(each) for each in part.rpy])
+    geometry = ElementTree.SubElement(visual, "geometry")
+    if part.shape == "box":
+        ElementTree.SubElement(geometry, "box", size=_numbers(part.size))
+    elif part.shape == "mesh":
+        ElementTree.SubElement(
+            geometry, "mesh", filename=Path(part.file).as_uri(), scale=_numbers(part.scale)
+        )
+    elif part.shape == "sphere":
+        ElementTree.SubElement(geometry, "sphere", radius=_number(0.5 * part.size[0]))
+    else:
+        _cylinder(geometry, 0.5 * part.size[0], part.size[1])
+    _colour(visual, part.color, part.rgba)
 
 
 def _add_part(visual: ElementTree.Element, part: Fixture) -> None:

@@ -1,0 +1,1 @@
+"""Robot files from a robot that they are like, and from URDF and MJCF; needs MuJoCo only for MJCF."""
