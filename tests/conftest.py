@@ -24,6 +24,7 @@ from fulmar_bringup.domains import reserved_domains
 from fulmar_cli import main as command_line
 from fulmar_ros.middleware import LOOPBACK, PROFILES
 from tests.fulmar_cli.bag_commands import POLICY
+from tests.read_once import read_once
 from tests.real_time_first import RealTimeFirstPlugin
 from tests.synthetic_run import CALM, Plan, write_run
 
@@ -42,8 +43,14 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Run tests with wall-clock deadlines before all others, and alone."""
+    """Run tests with wall-clock deadlines first, in one process; read what Fulmar comes with once."""
+    # As the Makefile does: each process and hundreds of their children would compile the same modules again.
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+    sys.dont_write_bytecode = False
     config.pluginmanager.register(RealTimeFirstPlugin(), "real_time_first")
+    patch = pytest.MonkeyPatch()
+    config.add_cleanup(patch.undo)
+    read_once(patch)
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
@@ -103,7 +110,7 @@ def pytest_collection_finish() -> None:
 def ordinary_threads() -> Iterator[None]:
     """Take the priority away that the loop of a node took in this process: it would hold up every test to come."""
     yield
-    if sys.platform != "linux" or os.sched_getscheduler(0) == os.SCHED_OTHER:
+    if sys.platform != "linux" or os.sched_getscheduler(0) in (os.SCHED_OTHER, os.SCHED_IDLE):
         return
     for thread in map(int, os.listdir("/proc/self/task")):
         with contextlib.suppress(OSError):  # it may have ended
@@ -140,7 +147,8 @@ def ros_domain(monkeypatch: pytest.MonkeyPatch) -> Iterator[RosDomain]:
     Ended lifecycle nodes of this process stay visible in their domain until they are garbage-collected, so nodes of
     this process freeze nothing. No plant searches for another one before it starts, since there is none.
     """
-    monkeypatch.setattr("fulmar_ros.runtime.gc", SimpleNamespace(collect=lambda: None, freeze=lambda: None))
+    unchanged = SimpleNamespace(**dict.fromkeys(("collect", "freeze", "unfreeze"), lambda: None))
+    monkeypatch.setattr("fulmar_ros.runtime.gc", unchanged)
     monkeypatch.setattr("fulmar_ros.plant_node.BRIEFLY_S", 0.0)
     gc.collect()
     gc.freeze()  # modules that earlier tests imported would take a quarter of a second at each collection

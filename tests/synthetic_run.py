@@ -18,7 +18,14 @@ from fulmar_core.controllers.lqr import Lqr, LqrWeights
 from fulmar_core.loop.control_loop import ControlLoop
 from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.robot_file import load_robot
-from fulmar_core.robots.topics import VELOCITY_COMMAND, WIRES, Wire, command_wire
+from fulmar_core.robots.topics import (
+    BROADCAST_NAMES,
+    BROADCAST_VALUES,
+    VELOCITY_COMMAND,
+    WIRES,
+    Wire,
+    command_wire,
+)
 from fulmar_core.simulation.simulation import BatchSimulation
 from fulmar_core.states.planar import PlanarState, at_rest
 from fulmar_core.states.rotation import rotate_inverse
@@ -52,6 +59,11 @@ def _weights(velocity: float, error_limit: float) -> LqrWeights:
 
 
 BRISK, CALM = _weights(4.0, 1.0), _weights(12.0, 1.0)
+
+
+IN_BAGS = tuple(
+    wire for wire in WIRES if wire not in (BROADCAST_NAMES, BROADCAST_VALUES)
+)  # types that bags know
 
 
 @dataclass(frozen=True)
@@ -177,7 +189,7 @@ class RunMessages:
     """Builds the messages of a run and writes them into a bag, by the names of the wires."""
 
     def __init__(
-        self, folder: Path, robot: Robot, info: dict[str, Any], wires: Sequence[Wire] = WIRES
+        self, folder: Path, robot: Robot, info: dict[str, Any], wires: Sequence[Wire] = IN_BAGS
     ) -> None:
         """Create the bag, with the topics of some wires."""
         self._robot, self._command_wire = robot.name, command_wire(robot)

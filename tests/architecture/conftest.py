@@ -11,6 +11,7 @@ PACKAGES = [
     "fulmar_benchmarks",
     "fulmar_bringup",
     "fulmar_cli",
+    "fulmar_console",
     "fulmar_core",
     "fulmar_evaluation",
     "fulmar_ros",

@@ -17,6 +17,7 @@ PROGRAMS = {
     "fulmar_cli/fulmar": "fulmar_cli.main",
     "fulmar_ros/estimator_node": "fulmar_ros.estimator_node",
     "fulmar_ros/estop_node": "fulmar_ros.estop_node",
+    "fulmar_ros/action_node": "fulmar_ros.action_node",
     "fulmar_ros/goal_node": "fulmar_ros.goal_node",
     "fulmar_ros/markers_node": "fulmar_ros.markers_node",
     "fulmar_ros/recorder_node": "fulmar_ros.recorder_node",
@@ -27,6 +28,7 @@ PROGRAMS = {
     "sim_nodes/camera_node": "sim_nodes.camera_node",
     "sim_nodes/emulator_node": "sim_nodes.emulator_node",
     "sim_nodes/event_camera_node": "sim_nodes.event_camera_node",
+    "sim_nodes/fleet_node": "sim_nodes.fleet_node",
     "sim_nodes/sim_node": "sim_nodes.sim_node",
 }
 SOURCES = ["configs", "hardware_drivers", "policy_server", "ros2_ws/src", "sim_nodes"]
@@ -105,7 +107,8 @@ def test_packages_are_built_from_the_core_to_the_command_line(workspace):
         "list", "--base-paths", "src", "--names-only", "--topological-order"
     ).stdout.split()
     assert order[:3] == ["fulmar_core", "fulmar_bags", "fulmar_ros"]
-    assert order[-4:] == ["fulmar_bringup", "fulmar_evaluation", "fulmar_benchmarks", "fulmar_cli"]
+    upper = ["fulmar_bringup", "fulmar_evaluation", "fulmar_console", "fulmar_benchmarks", "fulmar_cli"]
+    assert order[-5:] == upper
 
 
 @pytest.mark.parametrize("name", PACKAGES)

@@ -20,7 +20,7 @@ ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
 PAGES = {path.stem: path for path in (ROOT / "README.md", *sorted(DOCS.glob("*.md")))}
 COMMAND = re.compile(r"^ *(fulmar [a-z].*)$", re.MULTILINE)
-INLINE = re.compile(r"`fulmar ([a-z]+(?:-[a-z]+)*)")
+INLINE = re.compile(r"`fulmar ([a-z]+(?:-[a-z0-9]+)*)")
 FILE = re.compile(
     r"`((?:fulmar_|sim_nodes|policy_server|hardware_drivers|training|configs|tests)[\w/]*/[\w./]+)`"
 )
@@ -55,13 +55,13 @@ def root():
 
 def test_every_command_exists_with_its_options(page, root):
     for line in COMMAND.findall(shown(page)):
-        words = re.split(r"\s{2,}(?=[^-])|\s#\s", line)[0]  # the words beside a command explain it
+        words = re.split(r"\s{2,}(?=[^-])|\s#\s|\s&&\s", line)[0]  # the words beside a command explain it
         words = shlex.split(words.replace("[", "").replace("]", ""))[1:]
         command = root
         while words and hasattr(command, "commands"):
             assert words[0] in command.commands, line
             command = command.commands[words.pop(0)]
-        known = {name for parameter in command.params for name in parameter.opts} | {"--help"}
+        known = {"--help"}.union(*(each.opts + each.secondary_opts for each in command.params))
         assert {word.split("=")[0] for word in words if word.startswith("--")} <= known, line
 
 

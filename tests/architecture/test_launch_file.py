@@ -13,10 +13,11 @@ from types import ModuleType
 import pytest
 
 from fulmar_bringup import launched_system
+from fulmar_core.config.paths import config_names
 
 ARGUMENTS = {
     "system", "robot", "task", "controller", "backend", "hardware", "policy", "goals", "adapter", "topic",
-    "emulate", "name", "markers", "camera",
+    "emulate", "name", "markers", "camera", "actions", "simulation_interfaces", "broadcast",
 }  # fmt: skip
 
 ARGUMENTS_HELP = launched_system.ARGUMENTS
@@ -186,16 +187,20 @@ def test_the_launch_arguments_are_those_of_the_launched_system():
     assert set(launched_system.ARGUMENTS) == ARGUMENTS
 
 
-def test_every_system_launches_the_nodes_of_the_table(repository, load):
+QUICK = ("mock_lqr", "mujoco_lab")  # simulated, and with motion capture; every other one is like one of them
+
+
+@pytest.mark.parametrize(
+    "system",
+    [pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for name in config_names("systems")],
+)
+def test_every_system_launches_the_nodes_of_the_table(load, system):
     from fulmar_bringup.launched_system import list_nodes
 
-    systems = sorted(path.stem for path in (repository / "configs" / "systems").glob("*.yaml"))
-    assert systems
-    for system in systems:
-        launched = [
-            (node.kwargs["package"], node.kwargs["executable"], node.kwargs["name"])
-            for node in start(load(), {"system": system})
-        ]
-        listed = [(spec.package, spec.executable, spec.name) for spec in list_nodes(system=system)]
-        assert launched == listed
-        assert launched
+    launched = [
+        (node.kwargs["package"], node.kwargs["executable"], node.kwargs["name"])
+        for node in start(load(), {"system": system})
+    ]
+    listed = [(spec.package, spec.executable, spec.name) for spec in list_nodes(system=system)]
+    assert launched == listed
+    assert launched

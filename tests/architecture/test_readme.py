@@ -66,3 +66,10 @@ def test_images_are_small(readme, repository):
 def test_each_image_has_the_command_that_makes_it(readme):
     for name in images_of(readme):
         assert f"--record runs/{name}\n" in readme
+
+
+def test_the_film_on_top_is_small_and_has_its_one_command(readme, repository):
+    assert readme.index(f"{IMAGES}robots.webp") < readme.index(IMAGES + "platform.png")
+    assert (repository / IMAGES / "robots.webp").stat().st_size < 1_500_000
+    bags = re.findall(r"^fulmar report (.*) --video robots\.webp", readme, re.MULTILINE)[0].split()
+    assert all(f"--record {bag}\n" in readme for bag in bags)

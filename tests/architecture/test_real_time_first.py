@@ -1,14 +1,15 @@
-"""The order of all tests of a run: those with wall-clock deadlines first and alone, then the others."""
+"""The order of all tests: those with wall-clock deadlines first, only patient ones beside them, then the others."""
 
 from __future__ import annotations
 
+import os
 from collections import deque
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
-from tests.real_time_first import RealTimeFirst
+from tests.real_time_first import RealTimeFirst, RealTimeFirstPlugin, may_wait, over_file
 
 REAL_TIME = [f"tests/ros/test_{file}.py::test_r{number}" for file in "ab" for number in range(3)]
 OTHERS = [
@@ -41,7 +42,9 @@ class Process:
         return self.waiting[0] if ready else None
 
 
-def run(tmp_path: Path, collected: list[str], *, crashing: str = "") -> list[tuple[str, str]]:
+def run(
+    tmp_path: Path, collected: list[str], *, crashing: str = "", beside: bool = True
+) -> list[tuple[str, str]]:
     """Test and process of each step in which every process that can runs one test."""
     (tmp_path / "names").write_text("\n".join(name for name in collected if name in REAL_TIME))
     config = SimpleNamespace(
@@ -49,7 +52,7 @@ def run(tmp_path: Path, collected: list[str], *, crashing: str = "") -> list[tup
         option=SimpleNamespace(loadscopereorder=True),
         hook=SimpleNamespace(),
     )
-    scheduler = RealTimeFirst(config, None, tmp_path / "names")  # type: ignore[arg-type]
+    scheduler = RealTimeFirst(config, None, tmp_path / "names", beside=beside)  # type: ignore[arg-type]
     for name in ("gw0", "gw1", "gw2"):
         process = Process(name)
         scheduler.add_node(process)
@@ -87,3 +90,55 @@ def test_real_time_tests_come_first_in_one_process_and_every_test_comes_once(
 @pytest.mark.parametrize("collected", [REAL_TIME, REAL_TIME[:1], OTHERS, [SINGLE], [SINGLE, REAL_TIME[0]]])
 def test_a_part_of_all_tests_runs_to_its_end(collected: list[str], tmp_path: Path) -> None:
     assert sorted(name for name, _ in run(tmp_path, collected)) == sorted(collected)
+
+
+def test_files_whose_tests_wait_for_nodes_are_spread_among_the_others(tmp_path: Path) -> None:
+    waiting = [f"tests/ros/test_{n}.py::test_it" for n in range(6)]
+    computing = [f"tests/core/test_{n:02}.py::test_{m}" for n in range(12) for m in range(3)]
+    names = [name for name, _ in run(tmp_path, [*waiting, *computing])]
+    places = [names.index(name) / len(names) for name in waiting]
+    assert min(places) < 0.4 < 0.6 < max(places)
+
+
+PATIENT = [f"tests/contracts/test_{file}.py::test_{n}" for file in "abcd" for n in range(3)]
+
+
+@pytest.mark.parametrize(
+    ("crashing", "beside"),
+    [("", True), (REAL_TIME[2], True), (PATIENT[4], True), ("", False), (REAL_TIME[2], False)],
+)
+def test_only_tests_that_need_no_clock_run_beside_those_that_do(
+    crashing: str, beside: bool, tmp_path: Path
+) -> None:
+    done = run(tmp_path, [*COLLECTED, *PATIENT], crashing=crashing, beside=beside)
+    names = [name for name, _ in done]
+    assert sorted(names) == sorted([*COLLECTED, *PATIENT])
+    last = max(names.index(name) for name in REAL_TIME)
+    early = set(names[:last]) - set(REAL_TIME)
+    assert early <= set(PATIENT)
+    assert bool(early) == beside
+    assert over_file(tmp_path / "names").exists()
+
+
+def test_a_test_beside_them_waits_for_them_until_none_is_left(
+    tmp_path: Path,
+) -> None:
+    if not may_wait():
+        pytest.skip("this process may not come back from SCHED_IDLE")
+    plugin = RealTimeFirstPlugin()
+    config = SimpleNamespace(workerinput={"real_time_list": str(tmp_path / "names")})
+
+    def priority_of(marker: str | None) -> int:
+        marked = SimpleNamespace(config=config, get_closest_marker=lambda name: marker == name or None)
+        plugin.pytest_runtest_protocol(marked)  # type: ignore[arg-type]
+        return os.sched_getscheduler(0)
+
+    try:
+        assert priority_of(None) == os.SCHED_IDLE
+        assert priority_of("real_time") == os.SCHED_OTHER
+        assert priority_of(None) == os.SCHED_IDLE
+        over_file(tmp_path / "names").touch()
+        assert priority_of(None) == os.SCHED_OTHER
+    finally:
+        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+        plugin.pytest_unconfigure()

@@ -113,6 +113,9 @@ def test_programs_are_those_that_systems_start(packages):
         ("fulmar_cli", "fulmar"),
         ("fulmar_ros", "estimator_node"),
         ("fulmar_ros", "estop_node"),
+        ("fulmar_ros", "action_node"),
+        ("fulmar_ros", "broadcast_node"),
+        ("fulmar_ros", "simulation_interfaces_node"),
         ("fulmar_ros", "goal_node"),
         ("fulmar_ros", "markers_node"),
         ("fulmar_ros", "recorder_node"),
@@ -123,6 +126,7 @@ def test_programs_are_those_that_systems_start(packages):
         ("sim_nodes", "camera_node"),
         ("sim_nodes", "emulator_node"),
         ("sim_nodes", "event_camera_node"),
+        ("sim_nodes", "fleet_node"),
         ("sim_nodes", "sim_node"),
     }
 

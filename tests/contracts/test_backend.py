@@ -10,6 +10,7 @@ import pytest
 
 from fulmar_bringup.system import SIMULATED
 from fulmar_core.dynamics.flight_trim import find_trim, flying_at
+from fulmar_core.robots.basilisk_robots import is_for_basilisk
 from fulmar_core.robots.sensors.star_tracker import StarTrackerSpec
 from fulmar_core.simulation.episode import Episode, draw_episode
 from fulmar_core.states.planar import PlanarState
@@ -17,6 +18,7 @@ from fulmar_core.states.spatial import SpatialState
 from fulmar_core.tasks.goal import goal_at
 from fulmar_core.worlds.scenario import load_scenario
 from sim_nodes.mock_backend import MockBackend
+from tests.basilisk import with_basilisk
 from tests.conftest import ALIKE
 from tests.new_robots import robots_of_every_family
 from tests.spaces import SPACECRAFT, task_for
@@ -52,14 +54,17 @@ def build_jsbsim(robot):
 
 
 OF_ANY_ROBOT = {"mock": MockBackend, "mujoco": build_mujoco}
-BUILDERS = {**OF_ANY_ROBOT, "jsbsim": build_jsbsim}
+BUILDERS = {**OF_ANY_ROBOT, "jsbsim": build_jsbsim, "basilisk": with_basilisk}
+IS_FOR = {"jsbsim": lambda robot: robot.flies, "basilisk": is_for_basilisk}
 PAIRS = [
     pytest.param(
-        (kind, name), id=f"{kind}-{name}", marks=pytest.mark.slow if ALIKE.get(name) in ROBOTS else ()
+        (kind, name),
+        id=f"{kind}-{name}",
+        marks=pytest.mark.slow if ALIKE.get(name) in ROBOTS or kind == "basilisk" else (),
     )
     for kind in sorted(BUILDERS)
     for name in sorted(ROBOTS)
-    if kind in OF_ANY_ROBOT or ROBOTS[name].flies
+    if kind in OF_ANY_ROBOT or IS_FOR[kind](ROBOTS[name])
 ]
 
 
@@ -277,7 +282,7 @@ def test_a_spacecraft_obeys_the_mass_the_inertia_and_the_wrench_of_its_world(bui
     np.testing.assert_allclose(truth.angular_velocity_in_body, [0.0, 0.0, 0.1], rtol=0, atol=1e-9)
 
 
-@pytest.mark.parametrize("kind", sorted(BUILDERS))
+@pytest.mark.parametrize("kind", sorted({*BUILDERS} - {"basilisk"}))
 def test_an_aircraft_that_tumbles_faster_than_models_of_the_air_hold_for_loses_its_speed(kind):
     robot = ROBOTS["airship_v7"]
     backend = BUILDERS[kind](robot)

@@ -13,9 +13,9 @@ from fulmar_core.robots.actuators.ackermann import Ackermann
 from fulmar_core.robots.actuators.pushing import Pushing
 from fulmar_core.robots.actuators.reaction_wheels import ReactionWheels
 from fulmar_core.robots.actuators.rolling import Rolling
-from fulmar_core.safety.watchdog import default_timeout
 from fulmar_core.simulation.episode import draw_episode
 from fulmar_core.simulation.simulation import BatchSimulation
+from fulmar_core.wires.silence import default_timeout
 from fulmar_core.worlds.scenario import load_scenario
 from sim_nodes.mock_backend import MockBackend
 from tests.new_robots import robots_of_every_family

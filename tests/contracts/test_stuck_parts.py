@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from fulmar_core.config.errors import ConfigError
+from fulmar_core.robots.basilisk_robots import is_for_basilisk
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.simulation.episode import draw_episode
 from fulmar_core.simulation.simulation import BatchSimulation
@@ -16,6 +17,7 @@ from fulmar_core.worlds.parts import Actuation, Stuck, Supply
 from fulmar_core.worlds.scenario import load_scenario
 from fulmar_core.worlds.stuck import candidates_of
 from sim_nodes.mock_backend import MockBackend
+from tests.basilisk import with_basilisk
 from tests.new_robots import robots_of_every_family
 from tests.spaces import task_for
 
@@ -82,17 +84,23 @@ def jsbsim(robot):
     return JsbsimBackend(robot, sensor_noise=False)
 
 
+def basilisk(robot):
+    return with_basilisk(robot, sensor_noise=False)
+
+
 SIMULATORS = {
     "batch": batch_of,
     "mock": backend_of(MockBackend),
     "mujoco": backend_of(mujoco),
     "jsbsim": backend_of(jsbsim),
+    "basilisk": backend_of(basilisk),
 }
+IS_FOR = {"jsbsim": lambda robot: robot.flies, "basilisk": is_for_basilisk}
 PAIRS = [
-    (simulator, name)
+    pytest.param(simulator, name, marks=pytest.mark.slow if simulator == "basilisk" else ())
     for simulator in SIMULATORS
     for name in sorted(ROBOTS)
-    if simulator != "jsbsim" or ROBOTS[name].flies
+    if simulator not in IS_FOR or IS_FOR[simulator](ROBOTS[name])
 ]
 EACH = pytest.mark.parametrize(("simulator", "name"), PAIRS)
 

@@ -20,7 +20,16 @@ from fulmar_core.controllers.classical import gains_of
 from fulmar_core.loop.control_loop import ControlLoop
 from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.robot_file import load_robot
-from fulmar_core.robots.topics import AIR_BEARING, CLOCK, DIAGNOSTICS, METADATA, STATUS, WIRES
+from fulmar_core.robots.topics import (
+    AIR_BEARING,
+    CLOCK,
+    DIAGNOSTICS,
+    METADATA,
+    OPERATOR_ACTION,
+    ROBOT_INFO,
+    STATUS,
+    WIRES,
+)
 from fulmar_core.simulation.simulation import BatchSimulation
 from fulmar_core.tasks import Task, load_task
 from fulmar_core.tasks.goal import goal_in_float64
@@ -36,7 +45,7 @@ WORLDS, STEPS = 4, 6  # of each batch
 USUAL = "nominal"  # scenario of laws and observations
 # What they report depends on the time of day, or names folders; a clock ticks on until its last listener is gone; how
 # often a bearing reports before the first step depends on how fast nodes start.
-OF_A_MOMENT = (AIR_BEARING, CLOCK, DIAGNOSTICS, METADATA, STATUS)
+OF_A_MOMENT = (AIR_BEARING, CLOCK, DIAGNOSTICS, METADATA, OPERATOR_ACTION, ROBOT_INFO, STATUS)
 LAWS = tuple(name for name, entry in CONTROLLERS.items() if entry.is_law)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 
 import pytest
 from rosbags.rosbag2 import Reader
@@ -77,6 +78,15 @@ def test_a_bag_whose_metadata_is_gone_goes_on_all_the_same(tmp_path):
     write_words(bag, 10, 1)
     bag.close()
     assert len(words_by_rosbags(tmp_path / "bag")) == 6
+
+
+def test_what_was_written_after_the_last_metadata_counts_as_recorded(tmp_path):
+    assert interrupted_bag(tmp_path / "bag").last_ns == 0
+    before_ns = time.time_ns() - 1_000_000_000  # the clock of files is coarse
+    interrupted(tmp_path / "bag")
+    assert interrupted_bag(tmp_path / "bag").last_ns < before_ns  # the log time of the last message
+    (tmp_path / "bag" / "metadata.yaml").write_text("{}")
+    assert interrupted_bag(tmp_path / "bag").last_ns >= before_ns
 
 
 def test_a_bag_is_never_continued_unasked(tmp_path):

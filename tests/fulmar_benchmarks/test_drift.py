@@ -44,7 +44,7 @@ def folder(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def evaluated(folder):
-    result = run(FEW, "--output", str(folder), "--json")
+    result = run(FEW, "--output", str(folder), "--json", "--no-report")
     assert result.exit_code == 0, result.output
     return result
 
@@ -109,7 +109,9 @@ def test_unknown_names_are_refused_before_anything_is_evaluated(tmp_path):
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow  # tests/fulmar_benchmarks/test_report.py draws others of its kind
 def test_the_report_stands_alone_and_its_plots_are_small(document, folder):
+    assert run(FEW, "--output", str(folder)).exit_code == 0
     text = (folder / "index.html").read_text()
     assert not re.search(r'@import|url\((?!#)|src="http|href="http', text)
     for words in ("Go to pose under disturbances", "2 thrusters lost", "bound", "Square", "0–20 %"):

@@ -18,9 +18,9 @@ from fulmar_benchmarks.outcomes import code_hash, keys_of
 from fulmar_benchmarks.pairs import cells_of, find_pair
 from fulmar_benchmarks.results import QUANTILES, PairResult, outcome_of
 from fulmar_benchmarks.roboran.campaign import document_of
-from fulmar_benchmarks.roboran.document import wilson
 from fulmar_benchmarks.roboran.targets import LEAST, ROBOTS, TABLE, TASKS, checks_of, main_figure, thesis_row
 from fulmar_evaluation import bounds
+from fulmar_evaluation.success_interval import wilson
 from policy_server.controllers import policies_directory
 
 GOOD = {"batch": 0.995, "mujoco": 0.992}

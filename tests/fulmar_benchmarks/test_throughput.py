@@ -44,7 +44,7 @@ def command(tmp_path, monkeypatch):
 def test_paces_are_measured_again_unless_one_goes_on_with_those_that_are_kept(command):
     small = (
         "--robots",
-        "kingfisher,turtlebot2",
+        "jetbot,turtlebot2",
         "--worlds",
         "6",
         "--seconds",

@@ -36,7 +36,13 @@ def test_a_node_in_error_silent_or_absent_is_not_well(node, level, reason, well,
 def test_it_knows_the_name_of_every_node_of_a_system():
     guards = Guards(estop=True, estimator="mocap_imu")
     plan = RunPlan(
-        "floating_platform", "go_to_pose", "lqr", "mujoco", 50.0, guards=guards, extras=("markers", "camera")
+        "floating_platform",
+        "go_to_pose",
+        "lqr",
+        "mujoco",
+        50.0,
+        guards=guards,
+        extras=("markers", "camera", "actions", "simulation_interfaces", "broadcast"),
     )
     chain = Guards(estimator="attitude", estimators=("event_rate", "inertia"))
     satellite = RunPlan("cubesat_wheels", "point", "lqr", "mujoco", 10.0, guards=chain)

@@ -13,13 +13,12 @@ from pathlib import Path
 import pytest
 
 from fulmar_bringup import message_build
-from fulmar_bringup.message_build import SOURCE, install_tf2_msgs
+from fulmar_bringup.message_build import SOURCE, TF2_MSGS, install_messages
 from fulmar_core.config.errors import ConfigError, FulmarError
 
 REPOSITORY = Path(__file__).parents[2]
-BUILD = (
-    "from fulmar_bringup.message_build import install_tf2_msgs; print(install_tf2_msgs(lambda line: None))"
-)
+INSTALL = "from fulmar_bringup.message_build import install_messages as install"
+BUILD = f"{INSTALL}; print(install('tf2_msgs', lambda line: None))"
 USE = """
 import rclpy
 from rclpy.node import Node
@@ -51,14 +50,14 @@ def report(line):
 
 
 def test_a_package_that_is_there_is_left_alone(fulmar):
-    assert install_tf2_msgs(report) is False
+    assert install_messages(TF2_MSGS, report) is False
     assert fulmar("install-tf")[:2] == (0, "tf2_msgs is there already\n")
 
 
 def test_an_environment_without_ros_is_refused(monkeypatch):
     monkeypatch.setattr(message_build, "find_spec", lambda _name: None)
     with pytest.raises(ConfigError, match=r"install 'fulmar\[ros\]'"):
-        install_tf2_msgs(report)
+        install_messages(TF2_MSGS, report)
 
 
 @pytest.mark.usefixtures("absent")
@@ -67,14 +66,14 @@ def test_a_machine_without_a_compiler_is_refused_with_the_command_that_installs_
     for variable in ("CC", "CXX"):
         monkeypatch.delenv(variable, raising=False)
     with pytest.raises(ConfigError, match=r"no compiler was found \(cc, .*apt install g\+\+"):
-        install_tf2_msgs(report)
+        install_messages(TF2_MSGS, report)
 
 
 @pytest.mark.usefixtures("absent")
 def test_a_python_without_headers_is_refused(monkeypatch, tmp_path):
     monkeypatch.setattr(message_build.sysconfig, "get_path", lambda _name: str(tmp_path))
     with pytest.raises(ConfigError, match=r"no headers .*apt install python3-dev"):
-        install_tf2_msgs(report)
+        install_messages(TF2_MSGS, report)
 
 
 @pytest.mark.usefixtures("absent")
@@ -84,7 +83,7 @@ def test_a_step_that_fails_is_named_with_its_first_error(monkeypatch, tmp_path):
     python.chmod(0o755)
     monkeypatch.setattr(sys, "executable", str(python))
     with pytest.raises(FulmarError) as failed:
-        install_tf2_msgs(lambda line: None)
+        install_messages(TF2_MSGS, lambda line: None)
     assert str(failed.value) == (
         "tf2_msgs: could not make an environment:\nERROR: No matching distribution found"
     )

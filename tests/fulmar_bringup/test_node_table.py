@@ -11,6 +11,7 @@ import pytest
 
 from fulmar_bringup.controller_row import controller_spec
 from fulmar_bringup.estimator_row import estimator_specs
+from fulmar_bringup.fleet_file import system_names
 from fulmar_bringup.launched_system import ARGUMENTS, list_nodes
 from fulmar_bringup.node_table import OPTIONS, USUALLY_ON, node_rows, row_of
 from fulmar_bringup.plant_row import plant_spec
@@ -21,19 +22,29 @@ from fulmar_bringup.system_rows import system_rows
 from fulmar_cli.commands.run import run
 from fulmar_cli.commands.up import up
 from fulmar_core.config.errors import ConfigError, UnknownNameError
-from fulmar_core.config.paths import OWN_FOLDERS, config_names
+from fulmar_core.config.paths import OWN_FOLDERS
 
 PLAN = RunPlan("floating_platform", "go_to_pose", "lqr", "mujoco", 50.0)
-SYSTEMS = pytest.mark.parametrize("system", config_names("systems"))
+SYSTEMS = pytest.mark.parametrize("system", system_names(fleets=False))
 
 
-def test_only_a_controller_that_draws_gets_the_seed_of_the_run():
+def test_every_controller_node_gets_the_seed_of_the_run_since_one_that_draws_may_take_over():
     plan = replace(PLAN, robot="airship_v7", task="fly_a", seed=3)
-    rows = {
-        name: controller_spec(replace(plan, controller=name)).parameters for name in ("mppi", "pid", "lqi")
-    }
-    assert rows["mppi"]["seed"] == 3
-    assert "seed" not in rows["pid"] | rows["lqi"]
+    for name in ("mppi", "pid", "lqi"):
+        assert controller_spec(replace(plan, controller=name)).parameters["seed"] == 3
+
+
+def test_a_law_gets_the_trusted_keys_too_since_a_policy_may_take_over():
+    plan = replace(PLAN, controller="lqr", guards=Guards(trusted_keys="keys"))
+    assert str(controller_spec(plan).parameters["trusted_keys"]).endswith("/keys")
+
+
+def test_a_plant_is_started_with_what_it_publishes_of_its_system():
+    guards = Guards(fallback="lqr", area=(-1.0, 1.0, -2.0, 2.0))
+    plan = replace(PLAN, robot="floating_platform", task="go_to_pose", controller="policy", guards=guards)
+    parameters = plant_spec(plan).parameters
+    assert (parameters["controller"], parameters["fallback"], parameters["bundle"]) == ("policy", "lqr", True)
+    assert parameters["area"] == [-1.0, 1.0, -2.0, 2.0]
 
 
 def by_name(nodes):

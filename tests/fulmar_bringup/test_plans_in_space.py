@@ -125,14 +125,14 @@ def test_three_numbers_where_six_are_usual_are_asked_back_with_both_forms():
         default_task("navion", "lqi", goal=(100.0, 0.0, 50.0))
 
 
-def test_a_hardware_file_that_is_named_serves_a_robot_without_one_of_its_own(plan, tmp_path):
+def test_a_hardware_file_that_is_named_counts_more_than_what_is_shipped(plan, tmp_path):
     path = tmp_path / "valves.yaml"
     lines, order = [str(number) for number in range(16)], list(range(16))
     path.write_text(
         f"title: t\nrobot: spacecraft_16\ndriver: {{kind: gpio_valves, port: x, lines: {lines}, order: {order}}}\n"
     )
-    with pytest.raises(ConfigError, match="there is no hardware driver for 'spacecraft_16'"):
-        default_task("spacecraft_16", "lqr", "hardware")
+    with pytest.raises(ConfigError, match="there is no hardware driver for 'int_ball2'"):
+        default_task("int_ball2", "lqr", "hardware")
     task = default_task("spacecraft_16", "lqr", "hardware", hardware=str(path))
     asked = {"robot": "spacecraft_16", "task": task, "controller": "lqr", "goal": GOAL}
     found = plan(**asked, backend="hardware", hardware=str(path), emulated=True)

@@ -11,6 +11,7 @@ from fulmar_bringup.run_executor import (
     LOCKSTEP_SILENT_S,
     PLANT_SILENT_S,
     SILENT_S,
+    EndWatch,
     _wait_for_end,
     silence_limits_s,
 )
@@ -71,3 +72,16 @@ def test_nodes_that_reported_a_moment_ago_do_not_hang() -> None:
 def test_a_slow_controller_and_lock_step_have_more_time() -> None:
     assert silence_limits_s(replace(PLAN, control_hz=0.5)) == (PLANT_SILENT_S, 6.0)
     assert silence_limits_s(replace(PLAN, lockstep=True)) == (LOCKSTEP_SILENT_S, LOCKSTEP_SILENT_S)
+
+
+def test_the_robots_of_a_fleet_in_lock_step_have_more_time_together_and_by_the_clock_no_more() -> None:
+    def look(plan: RunPlan, silent_s: float) -> None:
+        overseer = Overseer(plant_ago_s=silent_s, controller_ago_s=0.0)
+        EndWatch(plan, overseer, Keeper(), end_on_estop=False, patience=3.0).look()
+
+    in_step = replace(PLAN, lockstep=True)
+    look(in_step, 2.9 * LOCKSTEP_SILENT_S)
+    with pytest.raises(RunFailed, match=r"plant: has not reported for 31\.0 s; it hangs$"):
+        look(in_step, 3.1 * LOCKSTEP_SILENT_S)
+    with pytest.raises(RunFailed, match=r"plant: has not reported for 3\.1 s; it hangs$"):
+        look(PLAN, PLANT_SILENT_S + 0.1)

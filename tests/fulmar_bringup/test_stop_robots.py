@@ -10,6 +10,7 @@ import pytest
 
 from fulmar_bringup import estop_robots as module
 from fulmar_bringup.estop_robots import robots_to_reset, stop_robots
+from fulmar_core.robots.topics import OPERATOR_ACTION
 
 
 class Seen:
@@ -35,8 +36,13 @@ class Seen:
             if self._now_s() >= from_s
         ]
 
+    def get_fully_qualified_name(self) -> str:
+        return "/seen"
+
     def create_publisher(self, _kind: Any, topic: str, _qos: Any) -> Any:
         name = topic.split("/")[1]
+        if topic.endswith(OPERATOR_ACTION.name):  # who presses is no press
+            return SimpleNamespace(publish=lambda _message: None, get_subscription_count=lambda: 0)
         return SimpleNamespace(
             publish=lambda _message: self.said.setdefault(name, []).append(self._now_s()),
             get_subscription_count=lambda: int(name in self._plants),

@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import pytest
 
+from fulmar_bringup.fleet_file import system_names
 from fulmar_bringup.launched_system import list_nodes
 from fulmar_bringup.node_spec import NodeSpec
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.system import Guards, load_system
 from fulmar_bringup.system_rows import check_rows, system_rows
 from fulmar_core.config.errors import ConfigError
-from fulmar_core.config.paths import config_names
 
 PLAN = RunPlan("floating_platform", "go_to_pose", "lqr", "mujoco", 50.0)
 ESTIMATED = replace(PLAN, guards=Guards(estimator="mocap_imu"), lockstep=True)
@@ -64,7 +64,7 @@ def test_a_second_clock_is_refused():
 
 
 def test_exactly_one_node_of_every_system_publishes_the_clock_of_a_simulation():
-    for system in config_names("systems"):
+    for system in system_names(fleets=False):
         rows = list_nodes(system=system)
         assert sum("/clock" in row.outputs for row in rows) == (load_system(system).backend != "hardware")
         check_rows(rows)

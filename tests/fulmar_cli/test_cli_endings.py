@@ -36,19 +36,24 @@ def test_a_place_that_cannot_be_written_is_a_failure_in_one_line(fulmar, tmp_pat
     assert err == f"fulmar: {blocked}: File exists.\n"
 
 
+COMMAND = [sys.executable, "-m", "fulmar_cli.main"]
+
+
 def test_the_installed_command_does_the_same_in_a_process_of_its_own():
-    command = [sys.executable, "-m", "fulmar_cli.main"]
     done = subprocess.run(
-        [*command, "list", "--json"], capture_output=True, text=True, timeout=30, check=False
+        [*COMMAND, "list", "robots", "--json"], capture_output=True, text=True, timeout=30, check=False
     )
     assert (done.returncode, done.stderr) == (0, "")
     assert "floating_platform" in json.loads(done.stdout)["robots"]
-    done = subprocess.run([*command, "run", "boat"], capture_output=True, text=True, timeout=30, check=False)
+
+
+def test_a_mistake_gets_one_line_from_the_installed_command_too():
+    done = subprocess.run([*COMMAND, "run", "boat"], capture_output=True, text=True, timeout=30, check=False)
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr.count("\n") == 1
 
 
-@pytest.mark.parametrize("words", [f"bundle show {SHIPPED} --json", "list"], ids=["a lot", "a little"])
+@pytest.mark.parametrize("words", [f"bundle show {SHIPPED} --json", "list robots"], ids=["a lot", "a little"])
 def test_a_reader_that_has_had_enough_gets_no_traceback(words):
     piped = f"{sys.executable} -m fulmar_cli.main {words} | true; exit ${{PIPESTATUS[0]}}"
     done = subprocess.run(["bash", "-c", piped], capture_output=True, text=True, timeout=30, check=False)

@@ -37,12 +37,23 @@ GIVEN = {
     "export": ("runs/one --out bundle", ("policy",)),
     "import": ("agent.pt --robot turtlebot2 --task go_to_position --out bundle", ("policy",)),
     "evaluate": ("floating_platform go_to_pose", ("policy", "sim")),
+    "certify": ("policy --robot floating_platform --task go_to_pose", ("policy", "sim")),
+    "parity": ("floating_platform", ("sim", "policy")),
     "rates": (f"{POLICY}", ("bags",)),
     "report": (f"{POLICY}", ("bags",)),
     "identify": (f"{POLICY}", ("bags",)),
+    "twin": (f"{POLICY} --out twin", ("sim", "policy", "bags", "train")),
     "demo": ("", ("ros", "sim", "policy", "bags", "view")),
     "install-tf": ("", ()),
+    "install-actions": ("", ()),
+    "install-px4": ("", ()),
+    "install-interfaces": ("", ()),
     "install-stars": ("", ()),
+    "console": ("", ("console", "ros")),
+    "view": ("--foxglove", ("foxglove",)),
+    "benchmark all": ("", ("view",)),
+    "benchmark console": ("", ("ros", "bags", "policy", "sim", "console")),
+    "benchmark pace": ("", ("bags",)),
     "benchmark avist": ("", ("sim", "policy")),
     "benchmark drift": ("", ("policy", "sim")),
     "benchmark events": ("", ("sim",)),
@@ -51,8 +62,8 @@ GIVEN = {
     "benchmark inertia": ("", ("view",)),
     "benchmark endurance": ("", ("ros", "bags", "policy", "sim")),
     "benchmark latency": ("", ("ros", "bags", "policy", "sim")),
-    "benchmark rans3d": ("", ("sim",)),
-    "benchmark roboran": ("", ("policy",)),
+    "benchmark rans3d": ("", ("sim", "policy")),
+    "benchmark roboran": ("", ("policy", "sim")),
     "benchmark throughput": ("--library torch", ("sim", "jsbsim", "train")),
     "benchmark training": ("", ("train",)),
     "benchmark estimator": ("", ("hardware",)),
@@ -74,6 +85,12 @@ GIVEN = {
     "bag play": (f"{POLICY}", ("ros",)),
     "bag plot": (f"{POLICY}", ("view",)),
     "check robot": ("jetbot", ()),
+    "simulation pause": ("floating_platform", ("ros",)),
+    "simulation resume": ("floating_platform", ("ros",)),
+    "simulation step": ("floating_platform", ("ros",)),
+    "simulation rate": ("floating_platform 0.5", ("ros",)),
+    "simulation disturb": ("floating_platform push", ("ros",)),
+    "new robot": ("mine --like jetbot --mjcf none.xml", ("sim",)),
     "service install": ("mujoco_policy --dry-run", ("ros", "bags", "policy", "sim")),
     "service status": ("--root root", ()),
 }
@@ -87,9 +104,11 @@ ALONE = [
     ("check robot jetbot --plot plot.png", "view"),
     ("train floating_platform go_to_pose --wandb", "wandb"),
 ]
+# Commands that write files and need no extra.
+WRITE = {f"new {kind}" for kind in ("task", "controller", "driver", "estimator", "sensor")}
 # `doctor` measures for seconds (test_extras_alone.py); `service remove` has nothing to remove. `benchmark
 # descent` flies for minutes without any extra, and `new airframe` has a Python of its own.
-ELSEWHERE = {"doctor", "service remove", "benchmark descent", "new airframe"}
+ELSEWHERE = {"doctor", "service remove", "benchmark descent", "new airframe", *WRITE}
 
 
 def commands(group, words=()):

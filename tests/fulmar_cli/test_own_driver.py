@@ -79,7 +79,7 @@ def test_no_emulator_speaks_for_it(folder, fulmar, command):
 @pytest.mark.parametrize("command", [ON_HARDWARE, ["commission", "own.yaml"]])
 def test_a_device_that_is_armed_moves_only_when_a_person_allows_it(folder, fulmar, command):
     (folder / "own_board.py").write_text(BOARD)
-    assert "--arm is for boats" in complaint(fulmar(*command, "--arm"))
+    assert "--arm is for autopilots" in complaint(fulmar(*command, "--arm"))
     (folder / "own.yaml").write_text(FILE + "  arm: false\n")
     assert "not armed: arm: true or --arm. Driving arms the device. Write arm: true" in complaint(
         fulmar(*command)

@@ -25,7 +25,7 @@ from fulmar_cli.installation.extras import EXTRAS
 
 PACKAGES = (
     "fulmar_core", "fulmar_bags", "fulmar_ros", "fulmar_bringup", "fulmar_evaluation", "fulmar_benchmarks",
-    "fulmar_cli", "sim_nodes", "policy_server", "hardware_drivers", "training",
+    "fulmar_cli", "fulmar_console", "sim_nodes", "policy_server", "hardware_drivers", "training",
 )  # fmt: skip
 missing: set[str] = set()
 

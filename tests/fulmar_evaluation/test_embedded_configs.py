@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import tempfile
 from pathlib import Path
 
 import pytest
@@ -81,8 +82,10 @@ def test_a_robot_that_is_known_here_is_the_one_that_is_known_here(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["../../evil", "/evil", "..", "a/b", ""])
-def test_a_name_in_a_bag_is_never_a_path(tmp_path, name):
+def test_a_name_in_a_bag_is_never_a_path(tmp_path, monkeypatch, name):
+    (temporary := tmp_path / "some" / "folder").mkdir(parents=True)  # two folders up is still in `tmp_path`
+    monkeypatch.setattr(tempfile, "tempdir", str(temporary))
     bag = bag_of(tmp_path / "bag", name, "name: evil\n")
     with knowing_what_it_carries(open_bag(bag)):
-        pass
-    assert not list(tmp_path.parent.rglob("evil*"))
+        assert not list(tmp_path.rglob("evil*"))
+    assert not Path("/evil.yaml").exists()

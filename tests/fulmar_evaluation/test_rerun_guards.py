@@ -11,17 +11,20 @@ import pytest
 
 from fulmar_bags.contents import Bag, open_bag
 from fulmar_bags.control_steps import ControlSteps, control_steps_of
+from fulmar_bags.controller_changes import ControllerChange
 from fulmar_bags.figures import describe
 from fulmar_bags.gathered import Topic
 from fulmar_bags.message_types import type_store
 from fulmar_core.config.errors import BagError, RunFailed
 from fulmar_core.controllers.classical import load_classical
 from fulmar_core.controllers.controller import Inputs
-from fulmar_core.robots.topics import ESTOP, ESTOP_RELEASED, METADATA, SWAP, Wire
+from fulmar_core.controllers.rest import Rest
+from fulmar_core.loop.swap_request import SwapResult
+from fulmar_core.robots.topics import ESTOP, ESTOP_RELEASED, METADATA, SWAP, SWAP_RESULT, Wire
 from fulmar_evaluation.rerun.live_node import rerun_through_node
 from fulmar_evaluation.rerun.replay_controllers import answers_of
 from fulmar_evaluation.rerun.rerun import Answers, rerun
-from policy_server.controllers import shipped_policy
+from policy_server.controllers import Choice, load_controller, shipped_policy
 
 BAGS = Path(__file__).resolve().parents[1] / "replay" / "bags"
 BAG = BAGS / "floating_platform_go_to_pose_policy"
@@ -189,9 +192,9 @@ def test_a_policy_that_took_over_takes_over_again(bag):
     reported = saying(bag, SWAP, (at - 2, "lqr"))
     reported = saying(reported, METADATA, (at - 4, metadata(bag)), (at - 1, json.dumps({"sha256": sha256})))
     record = control_steps_of(reported)
-    assert [change.value for change in record.changes] == [("lqr", sha256)]
+    assert [change.value for change in record.changes] == [ControllerChange(sha256, bundle="lqr")]
     first = Refused(record, after=1000)
-    answers = rerun(record, first, source="odometry", load=lambda folder: law)
+    answers = rerun(record, first, source="odometry", load=lambda change: law)
     assert not answers.actions[:40].any()
     assert answers.actions[40].any()
 
@@ -204,6 +207,47 @@ def test_a_policy_that_took_over_and_is_another_or_gone_is_refused(bag):
         again(saying(reported, SWAP, (at - 2, BUNDLE)), follow=True)
     with pytest.raises(BagError, match="cannot be loaded"):
         again(saying(reported, SWAP, (at - 2, "/nowhere/policy")), follow=True)
+
+
+def test_an_answer_says_from_which_measurement_on_a_controller_acts_whenever_it_was_recorded(bag):
+    record = control_steps_of(bag)
+    law = load_classical(record.robot, record.task, control_hz=5.0)
+    at, sha256 = int(record.log_ns[50]), law.metadata()["sha256"]
+    done = SwapResult(1, True, "lqr controls", "lqr", sha256=sha256, stamp_ns=int(record.stamp_ns[40]))
+    refused = SwapResult(2, False, "unknown controller")
+    ready = SwapResult(3, True, "ready", "mpc")
+    answers = [(at - 3 + number, it.to_text()) for number, it in enumerate((done, refused, ready))]
+    record = control_steps_of(saying(saying(bag, SWAP, (at - 9, "{}")), SWAP_RESULT, *answers))
+    assert list(record.changes_by_step()) == [40]
+    found = rerun(record, Refused(record, after=1000), source="odometry", load=lambda change: law)
+    assert not found.actions[:40].any()
+    assert found.actions[40].any()
+
+
+@pytest.mark.parametrize("name", ["lqr", "mpc", "fallback", "teleoperation"])
+def test_a_law_a_fallback_and_rest_that_took_over_take_over_again_and_give_way_to_the_policy(bag, name):
+    record = control_steps_of(guarded(bag, fallback="lqr"))
+    choice = Choice(5.0)
+    loaded = (
+        Rest(record.robot, control_hz=5.0, name=name)
+        if name == "teleoperation"
+        else load_controller("lqr" if name == "fallback" else name, record.robot, record.task, choice)
+    )
+    driven = load_controller("policy", record.robot, record.task, choice)
+    sha256, policy = (each.metadata()["sha256"] for each in (loaded, driven))
+    stamps = record.stamp_ns[[20, 60]].tolist()
+    done = SwapResult(1, True, "", name, sha256=sha256, stamp_ns=stamps[0])
+    back = SwapResult(2, True, "", "policy", sha256=policy, stamp_ns=stamps[1])
+    log = record.log_ns.tolist()
+    spoken = saying(
+        guarded(bag, fallback="lqr"), SWAP_RESULT, (log[20], done.to_text()), (log[60], back.to_text())
+    )
+    alone, _ = again(spoken)
+    followed, _ = answers_of(control_steps_of(spoken), "policy", BUNDLE, "odometry", follow=True)
+    same = (alone.actions == followed.actions).all(axis=1)
+    assert same[:20].all()
+    assert not same[20:60].all()
+    assert same[60:].all()
 
 
 def metadata(bag: Bag) -> str:

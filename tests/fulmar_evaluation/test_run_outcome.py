@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from fulmar_bringup.processes import Ended
-from fulmar_bringup.run_executor import Execution, _with_ends
+from fulmar_bringup.run_executor import Execution, with_ends
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_evaluation.run_outcome import RunOutcome, evaluate_execution
 from tests.synthetic_run import Plan, write_run
@@ -54,4 +54,4 @@ def test_a_run_without_a_bag_has_an_outcome_all_the_same(tmp_path):
 )
 def test_a_recorder_that_fails_at_its_end_fails_the_run(failure, said):
     """A full disk is reported by the recorder's exit code alone, when all else went well."""
-    assert _with_ends(failure, [Ended("controller", 0), Ended("recorder", 1)]) == said
+    assert with_ends(failure, [Ended("controller", 0), Ended("recorder", 1)]) == said

@@ -6,6 +6,7 @@ import re
 
 import pytest
 
+from fulmar_core.config.paths import config_path
 from fulmar_evaluation.robot_check import check_robot
 from tests.wrong_robots import altered
 
@@ -90,3 +91,11 @@ def test_a_usual_controller_of_ones_own_is_none(tmp_path):
 def test_a_speed_that_was_asked_for_is_not_blamed_on_the_file():
     found = check_robot("navion", speed=26.0)
     assert not any("'airframe.speed' = " in problem for problem in found.problems)
+
+
+def test_a_file_of_another_name_than_its_robots_is_passed_with_a_warning(tmp_path):
+    path = tmp_path / "mine.yaml"
+    path.write_text(config_path("robots", "jetbot").read_text())
+    found = check_robot(str(path))
+    assert found.passed
+    assert any("'name' is 'jetbot', the file's own name is 'mine'" in line for line in found.warnings)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import threading
 import time
-from contextlib import nullcontext
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -23,6 +22,7 @@ from fulmar_core.worlds.scenario import load_scenario
 from fulmar_ros.plant_clock import SimulatedTime
 from fulmar_ros.plant_loops import RealtimeLoop
 from sim_nodes.mock_backend import MockBackend
+from tests.fulmar_ros.quiet_wires import quiet_wires
 
 ROBOTS = [
     ("cubesat_8", "go_to_pose_3d"),
@@ -53,7 +53,7 @@ def flown(name, task, *, share, seconds):
         """There is no subscriber."""
 
     guard.offer(robot.actuators.names, command, time.monotonic_ns())
-    wires = SimpleNamespace(lock=nullcontext(), publish_sample=ignore, publish_applied=ignore)
+    wires = quiet_wires()
     feedback = ActuatorFeedback(robot, moves=False)
     loop = RealtimeLoop(
         SimpleNamespace(robot=robot, step=step), wires, guard, SimulatedTime(), rate=50.0, feedback=feedback

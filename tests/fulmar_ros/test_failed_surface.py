@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-from contextlib import nullcontext
 from types import SimpleNamespace
 
 import numpy as np
@@ -16,6 +15,7 @@ from fulmar_core.simulation.backend import Sample
 from fulmar_core.wires.reading import Reading
 from fulmar_ros.plant_clock import SimulatedTime
 from fulmar_ros.plant_loops import RealtimeLoop
+from tests.fulmar_ros.quiet_wires import quiet_wires
 
 ROBOT = load_robot("airship_v7")
 
@@ -35,7 +35,7 @@ def grounded_by(positions: np.ndarray) -> tuple[list[tuple], ActuatorFeedback]:
         see_refusal=ignore,
         handed_over=False,
     )
-    wires = SimpleNamespace(lock=nullcontext(), publish_sample=ignore, publish_applied=ignore)
+    wires = quiet_wires()
     backend = SimpleNamespace(robot=ROBOT, step=lambda _command: sample)
     feedback = ActuatorFeedback(ROBOT, moves=True)
     RealtimeLoop(backend, wires, guard, SimulatedTime(), rate=50.0, feedback=feedback).run(

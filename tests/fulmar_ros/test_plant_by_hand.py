@@ -77,9 +77,9 @@ def test_a_torn_command_feeds_no_watchdog(plant):
 
 def test_a_press_closes_the_valves_at_the_plant(plant):
     plant.command(OPEN)
-    plant.node.wires._on_estop(Bool(data=True), {})
+    plant.node.wires.estop._on_estop(Bool(data=True), {})
     assert output(plant) == SHUT
-    plant.node.wires._on_estop_released(None)
+    plant.node.wires.estop._on_released(None)
     assert output(plant) == SHUT  # until a new command
 
 

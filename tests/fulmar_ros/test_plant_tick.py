@@ -16,6 +16,7 @@ def test_a_step_within_a_period_has_its_readings_alone():
     sensors.publish = mock.Mock(side_effect=lambda *_given: seen.append(period.within))
     seen: list[bool] = []
     wires = mock.Mock(_period=period, _sensors=sensors, _mocap=mock.Mock(), lock=threading.Condition())
+    wires.cuts = lambda _side: False
     wires._mocap.see.return_value = [(7, "pose")]
     wires._publish_readings = lambda *given: PlantWires._publish_readings(wires, *given)
     sample = Sample({"odometry": Reading("state")}, "truth", {"block": "pose of a thing"})

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import threading
 import time
-from contextlib import nullcontext
 from types import SimpleNamespace
 
 import numpy as np
@@ -18,6 +17,7 @@ from fulmar_core.simulation.backend import Sample
 from fulmar_core.wires.reading import Reading
 from fulmar_ros.plant_clock import SimulatedTime, WallTime
 from fulmar_ros.plant_loops import RealtimeLoop
+from tests.fulmar_ros.quiet_wires import quiet_wires
 from tests.states import planar_state
 
 ROBOT, AIRCRAFT = load_robot("floating_platform"), load_robot("airship_v7")
@@ -39,7 +39,7 @@ def test_the_guard_receives_the_newest_measured_state_and_a_steady_time_for_safe
         """There is no subscriber."""
 
     backend = SimpleNamespace(robot=ROBOT, step=lambda _command: samples[len(received)])
-    wires = SimpleNamespace(lock=nullcontext(), publish_sample=ignore, publish_applied=ignore)
+    wires = quiet_wires()
     loop = RealtimeLoop(
         backend,
         wires,
@@ -67,7 +67,7 @@ def test_a_refusal_of_the_device_reaches_the_guard_before_the_next_command():
         return next(samples)
 
     backend = SimpleNamespace(robot=ROBOT, step=step)
-    wires = SimpleNamespace(lock=nullcontext(), publish_sample=_ignore, publish_applied=_ignore)
+    wires = quiet_wires()
     guard.offer(ROBOT.actuators.names, np.ones(8), time.monotonic_ns())
     RealtimeLoop(backend, wires, guard, SimulatedTime(), rate=50.0).run(
         Sample({}, None), 3, threading.Event()
@@ -89,7 +89,7 @@ def test_an_aircraft_is_brought_down_after_its_last_tick():
 
     guard.hand_over, guard.output = hand_over, output
     backend = SimpleNamespace(robot=AIRCRAFT, step=lambda _command: Sample({}, None))
-    wires = SimpleNamespace(lock=nullcontext(), publish_sample=_ignore, publish_applied=_ignore)
+    wires = quiet_wires()
     loop = RealtimeLoop(backend, wires, guard, SimulatedTime(), rate=50.0)
     loop.run(Sample({}, None), 2, threading.Event(), lands=True)
     assert (loop.ticks, guard.doing) == (2 + 4, DOWN)

@@ -9,6 +9,7 @@ import pytest
 from rclpy.serialization import serialize_message
 
 from fulmar_core.config.errors import BundleError
+from fulmar_core.loop.swap_request import read_request
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.robots.topics import CAMERA_DEPTH
 from fulmar_core.safety.arbiter import Mode
@@ -156,9 +157,14 @@ def test_by_the_clock_the_newest_image_counts_until_it_is_half_a_second_old():
     driven.look()
     for step in range(8):
         driven.node._step()
-        young = step * STEP_NS <= 500_000_000
-        assert driven.sent[-1].tolist() == [0.5 * young] * 8
+        if step * STEP_NS <= 500_000_000:
+            assert driven.sent[-1].tolist() == [0.5] * 8
+        elif step == 6:
+            assert driven.sent[-1].tolist() == [0.0] * 8  # the body is where the backup holds it
         driven.be()
+    force, _ = ROBOT.actuators.wrench_in_body(driven.sent[-1])
+    assert force[2] < -0.1  # by then it has risen, and is brought back
+    assert np.all(np.abs(force[:2]) < 1e-9)
     assert driven.node.guard.flags.image_problem == "camera_depth: no usable image for 700 ms (limit 500 ms)"
     assert driven.node.guard.decide(0).mode is Mode.ARMED
 
@@ -199,8 +205,6 @@ def test_two_cameras_hold_the_robot_with_a_warning_and_it_goes_on_when_one_is_go
 
 def test_a_policy_that_sees_does_not_take_over_in_a_node_that_receives_no_images():
     driven = Driven(controller=Blind)
-    driven.node._make_controller = lambda *_: OpensByDepth()
-    with pytest.raises(
-        BundleError, match="policy 'other' takes camera_depth, which this node does not receive"
-    ):
-        driven.node._load("other")
+    driven.node._loader._make = lambda *_: OpensByDepth()
+    with pytest.raises(BundleError, match="'other' takes camera_depth, which this node does not receive"):
+        driven.node._load(read_request("other"))

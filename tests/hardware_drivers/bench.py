@@ -14,6 +14,7 @@ from fulmar_core.robots.sensors.imu import ImuSample
 from fulmar_core.simulation.backend import Sample
 from fulmar_core.simulation.episode import Episode, draw_episode
 from fulmar_core.states.planar import at_rest
+from fulmar_core.states.spatial import SpatialState
 from fulmar_core.tasks import load_task
 from fulmar_core.wires.reading import Reading
 from fulmar_core.worlds.scenario import load_scenario
@@ -23,8 +24,13 @@ from sim_nodes.mock_backend import MockBackend
 
 def episode_at(robot: Robot, x: float, y: float, heading: float) -> Episode:
     """A still world with a robot at rest."""
-    drawn = draw_episode(robot, load_task("go_to_position"), load_scenario("ideal"), seed=1, number=0)
-    return Episode(at_rest(*(np.asarray(value) for value in (x, y, heading))), drawn.goal, drawn.world)
+    in_space = robot.state_type is SpatialState
+    task = load_task("go_to_position_3d" if in_space else "go_to_position")
+    drawn = draw_episode(robot, task, load_scenario("ideal"), seed=1, number=0)
+    start = at_rest(*(np.asarray(value) for value in (x, y, heading)))
+    if in_space:
+        return Episode(SpatialState.from_rigid(start.to_rigid()), drawn.goal, drawn.world)
+    return Episode(start, drawn.goal, drawn.world)
 
 
 class Bench:

@@ -9,7 +9,7 @@ from dataclasses import replace
 import gpiod
 import pytest
 
-from fulmar_core.config.errors import DeviceError
+from fulmar_core.config.errors import ConfigError, DeviceError
 from hardware_drivers.hardware import load_hardware
 from hardware_drivers.presence import check_presence
 from hardware_drivers.settings import Kobuki
@@ -89,3 +89,10 @@ def test_a_host_that_accepts_no_connection_is_reported():
 @pytest.mark.parametrize("name", ["kingfisher_ardupilot", "zero_g_lab_valve_node", "kingfisher_action"])
 def test_what_only_a_message_shows_is_not_looked_for(name):
     check_presence(load_hardware(name).driver)
+
+
+def test_a_driver_whose_messages_are_not_installed_says_what_installs_them(monkeypatch):
+    monkeypatch.setattr("hardware_drivers.presence.find_spec", lambda _name: None)
+    words = "driver 'px4_thrusters' needs px4_msgs, which is not installed. Run: fulmar install-px4"
+    with pytest.raises(ConfigError, match=words):
+        check_presence(load_hardware("modular_freeflyer_px4").driver)

@@ -29,6 +29,7 @@ from fulmar_core.robots.topics import (
     GOAL_POSE,
     IMU,
     ODOMETRY,
+    OPERATOR_ACTION,
     RELAY,
     STATUS,
     SWAP,
@@ -111,7 +112,10 @@ def test_a_controller_receives_odometry_and_its_goal_and_never_the_truth(
 ) -> None:
     """What a deployed controller may know; of a robot with thrusters on an air bearing, what these do as well."""
     received = {subscription.topic_name for subscription in controller.subscriptions}
-    wires = (ODOMETRY, GOAL_POSE, ESTOP, ESTOP_RELEASED, SWAP, ACTUATORS_STATE, AIR_BEARING, RELAY)
+    wires = (
+        *(ODOMETRY, GOAL_POSE, ESTOP, ESTOP_RELEASED, SWAP, ACTUATORS_STATE, AIR_BEARING, RELAY),
+        OPERATOR_ACTION,
+    )
     assert received == {f"{NAMESPACE}/{wire.name}" for wire in wires}
     assert f"{NAMESPACE}/{TRUTH.name}" not in received
     assert {STATUS.name, IMU.name}.isdisjoint(received)
@@ -155,6 +159,7 @@ def test_deactivation_ends_with_the_safe_command(stream: Stream, controller: Con
     """Then silence."""
     controller.trigger_deactivate()
     until(lambda: not stream.neighbour.commands[-1].any())
+    time.sleep(0.3)  # for its repetitions
     count = len(stream.neighbour.commands)
     time.sleep(0.2)
     assert len(stream.neighbour.commands) == count

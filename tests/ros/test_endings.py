@@ -125,14 +125,8 @@ def test_a_recorder_that_cannot_begin_is_the_failure(ros_domain: RosDomain, tmp_
     assert "[recorder] " in done.stderr
 
 
-@pytest.mark.parametrize(
-    "number",
-    [
-        pytest.param(signal.SIGINT, marks=pytest.mark.slow),
-        pytest.param(signal.SIGTERM, marks=pytest.mark.slow),
-        signal.SIGKILL,
-    ],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
 def test_an_evaluation_that_is_reported_to_stop_leaves_nobody_behind(
     number: signal.Signals, ros_domain: RosDomain, tmp_path: Path
 ) -> None:
@@ -173,6 +167,35 @@ try:
     evaluation._work(None, range(1), 0, 0)
 except RuntimeError:
     print("waits for another share")
+"""
+
+
+def test_a_worker_whose_evaluation_was_killed_is_asked_to_stop() -> None:
+    """Its parent, a process between this one and it, can tell it nothing any more."""
+    done = subprocess.run(
+        [sys.executable, "-c", LOSES_ITS_PARENT], capture_output=True, text=True, timeout=30.0, check=False
+    )
+    assert done.stdout == "stopped\n", done.stderr
+
+
+LOSES_ITS_PARENT = """
+import os, signal, time
+from fulmar_evaluation import ros_evaluation as evaluation
+
+here, parent = os.getpid(), os.fork()
+if parent == 0:
+    ready, begun = os.pipe()
+    if os.fork() == 0:
+        evaluation._begin_worker([], os.getppid())
+        try:
+            os.write(begun, b".")
+            time.sleep(20.0)
+        except SystemExit:
+            print("stopped", flush=True)
+        os._exit(0)
+    os.read(ready, 1)
+    os.kill(os.getpid(), signal.SIGKILL)
+os.waitpid(parent, 0)
 """
 
 

@@ -18,6 +18,7 @@ from fulmar_core.config.errors import FulmarError, RunFailed
 from fulmar_core.controllers.controller import Inputs
 from fulmar_core.estimators.actuator_health.beliefs import Beliefs
 from fulmar_core.loop.bundle_signature import make_keys, sign_bundle
+from fulmar_core.loop.swap_request import SwapRequest, read_request
 from fulmar_core.robots.topics import METADATA, SWAP
 from fulmar_ros.controller_node import ControllerNode
 from fulmar_ros.qos import publisher_qos, subscriber_qos
@@ -227,9 +228,9 @@ def test_the_swap_command_waits_for_the_controller_beside_a_recorder_and_asks_ag
     def lossy(self: ControllerNode, message: String) -> None:
         dropped.append(message.data) if len(dropped) < 2 else taken(self, message)
 
-    def counted(self: ControllerNode, folder: str) -> object:
-        loaded.append(folder)
-        return load(self, folder)
+    def counted(self: ControllerNode, request: SwapRequest) -> object:
+        loaded.append(request.bundle)
+        return load(self, request)
 
     monkeypatch.setattr(ControllerNode, "_on_swap", lossy)
     monkeypatch.setattr(ControllerNode, "_load", counted)
@@ -237,15 +238,16 @@ def test_the_swap_command_waits_for_the_controller_beside_a_recorder_and_asks_ag
     until(lambda: neighbour.node.count_subscribers(f"{NAMESPACE}/{SWAP.name}") > 0)
     person = Operator(neighbour.node)
     with pytest.raises(RunFailed, match="no controller of 'floating_platform'"):
-        person.say_swap(ROBOT, "x", find_s=0.3, answer_s=0.1)
+        person.ask_swap(ROBOT, bundle="x", find_s=0.3, answer_s=0.1)
     node = start(policy=SHIPPED)
     odometry = Stream(neighbour)
     second = str(copy_of(tmp_path, "second"))
     node._actuator_beliefs._estimated = Beliefs(words=("a push of 2.00 N is believed",))
     until(lambda: values(neighbour)["beliefs"] != "")
     for number in (1, 2):
-        assert person.say_swap(ROBOT, second, find_s=5.0, answer_s=10.0) == f"done {second}"
+        answer = person.ask_swap(ROBOT, bundle=second, find_s=5.0, answer_s=10.0)
+        assert (answer.accepted, answer.bundle) == (True, second)
         assert loaded == [second] * number
     until(lambda: values(neighbour)["beliefs"] == "")  # the one before believed it
     odometry.stop()
-    assert dropped == [second] * 2
+    assert [read_request(text).bundle for text in dropped] == [second] * 2

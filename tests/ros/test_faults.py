@@ -58,8 +58,9 @@ def start_run(domain: RosDomain, folder: Path, *more: str) -> psutil.Popen:
     raise AssertionError("the watchdog tripped twice before the run was under way")
 
 
-# The fault suite kills a controller in the quick tests.
-@pytest.mark.parametrize("number", [pytest.param(signal.SIGKILL, marks=pytest.mark.slow), signal.SIGSTOP])
+# In the quick tests the fault suite kills a controller, and tests/ros/test_plant_node.py has its silence.
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
 def test_a_dead_or_hung_policy_closes_the_valves_within_the_watchdog_and_a_tick(
     number: signal.Signals, ros_domain: RosDomain, tmp_path: Path
 ) -> None:
@@ -142,6 +143,7 @@ def test_ctrl_c_sigterm_and_a_lost_terminal_stop_in_order_with_the_valves_closed
     assert not np.any(record.applied.effort[-1])
 
 
+@pytest.mark.slow  # tests/fulmar_bringup/test_processes.py has one child, with no bag
 def test_no_node_outlives_its_launcher(ros_domain: RosDomain, tmp_path: Path) -> None:
     """Even one that was killed and could stop nobody; the bag is closed properly all the same."""
     run = start_run(ros_domain, tmp_path)

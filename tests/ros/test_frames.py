@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from geometry_msgs.msg import TransformStamped
 from nav_msgs.msg import Odometry
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import String
@@ -12,7 +13,7 @@ from tf2_msgs.msg import TFMessage
 from fulmar_bags.contents import open_bag
 from fulmar_bags.decode import NS, messages, stamps_ns
 from fulmar_core.robots.robot_file import load_robot
-from fulmar_core.robots.topics import DESCRIPTION, ODOMETRY, STATIC_TRANSFORMS, TRANSFORMS
+from fulmar_core.robots.topics import DESCRIPTION, ODOMETRY, ORIGIN, STATIC_TRANSFORMS, TRANSFORMS, TRUTH
 from fulmar_core.robots.urdf import body_frames, urdf_of
 from fulmar_core.wires.robot_name import frames_of
 from fulmar_ros.plant_node import PlantNode
@@ -68,6 +69,35 @@ def test_late_subscribers_get_the_model_and_its_fixed_frames(neighbour, plant):
     assert models[0].data == urdf_of(robot)
     found = {(each.header.frame_id, each.child_frame_id) for each in fixed[0].transforms}
     assert found == {("map", "odom"), *(("base_link", frame.name) for frame in body_frames(robot))}
+
+
+def test_a_robot_with_an_origin_begins_there_in_the_frame_that_all_robots_share(neighbour):
+    arguments = [
+        "--ros-args",
+        "-r",
+        f"__ns:={NAMESPACE}",
+        "-p",
+        "backend:=mock",
+        "-p",
+        "origin:=[2.0, -1.0, 90.0]",
+    ]
+    begins, fixed, truths = [], [], []
+    subscribe = neighbour.node.create_subscription
+    subscribe(TransformStamped, f"{NAMESPACE}/{ORIGIN.name}", begins.append, LATCHED)
+    subscribe(TFMessage, STATIC_TRANSFORMS.name, fixed.append, LATCHED)
+    subscribe(Odometry, f"{NAMESPACE}/{TRUTH.name}", truths.append, 10)
+    node = PlantNode(make_backend, lambda _code: None, cli_args=arguments)
+    with spinning(node, lambda error: pytest.fail(repr(error))):
+        until(lambda: begins and fixed and truths)
+        node.stop()
+    (begin,) = begins
+    assert (begin.header.frame_id, begin.child_frame_id) == ("map", "odom")
+    p, q = begin.transform.translation, begin.transform.rotation
+    np.testing.assert_allclose(
+        (p.x, p.y, p.z, q.x, q.y, q.z, q.w), (2.0, -1.0, 0.0, 0.0, 0.0, 0.5**0.5, 0.5**0.5)
+    )
+    assert begin in fixed[0].transforms
+    assert truths[0].header.frame_id == "odom"  # it is not turned into the shared frame
 
 
 def test_transforms_have_the_type_of_a_jazzy_machine(neighbour, plant):

@@ -32,12 +32,12 @@ from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.system import default_hardware
 from fulmar_core.config.errors import DeviceError, FulmarError
 from fulmar_core.config.paths import config_names, config_path
+from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.robots.topics import AIR_BEARING, DEVICE_STATE
 from fulmar_ros.qos import subscriber_qos
 from hardware_drivers.devices import own_watchdog, when_the_driver_dies
 from hardware_drivers.driver_node import DriverNode
 from hardware_drivers.hardware import load_hardware
-from hardware_drivers.settings import MavlinkBoat
 from sim_nodes.emulators.outputs import ValveBank
 from tests.conftest import RosDomain
 from tests.ros.cli import fulmar, json_of
@@ -60,7 +60,7 @@ class Rig:
         emulation = emulation_of(found, folder)
         plan = RunPlan(self.robot, "go_to_position", "policy", "hardware", 10.0)
         plan = replace(plan, hardware=default_hardware(self.robot, hardware), emulated=True)
-        plan = replace(plan, arm=isinstance(found.driver, MavlinkBoat))
+        plan = replace(plan, arm=found.arms)
         self.group = ProcessGroup()
         self.group.start(emulator_spec(plan, emulation))
         self.plant = plant_spec(plan, port=emulation.port)
@@ -93,7 +93,13 @@ def rig(neighbour: Neighbour, request: pytest.FixtureRequest, tmp_path: Path) ->
     made.group.stop_all()
 
 
-WATCHED = [name for name in config_names("hardware") if own_watchdog(load_hardware(name).driver)]
+def is_watched(name: str) -> bool:
+    """Whether a device that this rig can drive stops by itself; what flies or floats in space has tests of its own."""
+    file = load_hardware(name)
+    return bool(own_watchdog(file.driver)) and load_robot(file.robot).state_type.AXES == 2
+
+
+WATCHED = [name for name in config_names("hardware") if is_watched(name)]
 UNWATCHED = ("zero_g_lab", "zero_g_lab_valve_node", "kingfisher_action")
 
 

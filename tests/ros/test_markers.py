@@ -13,12 +13,12 @@ from rclpy.qos import QoSProfile
 from visualization_msgs.msg import Marker, MarkerArray
 
 from fulmar_bags.run_record import read_run
-from fulmar_core.config.errors import BAD_USAGE, DONE
+from fulmar_core.config.errors import DONE
 from fulmar_core.robots.topics import MARKERS
 from fulmar_core.tasks.goal import goal_at
 from fulmar_ros.goal_messages import goal_message
 from tests.conftest import RosDomain
-from tests.ros.cli import child_running, fulmar, start_fulmar
+from tests.ros.cli import child_running, start_fulmar
 from tests.ros.neighbour import NAMESPACE, Neighbour, until
 
 RVIZ = QoSProfile(depth=100)  # reliable and volatile
@@ -104,10 +104,3 @@ def topics_with_messages(bag: Path) -> set[str]:
     found = yaml.safe_load((bag / "metadata.yaml").read_text(encoding="utf-8"))
     counts = found["rosbag2_bagfile_information"]["topics_with_message_count"]
     return {each["topic_metadata"]["name"] for each in counts if each["message_count"]}
-
-
-def test_lock_step_refuses_markers_in_one_line(ros_domain: RosDomain, tmp_path: Path) -> None:
-    done = fulmar("run", "turtlebot2", "--lockstep", "--markers", env=ros_domain.env, cwd=tmp_path)
-    assert done.returncode == BAD_USAGE
-    assert len(done.stderr.strip().splitlines()) == 1
-    assert "--markers" in done.stderr

@@ -157,7 +157,7 @@ def test_a_plant_applies_nothing_but_commands_within_its_limits(
     wires = plant.wires
     for message in messages:
         if isinstance(message, bool):
-            wires._on_estop(Bool(data=message), {})
+            wires.estop._on_estop(Bool(data=message), {})
         elif by_hand and isinstance(message, JointState):
             wires._on_teleop(message)
         else:

@@ -13,7 +13,7 @@ from sensor_msgs.msg import JointState
 
 from fulmar_core.config.errors import BAD_USAGE, DONE, FAILED
 from fulmar_core.robots.topics import ACTUATORS_STATE
-from fulmar_core.safety.watchdog import default_timeout
+from fulmar_core.wires.silence import default_timeout
 from fulmar_evaluation.faults.two_hosts import TwoHosts, inside, two_hosts
 from fulmar_ros.middleware import STATIC_PEERS
 from fulmar_ros.qos import subscriber_qos

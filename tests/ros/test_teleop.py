@@ -21,7 +21,7 @@ from fulmar_ros.qos import publisher_qos, subscriber_qos
 from fulmar_ros.runtime import spinning
 from fulmar_ros.teleop_node import TeleopNode
 from tests.conftest import RosDomain
-from tests.ros.cli import FULMAR, fulmar
+from tests.ros.cli import FULMAR
 from tests.ros.neighbour import NAMESPACE, Neighbour, open_valves, until
 
 real_time = pytest.mark.real_time
@@ -196,7 +196,7 @@ def test_keys_drive_and_are_the_dead_man_switch(
         os.close(slave)
 
 
-def test_without_a_terminal_the_keyboard_is_refused_in_words(ros_domain: RosDomain, tmp_path: Path) -> None:
-    done = fulmar("teleop", "floating_platform", env=ros_domain.env, cwd=tmp_path)
-    assert done.returncode == 2
-    assert "no terminal" in done.stderr
+def test_without_a_terminal_the_keyboard_is_refused_in_words(ros_domain: RosDomain, fulmar) -> None:
+    code, _, err = fulmar("teleop", "floating_platform")
+    assert code == 2
+    assert "no terminal" in err

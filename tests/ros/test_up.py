@@ -99,7 +99,7 @@ def test_three_goals_a_swap_an_e_stop_its_reset_and_another_goal_follow_each_oth
         up.wait_for("reached", number)
     second = copy_of(tmp_path, "second")
     person = Operator(neighbour.node)
-    assert person.say_swap(ROBOT, str(second), find_s=5.0, answer_s=10.0).startswith("done")
+    assert person.ask_swap(ROBOT, bundle=str(second), find_s=5.0, answer_s=10.0).accepted
     up.wait_for("swapped")
     assert all(stopped.reached for stopped in person.stop_all(ROBOT))
     up.wait_for("estop")

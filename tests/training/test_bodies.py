@@ -87,7 +87,7 @@ def test_worlds_of_the_robots_own_body_share_one_allocation():
     np.testing.assert_allclose(env.bodies.terms, body_terms(ROBOT), rtol=1e-6)
 
 
-@pytest.mark.parametrize("name", ["cubesat_8", "int_ball2"])
+@pytest.mark.parametrize("name", [pytest.param("cubesat_8", marks=pytest.mark.slow), "int_ball2"])
 def test_one_run_gives_a_bundle_for_each_robot_with_its_own_allocation(run, name, tmp_path):
     passport = export(run, tmp_path / "bundle", name)
     robot, network = load_robot(name), load_network(run / NETWORK_FILE)

@@ -17,7 +17,7 @@ from fulmar_core.simulation.simulation import BatchSimulation
 from fulmar_core.tasks import load_task
 from fulmar_core.worlds.scenario import load_scenario
 from tests.new_robots import new_robot
-from tests.pairs import each_pair
+from tests.spaces import shared_space
 from training import kernel
 from training.compiled import CompiledStep
 from training.kernel import leaves, parts_of
@@ -26,9 +26,21 @@ from training.vec_env import BatchVecEnv
 RANDOMISED = load_scenario("randomised")
 ROBOT, TASK = load_robot("turtlebot2"), load_task("track_velocities")  # quick to compile
 WORLDS = 24
-EACH_PAIR = each_pair(
-    {name: load_robot(name) for name in config_names("robots")},
-    {name: load_task(name) for name in config_names("tasks")},
+ROBOTS = {name: load_robot(name) for name in config_names("robots")}
+TASKS = {name: load_task(name) for name in config_names("tasks")}
+# To trace one takes a second or several: of the quick tests one on wheels and one with nozzles.
+QUICK = {("turtlebot2", "track_velocities"), ("floating_platform", "go_to_pose")}
+EACH_PAIR = pytest.mark.parametrize(
+    ("robot", "task"),
+    [
+        pytest.param(
+            ROBOTS[robot],
+            TASKS[task],
+            id=f"{robot}-{task}",
+            marks=() if (robot, task) in QUICK else pytest.mark.slow,
+        )
+        for robot, task in shared_space(ROBOTS, TASKS)
+    ],
 )
 
 

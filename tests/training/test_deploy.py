@@ -99,7 +99,7 @@ def test_only_a_recurrent_policy_has_memory_and_it_forgets_on_reset(learners):
     assert controller.act(inputs_seeing(sights(1)[0, 0])).shape == (1, 2)
 
 
-@pytest.mark.parametrize("name", ["recurrent_ppo", "sac"])
+@pytest.mark.parametrize("name", [pytest.param("recurrent_ppo", marks=pytest.mark.slow), "sac"])
 def test_a_bundle_commands_what_the_network_does_from_the_first_command_to_the_last(
     learners, name, tmp_path, monkeypatch
 ):

@@ -184,7 +184,7 @@ def test_a_loaded_learner_is_the_one_that_was_saved(tmp_path):
 )
 def test_it_learns(space):
     fast = learner(FastPPO, space, learning_rate=3e-3, precision="bfloat16")
-    fast.learn(6_000)
+    fast.learn(4_000)
     seen = np.random.default_rng(1).normal(size=(500, 4)).astype(np.float32)
     actions = fast.predict(seen, deterministic=True)[0]
     wanted = seen[:, : actions.shape[1]] > 0.0

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from fulmar_core.loop.policy_bundle import read_passport
+from fulmar_core.loop.policy_bundle import PASSPORT, read_passport
 from policy_server.controllers import policies_directory
 from policy_server.policy import Policy
 from training import policies
@@ -148,10 +150,26 @@ def small_job(small_settings, tmp_path) -> Job:
     )
 
 
+class Copied(Here):
+    """Gives each job the shipped bundle with the job's recipe, as if it had been trained."""
+
+    def run(self, jobs, watch):
+        self.names += [job.name for job in jobs]
+        return [Outcome(job, self.copied(job)) for job in jobs]
+
+    def copied(self, job):
+        shutil.copytree(policies_directory() / ONE.name, job.bundle, dirs_exist_ok=True)
+        passport = read_passport(job.bundle)
+        again = replace(passport, training=passport.training | {"recipe": job.recipe}).sealed()
+        (job.bundle / PASSPORT).write_text(json.dumps(again.plain()))
+        return again.training
+
+
+@pytest.mark.parametrize("executor", [Copied(), pytest.param(Here(), marks=pytest.mark.slow)])
 def test_a_policy_is_made_once_and_again_only_when_it_is_made_from_something_else_or_damaged(
-    small_job, robot, task, tmp_path
+    small_job, robot, task, tmp_path, executor
 ):
-    table, executor = PolicyTable(2, 2, (ONE,)), Here()
+    table = PolicyTable(2, 2, (ONE,))
     assert not is_made(small_job)
     (first,) = make_policies(table, [small_job], executor, lambda *_: None)
     assert (first["made"], first["needed"]) == (True, 0.9)

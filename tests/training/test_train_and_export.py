@@ -228,8 +228,8 @@ def test_ctrl_c_during_an_export_ends_it_when_the_exporter_is_done(run_copy, tmp
     assert not (tmp_path / "bundle").exists()
 
 
-def test_the_passport_carries_the_result_of_mujoco(run_copy, tmp_path):
-    assert "mujoco" not in export(run_copy, tmp_path / "before").training
+def test_the_passport_carries_the_result_of_mujoco(run_copy, bundle, tmp_path):
+    assert "mujoco" not in bundle[1].training
     figures = evaluate_in_mujoco(run_copy, episodes=2)
     result = export(run_copy, tmp_path / "after").training["mujoco"]
     assert (result["seed"], result["scenario"], result["episodes"]) == (EVALUATION_SEED, "nominal", 2)

@@ -47,8 +47,15 @@ def command(robot, task, state, *targets, previous=None):
     return load_classical(robot, task).act(inputs)[0]
 
 
-# Each robot and each task once; an orbit lasts ten minutes, and flights a minute at 100 Hz each.
-QUICK = covering((r.name, t.name) for r, t in PAIRS if not (r.flies or r.actuators.turns_only))
+# Each robot and each task once; an orbit lasts ten minutes, and flights a minute at 100 Hz each. Of episodes that take
+# seconds of processor time the first part is tested below.
+LONG = {
+    ("cubesat_8", "inspect"),
+    ("cubesat_8", "go_through_positions_3d"),
+    ("int_ball2", "follow_pose_3d"),
+    ("int_ball2", "go_to_pose_3d"),
+}
+QUICK = covering((r.name, t.name) for r, t in PAIRS if not (r.flies or r.actuators.turns_only)) - LONG
 
 
 @pytest.mark.parametrize(
@@ -67,6 +74,17 @@ def test_it_does_its_task_in_nine_of_ten_episodes(robot, task):
     law = load_classical(robot, task)
     run = roll_out_in_batch(law, robot, task, load_scenario("nominal"), episodes=64, seed=7)
     assert successes(run, task).mean() >= 0.9
+
+
+@pytest.mark.parametrize(("robot", "task"), sorted(LONG))
+def test_of_a_long_task_it_does_the_beginning(robot, task):
+    """After twelve seconds no robot has left or hit anything, and each is nearer to its goal, or stays there."""
+    robot, task = ROBOTS[robot], replace(TASKS[task], episode_s=12.0)
+    run = roll_out_in_batch(
+        load_classical(robot, task), robot, task, load_scenario("nominal"), episodes=8, seed=7
+    )
+    assert not (run.touching | run.outside).any()
+    assert (run.position_error[:, -1] < np.maximum(run.position_error[:, 0], 0.05)).all()
 
 
 @pytest.mark.parametrize("seconds", [1.0, pytest.param(8.0, marks=pytest.mark.slow)])

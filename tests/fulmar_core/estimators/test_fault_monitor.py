@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import replace
 
 import numpy as np
@@ -139,7 +140,7 @@ def test_robots_with_valves_or_fans_are_watched(name):
 
 
 def test_bodies_that_their_actuators_carry_are_not_as_their_weight_would_be_a_push():
-    robot = load_robot("int_ball2")
+    robot = copy(load_robot("int_ball2"))  # read once, for all tests
     assert can_monitor(robot)
     robot.__dict__["kind"] = replace(robot.kind, weighs=True)
     assert not can_monitor(robot)

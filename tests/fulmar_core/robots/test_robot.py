@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import pickle
 from dataclasses import replace
 
 import pytest
 
 from fulmar_core.config.errors import ConfigError, UnknownNameError
-from fulmar_core.config.paths import config_directory
+from fulmar_core.config.paths import config_directory, config_names
 from fulmar_core.robots.robot import Limits, Timing, Uncertainty
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.robots.sensors.imu import ImuSpec
@@ -164,3 +165,12 @@ def test_a_robot_whose_file_is_called_otherwise_is_refused(tmp_path, monkeypatch
     monkeypatch.setenv("FULMAR_CONFIGS", str(tmp_path))
     with pytest.raises(ConfigError, match="'name' is 'floating_platform', the file's own name is 'other'"):
         load_robot("other")
+
+
+@pytest.mark.parametrize("name", config_names("robots"))
+def test_a_robot_whose_sensors_were_asked_for_goes_to_another_process(name):
+    robot = load_robot(name)
+    assert robot.sensors.kinds
+    there = pickle.loads(pickle.dumps(robot))
+    assert there.name == name
+    assert there.sensors.kinds == robot.sensors.kinds

@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 from fulmar_core.config.errors import SafetyError
-from fulmar_core.safety.watchdog import LONGEST_S, Watchdog, checked_timeout, default_timeout
+from fulmar_core.safety.watchdog import Watchdog, checked_timeout
+from fulmar_core.wires.silence import LONGEST_S, default_timeout
 
 MS = 1_000_000
 
@@ -73,3 +74,22 @@ def test_after_a_reset_it_waits_for_a_first_command_without_a_trip():
     dog.reset()
     assert dog.expired(500 * MS)
     assert (dog.trips, dog.tripped, dog.silent_ns(500 * MS)) == (0, False, 0)
+
+
+def test_while_a_simulation_stands_still_no_silence_grows_and_then_it_goes_on_from_there():
+    dog = Watchdog(200 * MS)
+    dog.feed(0)
+    dog.hold(150 * MS)
+    assert not dog.expired(900 * MS)
+    dog.go_on(1000 * MS)
+    assert dog.silent_ns(1000 * MS) == 150 * MS
+    assert dog.expired(1051 * MS)
+    assert dog.trips == 1
+
+
+def test_a_command_that_comes_while_it_stands_still_is_new_when_it_goes_on():
+    dog = Watchdog(200 * MS)
+    dog.hold(0)
+    dog.feed(900 * MS)
+    dog.go_on(1000 * MS)
+    assert dog.silent_ns(1000 * MS) == 0

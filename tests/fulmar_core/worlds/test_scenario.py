@@ -14,6 +14,7 @@ from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.states.counter_rng import WORLD, Draws
 from fulmar_core.states.planar import PlanarState
 from fulmar_core.worlds.holdability import uncontrollable_losses
+from fulmar_core.worlds.link import Link
 from fulmar_core.worlds.parts import (
     Actuation,
     Air,
@@ -129,6 +130,7 @@ ENTRIES = {
     "sensing.yaw_rate_noise": (STILL, {"sensing": Sensing(yaw_rate_noise=(0.0, 0.1))}, {"yaw_rate_noise"}),
     "bearing_late_s": (STILL, {"bearing_late_s": (1.0, 2.0)}, set()),  # of simulated plants, not of worlds
     "held_s": (STILL, {"held_s": (1.0, 2.0)}, set()),
+    "link": (STILL, {"link": Link(delay_s=0.1)}, set()),  # between plant and controller
     "sensing.gyroscope": (SEEING, {"sensing": Sensing(gyroscope=2.0)}, set()),  # of simulated sensors
     "sensing.gyroscope_dies_s": (SEEING, {"sensing": Sensing(gyroscope_dies_s=2.0)}, set()),
     "orbit_rate": (STILL, {"orbit_rate": 0.001}, set()),  # of worlds in space

@@ -67,7 +67,7 @@ def test_the_spectrum_of_w_is_that_of_the_specification():
 
     height, dt = 100.0, 0.05
     _, down, _, sigma = lengths_and_intensities(np.array(height), np.array(CLASSES["light"]))
-    w = gusts(height, dt=dt, seconds=400.0)[:, 2]
+    w = gusts(height, dt=dt, seconds=150.0)[:, 2]
     hz, power = welch(w, 1.0 / dt, nperseg=1024, axis=0)
     omega, found = 2.0 * np.pi * hz, power.mean(axis=1) / (2.0 * np.pi)
     x = (float(down) * omega / SPEED) ** 2

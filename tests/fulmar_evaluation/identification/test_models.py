@@ -24,7 +24,7 @@ from tests.inputs import inputs_of
 PLATFORM, BOAT, BASE = (load_robot(name) for name in ("floating_platform", "kingfisher", "turtlebot2"))
 
 
-def driven(true, nominal, *, duration_s=120.0, seed=1, load=0, spoil=None):
+def driven(true, nominal, *, duration_s=60.0, seed=1, load=0, spoil=None):
     """A run of a true robot under excitation by somebody who knows the nominal one."""
     simulation = BatchSimulation(
         true, load_task("go_to_position"), load_scenario("nominal"), worlds=1, seed=seed, dtype=np.float64
@@ -63,7 +63,7 @@ def platform(*, thrust=1.15, mass=4.9, inertia=0.16, center=(0.012, -0.007), del
 
 @pytest.fixture(scope="module")
 def bare():
-    return driven(platform(), PLATFORM)
+    return driven(platform(), PLATFORM, duration_s=120.0)
 
 
 @pytest.fixture(scope="module")
@@ -79,8 +79,13 @@ def check(found, **truth):
         assert e.low - 0.5 * width <= value <= e.high + 0.5 * width, (name, value, e)
 
 
-def test_a_ballast_determines_mass_thrust_inertia_centre_and_delays(bare, heavy):
-    found = identify(PLATFORM, [bare, heavy], ballasts={1: Weight(2.0, 0.002)})
+@pytest.fixture(scope="module")
+def with_ballast(bare, heavy):
+    return identify(PLATFORM, [bare, heavy], ballasts={1: Weight(2.0, 0.002)})
+
+
+def test_a_ballast_determines_mass_thrust_inertia_centre_and_delays(with_ballast):
+    found = with_ballast
     assert found.trusted
     check(
         found,
@@ -135,7 +140,7 @@ def test_the_drag_of_a_boat_is_found_at_the_speeds_it_goes():
         linear_damping=(3.0, 80.0, 99.99, 13.0, 13.0, 7.0),
         quadratic_damping=(21.0, 120.0, 10.0, 5.0, 5.0, 13.0),
     )
-    found = identify(BOAT, [driven(replace(BOAT, hydrodynamics=water), BOAT, duration_s=200.0)])
+    found = identify(BOAT, [driven(replace(BOAT, hydrodynamics=water), BOAT, duration_s=100.0)])
     at = {name: e.value for name, e in found.fit.estimates.items()}
     for axis, speed, linear, quadratic in (
         ("surge", 1.0, 3.0, 21.0),
@@ -157,8 +162,8 @@ def test_wheel_scale_and_turn_scale_are_found():
     assert found.fit.estimates["delay"].value == pytest.approx(0.04, abs=0.01)
 
 
-def test_a_calibration_made_of_them_says_the_same_and_leaves_the_ballast_out(bare, heavy):
-    found = identify(PLATFORM, [bare, heavy], ballasts={1: Weight(2.0, 0.002)})
+def test_a_calibration_made_of_them_says_the_same_and_leaves_the_ballast_out(with_ballast):
+    found = with_ballast
     calibration = calibration_of(PLATFORM, found, ["a", "b"])
     assert calibration.runs == ("a", "b")
     assert "ballast_1" not in calibration.measured
