@@ -10,14 +10,17 @@ PYTEST_ARGS ?=
 
 VENV := .venv
 BIN := $(VENV)/bin
-# Outside programs that tests compare with: what they need may contradict our own locks.
+# Outside programs that tests compare with, and the simulator Basilisk: what they need may contradict our own locks.
 PEERS := .venv-peers
 # DreamerV3 by sheeprl, which `fulmar train --algorithm dreamer` runs: what it needs contradicts our own lock.
 DREAMER := .venv-dreamer
+# The builder of the documentation site, which nothing else needs.
+SITE := .venv-docs
 RUN_LOCK := requirements.lock
 DEV_LOCK := requirements-dev.lock
 PEERS_LOCK := requirements-peers.lock
 DREAMER_LOCK := requirements-dreamer.lock
+DOCS_LOCK := requirements-docs.lock
 # Of the images that are not made from the run lock.
 ROBOT_LOCK := docker/requirements-robot.lock
 TRAIN_LOCK := docker/requirements-train.lock
@@ -26,7 +29,7 @@ MESSAGES_LOCK := ros2_ws/src/fulmar_bringup/fulmar_bringup/tf2_msgs/requirements
 # Of .venv after an install on x86-64 [MiB], measured by `du -s --block-size=1M .venv`; the last two of
 # .venv-peers and .venv-dreamer.
 RUN_SIZE := 884
-DEV_SIZE := 7489
+DEV_SIZE := 8217
 PEERS_SIZE := 8838
 DREAMER_SIZE := 6209
 
@@ -40,6 +43,10 @@ key = $(firstword $(shell cat $(1) pyproject.toml | cksum))
 RUN_STAMP := $(VENV)/.run-$(call key,$(RUN_LOCK))
 DEV_STAMP := $(VENV)/.dev-$(call key,$(DEV_LOCK))
 TF_STAMP := $(VENV)/.tf-$(firstword $(shell cksum < $(MESSAGES_LOCK)))
+INTERFACES := $(wildcard $(addprefix ros2_ws/src/fulmar_bringup/fulmar_bringup/,nav2_msgs/action/* \
+	simulation_interfaces/msg/* simulation_interfaces/srv/* simulation_interfaces/action/* control_msgs/msg/* \
+	px4_msgs/msg/*))
+INTERFACES_STAMP := $(VENV)/.interfaces-$(firstword $(shell cat $(MESSAGES_LOCK) $(INTERFACES) | cksum))
 STARS_LOCK := ros2_ws/src/fulmar_bringup/fulmar_bringup/stars/requirements.lock
 STARS_STAMP := $(VENV)/.stars-$(firstword $(shell cksum < $(STARS_LOCK)))
 # Elsewhere ROS does not come as wheels, and its own tf2_msgs comes with it.
@@ -84,7 +91,7 @@ help: ## Show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' Makefile
 	@echo
 	@echo "  PYTHON=python3.12    interpreter of .venv (3.11 to 3.14)"
-	@echo "  EXTRA='jsbsim gym'   extras that 'make with' adds: cluster datasets events gym jsbsim train wandb"
+	@echo "  EXTRA='jsbsim gym'   extras that 'make with' adds: cluster datasets events gym jsbsim pettingzoo train wandb"
 	@echo "  PYTEST_ARGS='-k lqr' more arguments for pytest in 'make test'"
 
 .PHONY: setup
@@ -98,10 +105,10 @@ with: $(RUN_STAMP) ## Add an extra of pyproject.toml, without the rest of `make 
 	@$(BIN)/python -m fulmar_cli.installation.add_extra $(EXTRA)
 
 .PHONY: dev
-dev: $(DEV_STAMP) $(if $(HAS_ROS_WHEELS),$(TF_STAMP)) $(STARS_STAMP) ## Install everything, also for training and tests (7.3 GiB)
+dev: $(DEV_STAMP) $(if $(HAS_ROS_WHEELS),$(TF_STAMP) $(INTERFACES_STAMP)) $(STARS_STAMP) ## Install everything, also for training and tests (8.0 GiB)
 
 .PHONY: peers
-peers: $(PEERS_STAMP) ## Install the outside programs that tests compare with, into .venv-peers (8.6 GiB)
+peers: $(PEERS_STAMP) ## Install Basilisk and the outside programs that tests compare with, into .venv-peers (8.6 GiB)
 
 .PHONY: dreamer
 dreamer: $(DREAMER_STAMP) ## Install DreamerV3, which learns policies, into .venv-dreamer (6.1 GiB)
@@ -132,6 +139,11 @@ $(DEV_STAMP): | $(VENV)/bin/python
 $(TF_STAMP): | $(RUN_STAMP)
 	@$(BIN)/fulmar install-tf
 	@rm -f $(VENV)/.tf-*
+	@touch $@
+
+$(INTERFACES_STAMP): | $(RUN_STAMP)
+	@$(BIN)/fulmar install-interfaces
+	@rm -f $(VENV)/.interfaces-*
 	@touch $@
 
 $(STARS_STAMP): | $(RUN_STAMP)
@@ -166,6 +178,11 @@ train-demo: dev ## Train a policy, export it and evaluate it in MuJoCo
 policies: dev ## Make the shipped policies that are missing or out of date (under 90 minutes on two cores)
 	$(BIN)/fulmar policies
 
+.PHONY: envelopes
+envelopes: dev ## Test the certified sets of the shipped policies again, on today's core (10 minutes on two cores)
+	for passport in $$(grep -l '"envelope"' policy_server/policies/*/passport.json); do \
+		$(BIN)/fulmar certify $$(dirname $$passport) --again --write || exit 1; done
+
 .PHONY: replay-bags
 replay-bags: dev ## Record the reference bags of the tests again, after an intended change of behaviour
 	$(BIN)/fulmar bag reference tests/replay/bags --update
@@ -183,8 +200,8 @@ rooms: dev ## Print the rooms of the core, and which folders import each other
 freeze: dev ## Freeze them anew, after an intended change of behaviour
 	$(BIN)/python -m tests.freeze --update
 
-# Three processes, since tests of nodes mostly wait. Those with wall-clock deadlines come first and alone, see
-# tests/real_time_first.py.
+# Three processes, since tests of nodes mostly wait. Those with wall-clock deadlines come first, and beside them only
+# what takes nothing from them, see tests/real_time_first.py.
 define run_tests
 if $(BIN)/python -m pytest tests -n 3 --dist loadfile $(1) $(PYTEST_ARGS); then echo; echo "All tests passed."; \
 else code=$$?; echo; \
@@ -197,7 +214,7 @@ test: dev ## Run the tests, without those that take over 1.5 s of processor time
 	@$(call run_tests,-m "not slow")
 
 .PHONY: test-all
-test-all: dev peers dreamer ## Run every test
+test-all: dev peers dreamer setup-browser ## Run every test
 	@$(call run_tests,)
 
 .PHONY: mutants
@@ -243,7 +260,7 @@ lock: $(DEV_STAMP) ## Make the locks anew (UPGRADE=1 takes the newest versions)
 	$(compile) $(if $(UPGRADE),--upgrade) pyproject.toml --extra run --group build --output-file $(RUN_LOCK)
 	$(compile) $(if $(UPGRADE),--upgrade) pyproject.toml --all-extras --group dev --constraint $(RUN_LOCK) \
 		--output-file $(DEV_LOCK)
-	$(compile) $(if $(UPGRADE),--upgrade) pyproject.toml --extra ros --extra policy --extra bags --extra hardware \
+	$(compile) $(if $(UPGRADE),--upgrade) pyproject.toml --extra ros --extra policy --extra bags --extra hardware --extra console \
 		--group build --constraint $(RUN_LOCK) --output-file $(ROBOT_LOCK)
 	cp $(DEV_LOCK) $(TRAIN_LOCK) # its versions are taken where they fit
 	$(compile) pyproject.toml --extra ros --extra sim --extra policy --extra bags --extra view --extra train --group build \
@@ -251,7 +268,32 @@ lock: $(DEV_STAMP) ## Make the locks anew (UPGRADE=1 takes the newest versions)
 	$(compile) $(if $(UPGRADE),--upgrade) --group peers --output-file $(PEERS_LOCK)
 	cp $(DEV_LOCK) $(DREAMER_LOCK) # likewise
 	$(compile) --group dreamer --output-file $(DREAMER_LOCK)
+	$(compile) $(if $(UPGRADE),--upgrade) --group docs --output-file $(DOCS_LOCK)
 	$(compile) $(if $(UPGRADE),--upgrade) --group messages --constraint $(RUN_LOCK) --output-file $(MESSAGES_LOCK)
+
+$(SITE)/bin/zensical: $(DOCS_LOCK)
+	@$(PYTHON) -m venv $(SITE)
+	@$(SITE)/bin/python -m pip install --disable-pip-version-check --no-input --quiet --require-hashes -r $(DOCS_LOCK)
+	@touch $@
+
+.PHONY: site
+site: $(SITE)/bin/zensical ## Build the documentation site into site/, strictly
+	@$(SITE)/bin/zensical build --clean --strict
+
+.PHONY: site-serve
+site-serve: $(SITE)/bin/zensical ## Serve the documentation site on this computer, anew at each change
+	@$(SITE)/bin/zensical serve
+
+.PHONY: console-vendor
+console-vendor: ## Bundle three.js and uPlot for the console's page anew (npm)
+	ros2_ws/src/fulmar_console/vendor/build.sh
+
+.PHONY: setup-browser
+setup-browser: ## Install the browser in which the console's page is tested (Debian's Chromium, by apt-get)
+	@if command -v chromium > /dev/null && ldconfig -p | grep -q libEGL.so.1; then echo "Chromium is there."; \
+	elif [ "$$(id -u)" = 0 ]; then apt-get update -qq; \
+		apt-get install -y -qq --no-install-recommends chromium libegl1 libgl1-mesa-dri fonts-dejavu-core; \
+	else echo "As root: apt-get install chromium libegl1 libgl1-mesa-dri fonts-dejavu-core" >&2; exit 1; fi
 
 .PHONY: clean
 clean: ## Remove what was built and cached; .venv, .venv-peers, .venv-dreamer and runs/ stay

@@ -9,4 +9,4 @@ $pip install --require-hashes -r "$lock"
 if [ $# -gt 0 ]; then $pip install --no-deps "$@"; fi
 # What `fulmar install-tf` does, which is not here yet.
 PYTHONPATH=ros2_ws/src/fulmar_core:ros2_ws/src/fulmar_bringup /opt/fulmar/bin/python -c \
-    'from fulmar_bringup.message_build import install_tf2_msgs; install_tf2_msgs(print)'
+    'from fulmar_bringup.message_build import install_messages; install_messages("tf2_msgs", print)'

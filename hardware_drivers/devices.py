@@ -11,6 +11,7 @@ from hardware_drivers.driver import DeviceDriver
 from hardware_drivers.driver_backend import DriverBackend, backend_of
 from hardware_drivers.driver_facts import OwnWatchdog
 from hardware_drivers.hardware import TOPIC_DRIVERS, Hardware
+from hardware_drivers.px4_settings import Px4Thrusters, Px4Wing
 from hardware_drivers.settings import Driver, OwnDriver
 
 
@@ -30,7 +31,7 @@ def make_device(robot: Robot, hardware: Hardware, *, port: str, patience_s: floa
     settings = hardware.driver
     if hardware.robot != robot.name:
         raise ConfigError(f"the hardware file is of '{hardware.robot}', the robot is '{robot.name}'.")
-    if port and not isinstance(settings, TOPIC_DRIVERS):
+    if port and not isinstance(settings, TOPIC_DRIVERS) and not isinstance(settings, (Px4Thrusters, Px4Wing)):
         settings = replace(settings, port=port)
     if isinstance(settings, OwnDriver):
         from hardware_drivers.own_driver import make_own_driver

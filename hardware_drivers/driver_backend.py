@@ -10,6 +10,7 @@ import numpy as np
 from fulmar_core.config.errors import DeviceError
 from fulmar_core.robots.actuators.refuge import slowdown
 from fulmar_core.robots.robot import Robot
+from fulmar_core.safety.command_end import CommandEnd, TakesEnds
 from fulmar_core.simulation.backend import AirBearing, Sample
 from fulmar_core.simulation.episode import Episode
 from fulmar_core.states.planar import PlanarState
@@ -144,6 +145,33 @@ class HaltingDriverBackend(DriverBackend):
             super().make_safe()
 
 
+class EndTakingDriverBackend(DriverBackend):
+    """Backend of a driver whose device goes on by itself where commands end; see `TakesEnds`."""
+
+    def __init__(self, robot: Robot, driver: DeviceDriver, takes_ends: TakesEnds) -> None:
+        super().__init__(robot, driver)
+        self._takes_ends = takes_ends
+
+    def take_end(self, end: CommandEnd) -> None:
+        """See `TakesEnds`."""
+        self._takes_ends.take_end(end)
+
+    def make_safe(self) -> None:
+        """Let the driver know that commands end for good before the safe command; raises as in `DriverBackend`."""
+        self._takes_ends.take_end(CommandEnd.STOPPED)
+        super().make_safe()
+
+
+class HandFloatedDriverBackend(EndTakingDriverBackend):
+    """The same of a platform whose air bearing a person switches: no wire leads to it."""
+
+    bearing_on = True  # who arms the device has switched it on
+
+    def set_bearing(self, on: bool) -> str:
+        """Refuse; see `AirBearing`."""
+        return f"no wire leads to the air bearing of '{self.robot.name}': switch it by hand"
+
+
 class _HangsError(DeviceError):
     """A write that does not come back."""
 
@@ -152,6 +180,9 @@ def backend_of(robot: Robot, driver: DeviceDriver) -> DriverBackend:
     """The backend of a driver, with what it has beside its actuators."""
     if isinstance(driver, AirBearing):
         return FloatingDriverBackend(robot, driver, driver)
+    if isinstance(driver, TakesEnds):
+        made = HandFloatedDriverBackend if robot.air_bearing else EndTakingDriverBackend
+        return made(robot, driver, driver)
     if isinstance(driver, Halting):
         return HaltingDriverBackend(robot, driver, driver)
     return DriverBackend(robot, driver)

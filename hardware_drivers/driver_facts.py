@@ -20,16 +20,20 @@ class DriverFacts:
     Attributes:
         fits: Families of actuators that it can move.
         needs: Modules of the extra `hardware` that it imports.
+        needs_messages: Package of ROS messages that `fulmar install-...` builds; empty: none.
         moves_on: What moves on where nothing stops the device, in capitals.
         emulator: Device of `sim_nodes.emulator_node` that stands in for theirs; empty: none does.
+        arming: What the driver does where it may arm, in words.
         instead: What a user does about that; empty: builds in a supply that closes without the driver.
     """
 
     fits: ClassVar[tuple[str, ...]] = ()
     needs: ClassVar[tuple[str, ...]] = ()
+    needs_messages: ClassVar[str] = ""
     moves_on: ClassVar[str] = "ACTUATORS"
     emulator: ClassVar[str] = ""
     instead: ClassVar[str] = ""
+    arming: ClassVar[str] = "arms the device"
 
     @property
     def made_by(self) -> str:

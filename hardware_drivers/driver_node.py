@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
@@ -16,15 +17,28 @@ from fulmar_ros.foreign_topics import thrust_sender, valve_sender, velocity_send
 from fulmar_ros.parameters import own_frames
 from fulmar_ros.plant_node import DONE, PlantNode
 from fulmar_ros.plant_settings import PlantSettings
+from fulmar_ros.px4_wires import Px4Wires
 from fulmar_ros.runtime import RequestExit, run_node
 from hardware_drivers.devices import make_device
 from hardware_drivers.driver_backend import DriverBackend, backend_of
 from hardware_drivers.hardware import Hardware, load_hardware
 from hardware_drivers.mavlink_address import place_of
-from hardware_drivers.settings import UNARMED, MavlinkBoat, OwnDriver, ThrustTopic, ValveTopic, VelocityTopic
+from hardware_drivers.plane_settings import MavlinkPlane
+from hardware_drivers.px4_driver import Px4Driver, Px4ThrusterDriver
+from hardware_drivers.px4_settings import Px4, Px4Thrusters, Px4Wing
+from hardware_drivers.settings import (
+    UNARMED,
+    MavlinkBoat,
+    OwnDriver,
+    ThrustTopic,
+    ValveTopic,
+    VelocityTopic,
+)
 from hardware_drivers.topic_driver import Listeners, TopicDriver, ValveTopicDriver
 from hardware_drivers.valves import to_message
 from hardware_drivers.wiring import channel_velocity, channels
+
+Arming = TypeVar("Arming", bound=MavlinkPlane | Px4Thrusters | Px4Wing)
 
 
 @dataclass(frozen=True)
@@ -93,6 +107,8 @@ class DriverNode(PlantNode):
         if hardware.robot != robot.name:
             raise ConfigError(f"{settings.hardware} is of '{hardware.robot}', the robot is '{robot.name}'.")
         hardware = self._armed(hardware, settings)
+        if isinstance(hardware.driver, (Px4Thrusters, Px4Wing)):
+            return self._px4(robot, hardware.driver, settings)
         by_topic = self._by_topic(robot, hardware, settings.connect_s)
         return by_topic or make_device(robot, hardware, port=settings.port, patience_s=settings.connect_s)
 
@@ -108,14 +124,21 @@ class DriverNode(PlantNode):
             )
             self.get_logger().warning(f"{driver.kind}: {will}")
             return replace(hardware, driver=driver)
-        if not isinstance(driver, MavlinkBoat):
+        if isinstance(driver, (Px4Thrusters, Px4Wing)):
+            return replace(hardware, driver=self._may_arm("PX4", driver, settings))
+        if not isinstance(driver, (MavlinkBoat, MavlinkPlane)):
             return hardware
-        driver = replace(driver, arm=settings.may_arm(driver.arm))
+        if isinstance(driver, MavlinkPlane):
+            driver = self._may_arm(f"autopilot at {settings.port or driver.port}", driver, settings)
+        else:
+            driver = replace(driver, arm=settings.may_arm(driver.arm))
         if place_of(settings.port or driver.port).is_open and not driver.signing_key:
             self.get_logger().warning(
                 f"autopilot at {settings.port or driver.port}: the first of any host that speaks there counts as the "
                 "autopilot. Name an address that only it reaches, or a 'signing_key' (docs/security.md)."
             )
+        if isinstance(driver, MavlinkPlane):
+            return replace(hardware, driver=driver)
         self.get_logger().warning(
             f"autopilot at {settings.port or driver.port}: this driver will set MANUAL, ARM THE BOAT, and override RC "
             f"channels {driver.steering_channel} (steering) and {driver.throttle_channel} (throttle)."
@@ -123,6 +146,27 @@ class DriverNode(PlantNode):
             else f"autopilot at {settings.port or driver.port}: {UNARMED}. This driver sends no command."
         )
         return replace(hardware, driver=driver)
+
+    def _may_arm(self, name: str, driver: Arming, settings: DriverSettings) -> Arming:
+        """A driver's settings with the parameter `arm`; logs what it does then."""
+        driver = replace(driver, arm=settings.may_arm(driver.arm))
+        does = f"this driver {driver.arming}." if driver.arm else f"{UNARMED}. This driver sends no command."
+        self.get_logger().warning(f"{name}: {does}")
+        return driver
+
+    def _px4(self, robot: Robot, driver: Px4, settings: DriverSettings) -> DriverBackend:
+        """The backend of a PX4; `port` takes the place of the MAVLink address of its failsafe."""
+        if settings.port:
+            driver = replace(driver, failsafe=replace(driver.failsafe, mavlink=settings.port))
+        wires = Px4Wires(self, driver.topics)
+        made: Px4Driver
+        if isinstance(driver, Px4Thrusters):
+            made = Px4ThrusterDriver(robot, driver, wires, patience_s=settings.connect_s)
+        else:
+            from hardware_drivers.px4_wing_driver import Px4WingDriver
+
+            made = Px4WingDriver(robot, driver, wires, patience_s=settings.connect_s)
+        return backend_of(robot, made)
 
     def _by_topic(self, robot: Robot, hardware: Hardware, patience_s: float) -> DriverBackend | None:
         driver = hardware.driver

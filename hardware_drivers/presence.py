@@ -6,9 +6,10 @@ import os
 import socket
 from collections.abc import Sequence
 from glob import glob
+from importlib.util import find_spec
 from pathlib import Path
 
-from fulmar_core.config.errors import DeviceError
+from fulmar_core.config.errors import ConfigError, DeviceError
 from hardware_drivers.gpio import FILE_CHIP, line_of
 from hardware_drivers.settings import (
     Driver,
@@ -23,6 +24,16 @@ TCP = ("tcp://", "tcp:")
 UDP = ("udpin:", "udpout:", "udp:")
 
 
+def check_messages(driver: Driver) -> None:
+    """Raise ConfigError where the ROS messages of a driver are not installed."""
+    package = driver.needs_messages
+    if package and find_spec(package) is None:
+        short = package.removesuffix("_msgs")
+        raise ConfigError(
+            f"driver '{driver.kind}' needs {package}, which is not installed. Run: fulmar install-{short}"
+        )
+
+
 def check_presence(driver: Driver, port: str = "") -> None:
     """Reject a driver whose port does not exist; takes under a second.
 
@@ -33,8 +44,10 @@ def check_presence(driver: Driver, port: str = "") -> None:
         port: Takes the place of the file's port; empty: the file's.
 
     Raises:
+        ConfigError: ROS messages of the driver are not installed.
         DeviceError: There is no such port, chip, line or host, or this user may not use it.
     """
+    check_messages(driver)
     if isinstance(driver, GpioValves):
         _check_chip(port or driver.port, driver.every_line)
     elif isinstance(driver, PwmValves):

@@ -11,6 +11,8 @@ from fulmar_core.config.own_class import check_class_path
 from fulmar_core.config.strict_yaml import Named
 from hardware_drivers.driver_facts import DriverFacts, OwnWatchdog
 from hardware_drivers.mavlink_address import place_of
+from hardware_drivers.plane_settings import MavlinkPlane
+from hardware_drivers.px4_settings import Px4Thrusters, Px4Wing
 from hardware_drivers.valves import VALVE_ORDERS
 from hardware_drivers.wiring import AS_NAMED, check_wiring
 
@@ -382,6 +384,9 @@ Driver = (
     | KingfisherNmea
     | MavlinkBoat
     | ThrustTopic
+    | MavlinkPlane
+    | Px4Thrusters
+    | Px4Wing
     | XPlane
     | OwnDriver
 )

@@ -10,7 +10,7 @@ import threading
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from geometry_msgs.msg import PoseStamped, Twist, TwistStamped
 from nav_msgs.msg import Odometry
@@ -34,6 +34,7 @@ from fulmar_ros.foreign_topics import VALVE_MESSAGES
 from fulmar_ros.motion_capture import capture_maker
 from fulmar_ros.parameters import own_frames, read_parameters
 from fulmar_ros.plant_settings import PlantSettings, first_episode
+from fulmar_ros.px4_wires import Px4Wires
 from fulmar_ros.qos import publisher_qos
 from fulmar_ros.runtime import RequestExit, run_node, settle_memory
 from sim_nodes.emulators.device import EmulatedDevice, Link, PtyLink, TcpLink
@@ -41,16 +42,21 @@ from sim_nodes.emulators.kingfisher import KingfisherEmulator
 from sim_nodes.emulators.kobuki import KobukiEmulator
 from sim_nodes.emulators.outputs import BASE_TIMEOUT_S, NO_TIMEOUT_S, TopicDevice, ValveBank, ValveNode
 from sim_nodes.emulators.pwm import PwmBank
+from sim_nodes.emulators.px4 import Px4Emulator
 from sim_nodes.emulators.wiring import STRAIGHT, Wiring
 from sim_nodes.emulators.xplane import XPlaneEmulator
 from sim_nodes.mock_backend import MockBackend
 from sim_nodes.mujoco_backend import MujocoBackend
 from sim_nodes.on_air import OnAir
 
-XPLANE = "xplane"
+if TYPE_CHECKING:
+    from sim_nodes.emulators.parameters import Px4ParameterLink
+
+XPLANE, ARDUPLANE, PX4_WING, PX4_THRUSTERS = "xplane", "arduplane", "px4_wing", "px4_thrusters"
+TOPICS = "topics:"  # how the link of a PX4 begins
 DEVICES = (
     "valves", "pwm_valves", "kobuki", "kingfisher", "ardupilot", XPLANE,
-    "valve_topic", "velocity_topic", "thrust_topic",
+    "valve_topic", "velocity_topic", "thrust_topic", ARDUPLANE, PX4_WING, PX4_THRUSTERS,
 )  # fmt: skip
 NONE = -1  # an empty list has no type in ROS
 CATCH_UP = 25  # ticks at most after a pause of the process; simulated time loses the rest
@@ -62,6 +68,7 @@ class EmulatorSettings(PlantSettings):
 
     device: str = ""  # one of DEVICES
     link: str = ""  # path of the pseudo-terminal or the chip to make, tcp:<port>, udp:<port>, or a topic
+    parameters: str = ""  # udp:<port> where a PX4's parameters are asked for; empty: nowhere
     order: tuple[int, ...] = (0, 1, 2, 3, 4, 5, 6, 7)  # which thruster each valve line opens
     channels: tuple[int, ...] = (0, 1, 2, 3, 4, 5, 6, 7)  # of a PWM chip, in the order of its wires
     active_low: bool = True
@@ -115,6 +122,9 @@ class EmulatorNode(Node):
         self._odometry: Publisher | None = None
         if isinstance(self.device, TopicDevice):
             self._subscribe(self.device)
+        self._px4 = (
+            Px4Side(self, self.device, self.settings) if isinstance(self.device, Px4Emulator) else None
+        )
         self._truth = self.create_publisher(Odometry, TRUTH.name, publisher_qos(TRUTH))
         self._state = self.create_publisher(JointState, DEVICE_STATE.name, publisher_qos(DEVICE_STATE))
         self._mocap = self.create_publisher(PoseStamped, MOCAP.name, publisher_qos(MOCAP))
@@ -133,6 +143,8 @@ class EmulatorNode(Node):
         self._stop.set()
         self._thread.join(2.0)
         self._room.close()
+        if self._px4 is not None:
+            self._px4.close()
         self.device.close()
         self._backend.close()
 
@@ -150,6 +162,8 @@ class EmulatorNode(Node):
         deadlines, began_s, ticks = Deadlines(dt), time.monotonic(), 0
         while deadlines.wait(self._stop):
             now_s = time.monotonic()
+            if self._px4 is not None:
+                self._px4.serve(now_s)
             command = self._wiring.applied(self.device.command(now_s))
             if isinstance(self._backend, OnAir) and isinstance(self.device, (ValveBank, ValveNode)):
                 self._backend.set_bearing(self.device.air)
@@ -193,6 +207,31 @@ class EmulatorNode(Node):
         self._mocap.publish(self._write_pose.raw(state, sent_ns))
 
 
+class Px4Side:
+    """The wires of an emulated PX4: px4_msgs, and MAVLink for its parameters."""
+
+    def __init__(self, node: Node, device: Px4Emulator, settings: EmulatorSettings) -> None:
+        """Connect; raises ConfigError where px4_msgs is not installed."""
+        self._wires = Px4Wires(node, settings.link.removeprefix(TOPICS), as_px4=True)
+        device.connect(self._wires)
+        self._parameters: Px4ParameterLink | None = None
+        if settings.parameters:
+            from sim_nodes.emulators.parameters import Px4ParameterLink
+
+            self._parameters = Px4ParameterLink(_number(settings.parameters, "udp"), device.parameters)
+
+    def serve(self, now_s: float) -> None:
+        """Answer questions for parameters at a time of the monotonic clock [s]."""
+        if self._parameters is not None:
+            self._parameters.serve(now_s)
+
+    def close(self) -> None:
+        """Close both."""
+        self._wires.close()
+        if self._parameters is not None:
+            self._parameters.close()
+
+
 def values_of(message: Any) -> list[float]:
     """The numbers of a command of another stack."""
     if hasattr(message, "data"):
@@ -206,9 +245,15 @@ def make_emulation(
 ) -> tuple[MockBackend | MujocoBackend, EmulatedDevice]:
     """The simulator and the emulated device of the parameters; raises ConfigError as `make_emulator`."""
     task = load_task(settings.task)
-    if settings.device == XPLANE:
+    if settings.device in (XPLANE, ARDUPLANE, PX4_WING):
         core = MockBackend(robot, things=task.things)
-        return core, XPlaneEmulator(robot, lambda: core.time_s, _number(settings.link, "udp"))
+        if settings.device == XPLANE:
+            return core, XPlaneEmulator(robot, lambda: core.time_s, _number(settings.link, "udp"))
+        if settings.device == PX4_WING:
+            return core, Px4Emulator(robot, (), wing=True)
+        from sim_nodes.emulators.arduplane import ArduPlaneEmulator
+
+        return core, ArduPlaneEmulator(robot, _number(settings.link, "udp"))
     simulator = MujocoBackend.of(robot, task, scenario)
     return simulator, make_emulator(robot, simulator, settings)
 
@@ -228,6 +273,8 @@ def make_emulator(robot: Robot, backend: MujocoBackend, settings: EmulatorSettin
             bearing=settings.bearing,
             supply=settings.supply,
         )
+    if settings.device == PX4_THRUSTERS:
+        return Px4Emulator(robot, settings.order, wing=False)
     if settings.device == "pwm_valves":
         return PwmBank(Path(settings.link), channels=settings.channels, order=settings.order)
     if settings.device == "valve_topic":

@@ -11,7 +11,7 @@ from fulmar_core.robots.sensors.kind import Truth
 from fulmar_core.robots.sensors.simulated import SimulatedSensors
 from fulmar_core.simulation.backend import Sample
 from fulmar_core.simulation.episode import Episode
-from fulmar_core.states.state import State
+from fulmar_core.states.state import RigidBodyState, State
 from fulmar_core.wires.reading import Reading
 from sim_nodes.one_world import OneWorld
 
@@ -56,10 +56,19 @@ class MockBackend:
         self._state = self._state.stopped()
         return self._sample(ticks)
 
+    def place(self, state: RigidBodyState) -> None:
+        """See `CanPlace.place`."""
+        columns = self.robot.state_type.from_rigid(state)
+        self._state = columns.mapped(lambda part: np.array([part], dtype=float))
+
     @property
     def time_s(self) -> float:
         """Simulated time since the episode began [s]."""
         return self._ticks * self.robot.timing.physics_dt
+
+    def push(self, force: tuple[float, ...] | None) -> None:
+        """See `CanPush.push`."""
+        self._world.extra = force
 
     def make_safe(self) -> None:
         """Nothing to do: a command acts only during a step."""

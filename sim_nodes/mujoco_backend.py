@@ -126,6 +126,15 @@ class MujocoBackend:
         truth = self._read()
         return self._sample(truth, world.measure(truth.state))
 
+    def push(self, force: tuple[float, ...] | None) -> None:
+        """See `CanPush.push`."""
+        self._world.extra = force
+
+    def place(self, state: RigidBodyState) -> None:
+        """See `CanPlace.place`."""
+        self._scene.place(self.robot.state_type.from_rigid(state))
+        self._truth = self._read().state
+
     def make_safe(self) -> None:
         """Bring the actuators to rest."""
         self.data.ctrl[:] = 0.0

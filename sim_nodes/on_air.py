@@ -9,7 +9,9 @@ from typing import Protocol
 import numpy as np
 
 from fulmar_core.simulation.backend import Backend, Sample
+from fulmar_core.simulation.disturbed import CanPlace, CanPush
 from fulmar_core.simulation.episode import Episode
+from fulmar_core.states.state import RigidBodyState
 from fulmar_core.worlds.scenario import Scenario, bearing_late_s
 
 
@@ -66,6 +68,16 @@ class OnAir:
             self._carried_s += seconds if on else 0.0
             self._open_s += seconds if self._open else 0.0
         return replace(sample, applied=applied)
+
+    def push(self, force: tuple[float, ...] | None) -> None:
+        """See `CanPush.push`; a body that stands is not moved."""
+        if isinstance(self._backend, CanPush):
+            self._backend.push(force)
+
+    def place(self, state: RigidBodyState) -> None:
+        """See `CanPlace.place`; also without air."""
+        if isinstance(self._backend, CanPlace):
+            self._backend.place(state)
 
     def make_safe(self) -> None:
         """See `Backend.make_safe`; the bearing stays as it is."""

@@ -24,7 +24,7 @@ class OneWorld:
         world: What was drawn for the episode, as a batch of one.
         actuation: What the actuators do.
         dynamics: Of the robot.
-        outside: Push of the surroundings in this control step, as in `Dynamics.outside`, shapes (1,).
+        extra: A push beside it, along the world's axes [N]; None: none.
         latest_s: How late commands act [s].
     """
 
@@ -54,7 +54,8 @@ class OneWorld:
             changes=bool(self.world.stuck_part[0] >= 0.0 or self.world.supply_left[0] < 1.0),
             world=self.world,
         )
-        self.outside: Any = None  # before the first command
+        self._outside: Any = None  # before the first command
+        self.extra: tuple[float, ...] | None = None
         self._constant_push = self.dynamics.push_is_constant(self.world)
         self._blurred = self.dynamics.blurs(self.world)
 
@@ -101,11 +102,20 @@ class OneWorld:
             self._command = np.array(command, dtype=float)
             self.actuation.begin(self._command[:, None], self.world, self._noise())
             if not (self._constant_push and self._begun):
-                self.outside = self._push(truth, ticks if ticks > 1 else nominal)
+                self._outside = self._push(truth, ticks if ticks > 1 else nominal)
             self._begun += 1
             self._left = nominal
         self._left -= ticks
         self._ticks += ticks
+
+    @property
+    def outside(self) -> Any:
+        """Push of the surroundings in this control step, as in `Dynamics.outside`, shapes (1,)."""
+        if self.extra is None:
+            return self._outside
+        along = len(self.extra)
+        pushed = tuple(part + more for part, more in zip(self._outside, self.extra, strict=False))
+        return (*pushed, *self._outside[along:])
 
     def measure(self, truth: RigidBodyState) -> RigidBodyState:
         """What the odometry reports now; called once for each `begin`, at its end."""

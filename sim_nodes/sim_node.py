@@ -1,13 +1,15 @@
-"""The process that simulates a robot: MuJoCo or the mock behind the plant's wires."""
+"""The process that simulates a robot: a simulator or the mock behind the plant's wires."""
 
 from __future__ import annotations
 
 import sys
 
 from fulmar_core.config.errors import UnknownNameError
+from fulmar_core.robots.basilisk_robots import BASILISK
 from fulmar_core.robots.jsbsim_models import JSBSIM, is_jsbsim, jsbsim_model
 from fulmar_core.robots.robot import Robot
 from fulmar_core.simulation.backend import Backend
+from fulmar_core.simulation.disturbed import disturbed
 from fulmar_core.tasks import load_task
 from fulmar_core.worlds.scenario import load_scenario
 from fulmar_ros.plant_node import PlantNode
@@ -16,13 +18,13 @@ from fulmar_ros.runtime import run_node
 from sim_nodes.camera.opengl import check_variable
 from sim_nodes.on_air import CanStand, OnAir
 
-BACKENDS = ("mujoco", "mock", JSBSIM)
+BACKENDS = ("mujoco", "mock", JSBSIM, BASILISK)
 
 
 def make_backend(robot: Robot, settings: PlantSettings) -> Backend:
     """Build the backend that the parameters name, on air where the robot has a bearing."""
     backend = _simulator(robot, settings)
-    return OnAir(backend, load_scenario(settings.scenario)) if robot.air_bearing else backend
+    return disturbed(OnAir(backend, load_scenario(settings.scenario)) if robot.air_bearing else backend)
 
 
 def _simulator(robot: Robot, settings: PlantSettings) -> CanStand:
@@ -42,6 +44,10 @@ def _simulator(robot: Robot, settings: PlantSettings) -> CanStand:
 
         model = jsbsim_model(robot, settings.backend)
         return JsbsimBackend.of(robot, task, load_scenario(settings.scenario), model)
+    if settings.backend == BASILISK:
+        from sim_nodes.basilisk_backend import BasiliskBackend
+
+        return BasiliskBackend.of(robot, task, load_scenario(settings.scenario))
     raise UnknownNameError("simulated backend", settings.backend, BACKENDS)
 
 

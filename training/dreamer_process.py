@@ -15,12 +15,13 @@ from typing import IO, Any
 
 from fulmar_core.config.errors import ConfigError, FulmarError
 from fulmar_core.config.module_path import PYTHONPATH, SAFE
+from fulmar_core.config.other_environment import environment_python, make_environment
 from training.dreamer_request import Request
 
 ENVIRONMENT = ".venv-dreamer"
 SHEEPRL = "0.8.4"  # whose networks `training.dreamer_network` copies
 LOG_FILE = "dreamer.log"  # what sheeprl writes, in the run folder
-INSTALL = "Run: make dreamer"
+INSTALL = make_environment(ENVIRONMENT)
 CHECKOUT = Path(__file__).resolve().parents[1]
 LOOK_S = 0.5  # how often it is seen whether the run shall end [s]
 
@@ -37,13 +38,9 @@ def dreamer_python() -> Path:
     Raises:
         ConfigError: The environment is missing, broken, or has another sheeprl.
     """
-    places = [folder / ENVIRONMENT / "bin" / "python" for folder in (CHECKOUT, Path.cwd())]
-    python = next((place for place in places if place.is_file()), None)
-    if python is None:
-        raise ConfigError(
-            f"DreamerV3 learns in an environment of its own, and {ENVIRONMENT}/bin/python is missing. {INSTALL}"
-        )
-    asked = [python, "-c", "from importlib.metadata import version; print(version('sheeprl'))"]
+    folders, purpose = (CHECKOUT, Path.cwd()), "DreamerV3 learns in an environment of its own"
+    python = environment_python(ENVIRONMENT, folders, purpose)
+    asked = [str(python), "-c", "from importlib.metadata import version; print(version('sheeprl'))"]
     try:
         done = subprocess.run(asked, capture_output=True, text=True, timeout=60, check=False)
     except (OSError, subprocess.TimeoutExpired) as error:

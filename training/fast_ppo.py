@@ -238,6 +238,7 @@ class FastMlp:
         if len(self._linear) != len(between) or not all(isinstance(layer, nn.Tanh) for layer in between):
             raise ValueError("each hidden layer must be linear, followed by tanh")
         self._head, self.precision = head, precision
+        self._in_one_pass = _in_one_pass(precision)
         self._hidden: list[torch.Tensor] = []
         self.refresh()
 
@@ -253,9 +254,14 @@ class FastMlp:
         """Outputs for a batch of inputs: shapes (batch, n) and (batch, m), float32."""
         self._hidden = [inputs.to(self.precision)]
         for weight, bias in self._weights:
-            self._hidden.append(_tanh_layer(self._hidden[-1], weight, bias))
+            self._hidden.append(self._layer(self._hidden[-1], weight, bias))
         self._features = self._hidden[-1].float()
         return torch.addmm(self._head.bias, self._features, self._head.weight.t())
+
+    def _layer(self, inputs: torch.Tensor, weight: torch.Tensor, bias: torch.Tensor) -> torch.Tensor:
+        if self._in_one_pass:
+            return torch.ops.mkldnn._linear_pointwise(inputs, weight, bias, "tanh", [], "")
+        return torch.addmm(bias, inputs, weight.t()).tanh_()
 
     @torch.no_grad()
     def backward(self, gradient: torch.Tensor) -> None:
@@ -281,8 +287,11 @@ def _leave(layer: nn.Linear, weight: torch.Tensor, bias: torch.Tensor) -> None:
     layer.weight.grad, layer.bias.grad = weight, bias
 
 
-def _tanh_layer(inputs: torch.Tensor, weight: torch.Tensor, bias: torch.Tensor) -> torch.Tensor:
-    """Product, sum and tanh in one pass of oneDNN where there is it: tanh alone costs twice the product."""
-    if torch.backends.mkldnn.is_available():
-        return torch.ops.mkldnn._linear_pointwise(inputs, weight, bias, "tanh", [], "")
-    return torch.addmm(bias, inputs, weight.t()).tanh_()
+def _in_one_pass(precision: torch.dtype) -> bool:
+    """Whether oneDNN computes product, sum and tanh together here: tanh alone costs twice the product.
+
+    It has bfloat16 from AVX-512 on alone.
+    """
+    if not torch.backends.mkldnn.is_available():
+        return False
+    return precision != torch.bfloat16 or bool(torch.ops.mkldnn._is_mkldnn_bf16_supported())

@@ -88,14 +88,14 @@ def recipe(policy: ShippedPolicy, settings: TrainingSettings) -> str:
 
 
 def _as_trained(robot: Robot, scenario: Scenario, *, sees: bool) -> Any:
-    """A robot as batches have it: on air, its supply full, and without what the scenario or a policy does not read."""
+    """A robot as batches have it: on air, its supply full, and without what neither scenario nor policy reads."""
     tank = robot.actuators.tank
     # A tank that is a part of the body empties in batches too.
     actuators: Any = robot.actuators if tank is None or tank.weighs else replace(robot.actuators, tank=None)
     camera = robot.sensors.camera if sees else None
     sensors = replace(robot.sensors, supply=None, fuel=None, camera=camera)
     spans = robot.morphology if scenario.body == "morphology" else None
-    same = replace(robot, air_bearing=False, usual_controller="", morphology=spans)
+    same = replace(robot, air_bearing=False, usual_controller="", morphology=spans, look=())
     found = _chosen(replace(same, actuators=actuators, sensors=sensors))
     del found["sensors"]["own"]
     return found

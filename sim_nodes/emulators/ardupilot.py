@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import math
-import os
 from typing import Any
-
-os.environ.setdefault("MAVLINK20", "1")  # pymavlink reads it when it is imported
 
 import numpy as np
 from pymavlink import mavutil
 
 from fulmar_core.simulation.backend import Sample
 from fulmar_core.states.rotation import rotate_inverse
+from sim_nodes.emulators.mavlink2 import Intervals, link_to
 
 OVERRIDE_S = 3.0  # RC_OVERRIDE_TIME: an override is forgotten after so long
 GROUND_S = 1.5  # FS_TIMEOUT with FS_GCS_ENABLE: without the host's heartbeat for so long it holds
@@ -36,10 +34,7 @@ class ArdupilotEmulator:
 
     def __init__(self, port: int, key: bytes = b"") -> None:
         """Switch it on; it speaks first, to a UDP port of this host, signed where it has a key."""
-        self._link: Any = mavutil.mavlink_connection(
-            f"udpout:127.0.0.1:{port}", source_system=1, source_component=1, robust_parsing=True
-        )
-        self.address = f"udpin:127.0.0.1:{port}"
+        self._link, self.address = link_to(port)
         if key:
             self._link.setup_signing(key, sign_outgoing=True)
         self.armed, self._mode = False, MANUAL
@@ -48,8 +43,7 @@ class ArdupilotEmulator:
         self._shares = np.zeros(2)
         self._override_s = self._ground_s = self._beaten_s = -math.inf
         self._began_s: float | None = None
-        self._period_s: dict[int, float] = {}
-        self._due_s: dict[int, float] = {}
+        self._intervals = Intervals()
         self.mute = False
 
     @property
@@ -75,7 +69,7 @@ class ArdupilotEmulator:
         if self.mute:
             return
         mav, mavlink = self._link.mav, mavutil.mavlink
-        if now_s - self._beaten_s >= self._period_s.get(mavlink.MAVLINK_MSG_ID_HEARTBEAT, HEARTBEAT_S):
+        if now_s - self._beaten_s >= self._intervals.period_s(mavlink.MAVLINK_MSG_ID_HEARTBEAT, HEARTBEAT_S):
             self._beaten_s = now_s
             armed = mavlink.MAV_MODE_FLAG_SAFETY_ARMED if self.armed else 0
             mode = armed | mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
@@ -92,33 +86,26 @@ class ArdupilotEmulator:
     def _send_what_is_due(self, sample: Sample, now_s: float, boot_ms: int) -> None:
         state, mav, mavlink = sample.odometry, self._link.mav, mavutil.mavlink
         assert state is not None
-        if self._is_due(mavlink.MAVLINK_MSG_ID_ATTITUDE, now_s):
+        if self._intervals.is_due(mavlink.MAVLINK_MSG_ID_ATTITUDE, now_s):
             up = rotate_inverse(state.quat_xyzw, np.array([0.0, 0.0, 1.0]))
             roll, pitch = math.atan2(up[1], up[2]), math.asin(max(-1.0, min(1.0, float(up[0]))))
             yaw = (0.5 * math.pi - float(state.yaw) + math.pi) % (2.0 * math.pi) - math.pi
             p, q, r = state.angular_velocity_in_body.tolist()
             mav.attitude_send(boot_ms, roll, pitch, yaw, p, -q, -r)
-        if self._is_due(mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED, now_s):
+        if self._intervals.is_due(mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED, now_s):
             (x, y, z), (vx, vy, vz) = state.position_in_world.tolist(), state.velocity_in_world.tolist()
             mav.local_position_ned_send(boot_ms, y, x, -z, vy, vx, -vz)
-        if self._is_due(mavlink.MAVLINK_MSG_ID_RC_CHANNELS, now_s):
+        if self._intervals.is_due(mavlink.MAVLINK_MSG_ID_RC_CHANNELS, now_s):
             left, right = self._shares if now_s - self._override_s <= OVERRIDE_S else (0.0, 0.0)
             steering, throttle = (
                 round(TRIM + SPAN * value) for value in (0.5 * (left - right), 0.5 * (left + right))
             )
             others = [0] * 13
             mav.rc_channels_send(boot_ms, 16, steering, TRIM, throttle, TRIM, TRIM, *others, 255)
-        if self._is_due(mavlink.MAVLINK_MSG_ID_RAW_IMU, now_s) and sample.imu is not None:
+        if self._intervals.is_due(mavlink.MAVLINK_MSG_ID_RAW_IMU, now_s) and sample.imu is not None:
             force = np.round(1e3 / G * sample.imu.specific_force * (1.0, -1.0, -1.0)).astype(int).tolist()
             turn = np.round(1e3 * sample.imu.angular_velocity * (1.0, -1.0, -1.0)).astype(int).tolist()
             mav.raw_imu_send(1000 * boot_ms, *force, *turn, 0, 0, 0)
-
-    def _is_due(self, kind: int, now_s: float) -> bool:
-        period_s = self._period_s.get(kind)
-        if period_s is None or now_s < self._due_s[kind]:
-            return False
-        self._due_s[kind] = max(self._due_s[kind] + period_s, now_s + 0.5 * period_s)
-        return True
 
     def _take(self, message: Any, now_s: float) -> None:
         kind = message.get_type()
@@ -144,8 +131,7 @@ class ArdupilotEmulator:
         elif message.command == mavlink.MAV_CMD_DO_SET_MODE:
             self._mode = int(message.param2)
         elif message.command == mavlink.MAV_CMD_SET_MESSAGE_INTERVAL:
-            self._period_s[int(message.param1)] = 1e-6 * message.param2
-            self._due_s[int(message.param1)] = now_s
+            self._intervals.ask(int(message.param1), 1e-6 * message.param2, now_s)
         else:
             result = mavlink.MAV_RESULT_UNSUPPORTED
         self._link.mav.command_ack_send(message.command, result)

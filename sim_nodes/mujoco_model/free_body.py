@@ -7,6 +7,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from fulmar_core.dynamics.rigid_body import matrix_of
 from fulmar_core.states.spatial import SpatialState
 
 
@@ -32,5 +33,4 @@ class FreeBody:
 
 def tensor_of(world: Any) -> np.ndarray:
     """Inertia tensor of the body of a `SpatialWorld` without a batch axis, shape (3, 3) [kg·m²]."""
-    xx, yy, zz, xy, xz, yz = np.asarray(world.inertia, dtype=float)
-    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    return matrix_of(world.inertia)

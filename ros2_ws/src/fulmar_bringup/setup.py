@@ -16,7 +16,23 @@ setup(
     maintainer=ABOUT.findtext("maintainer"),
     maintainer_email=ABOUT.find("maintainer").get("email"),
     packages=find_packages(include=[NAME, f"{NAME}.*"]),
-    package_data={NAME: ["tf2_msgs/*", "tf2_msgs/msg/*", "stars/*"]},
+    package_data={
+        NAME: [
+            *(
+                f"{package}/*"
+                for package in (
+                    "tf2_msgs",
+                    "nav2_msgs",
+                    "simulation_interfaces",
+                    "control_msgs",
+                    "px4_msgs",
+                    "stars",
+                )
+            ),
+            *(f"*_msgs/{kind}/*" for kind in ("msg", "action")),
+            *(f"simulation_interfaces/{kind}/*" for kind in ("msg", "srv", "action")),
+        ]
+    },
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),

@@ -15,7 +15,7 @@ setup(
     maintainer=ABOUT.findtext("maintainer"),
     maintainer_email=ABOUT.find("maintainer").get("email"),
     packages=find_packages(include=[NAME, f"{NAME}.*"]),
-    package_data={NAME: ["faults/*.c"]},
+    package_data={NAME: ["faults/*.c", "new_parts/templates/*.txt"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),

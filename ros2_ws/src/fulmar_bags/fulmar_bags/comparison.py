@@ -14,7 +14,15 @@ from fulmar_bags.figures import provenance
 from fulmar_bags.gathered import Topic
 from fulmar_bags.tables import Row, columns, rows
 from fulmar_core.config.errors import ConfigError, UnknownNameError
-from fulmar_core.robots.topics import CLOCK, DIAGNOSTICS, METADATA, STATUS
+from fulmar_core.robots.topics import (
+    CLOCK,
+    DIAGNOSTICS,
+    METADATA,
+    OPERATOR_ACTION,
+    ROBOT_INFO,
+    STATUS,
+    SWAP_RESULT,
+)
 from fulmar_core.wires.robot_name import Frames
 
 
@@ -141,7 +149,7 @@ def read_tolerances(texts: Sequence[str], fields: Sequence[str]) -> Mapping[str,
 
 
 # About the computer and the single run, not about what the robot did.
-OF_THE_MACHINE = (CLOCK, DIAGNOSTICS, STATUS, METADATA)
+OF_THE_MACHINE = (CLOCK, DIAGNOSTICS, STATUS, METADATA, OPERATOR_ACTION, ROBOT_INFO, SWAP_RESULT)
 ORIGIN = (
     "robot", "name", "task", "controller", "policy", "scenario", "seed", "control_hz", "git_revision",
     "controller_sha256",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +13,15 @@ from fulmar_bags.gathered import Gathered, Topic, json_object
 from fulmar_bags.mcap_records import custom_text, files_of, left_out_files, missing_files, storage_of
 from fulmar_bags.metadata import metadata_refusal, read_information
 from fulmar_bags.ring import FAULTS
+from fulmar_bags.selection import Selection
 from fulmar_bags.writer import RUN_RECORD
 from fulmar_bags.writer_thread import RECORDING
 from fulmar_core.config.errors import BagError, UnknownNameError
+from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.robots.topics import ODOMETRY, TRUTH, WIRES, Wire
 from fulmar_core.wires.robot_name import PLAIN, Frames, namespace_of
+
+ROBOTS = "robots"  # key of a fleet's run record: the run record of each robot by its name
 
 
 @dataclass(frozen=True)
@@ -42,6 +46,31 @@ class Bag:
     attachments: dict[str, bytes]
     warnings: tuple[str, ...]  # what could not be read
     reading: BagReading = AS_IT_IS  # what was said about it
+
+    @property
+    def robots(self) -> tuple[str, ...]:
+        """Names of the robots of a fleet; empty where the bag is of one robot."""
+        every = (self.info or {}).get(ROBOTS)
+        return tuple(every) if isinstance(every, dict) else ()
+
+    def of_robot(self, name: str) -> Bag:
+        """The bag of a fleet as that of one robot: its run record, its attachments, and no topic of another robot.
+
+        Raises:
+            ConfigError: The fleet has no robot of this name.
+        """
+        if name not in self.robots:
+            raise UnknownNameError(f"robot in {self.path}:", name, self.robots)
+        assert self.info is not None
+        shared = {key: self.info[key] for key in ("fleet", "least_distance") if key in self.info}
+        own = {
+            key.removeprefix(f"{name}/"): data for key, data in self.attachments.items() if _is_of(key, name)
+        }
+        others = tuple(f"{namespace_of(other)}/" for other in self.robots if other != name)
+        topics = {topic: found for topic, found in self.topics.items() if not topic.startswith(others)}
+        reading = replace(self.reading, robot=None)
+        info = {**shared, **self.info[ROBOTS][name]}
+        return replace(self, info=info, topics=topics, attachments=own, reading=reading)
 
     @property
     def size(self) -> int:
@@ -137,6 +166,11 @@ class Bag:
         )
 
 
+def _is_of(attachment: str, robot: str) -> bool:
+    """Whether an attachment of a fleet's bag is that of a robot, or of all."""
+    return "/" not in attachment or attachment.startswith(f"{robot}/")
+
+
 def _space_of(topic: Topic) -> str:
     """Name of the robot that a topic of odometry is of; empty for any other topic."""
     return topic.name.removesuffix(ODOMETRY.name).strip("/") if is_of_wire(topic.name, ODOMETRY) else ""
@@ -148,23 +182,26 @@ def is_of_wire(topic: str, wire: Wire) -> bool:
     return bool(ends) and max(ends, key=len) == wire.name
 
 
-def open_bag(path: Path, reading: BagReading = AS_IT_IS) -> Bag:
+def open_bag(path: Path, reading: BagReading = AS_IT_IS, selection: Selection | None = None) -> Bag:
     """Read a bag.
 
     Args:
         path: Bag folder, or a file in it.
         reading: What the bag does not say itself.
+        selection: Topics that are read; by default all.
 
     Returns:
         The bag. What is damaged is left out and named in `warnings`.
 
     Raises:
         BagError: There is no bag, or nothing of it can be read.
-        ConfigError: It has not the topics of `reading`.
+        ConfigError: It has not the topics of `reading`, or no such robot.
     """
     path = Path(path)
     files = files_of(path)
-    gathered = Gathered()
+    selection = selection or Selection()
+    selection.begin([file.stat().st_size for file in files])
+    gathered = Gathered(selection)
     problems: list[str] = []
     for file in files:
         try:
@@ -182,9 +219,9 @@ def open_bag(path: Path, reading: BagReading = AS_IT_IS) -> Bag:
     problems += [refusal] if (refusal := metadata_refusal(path if path.is_dir() else path.parent)) else []
     problems += [f"{name}: the file is missing; metadata.yaml lists it." for name in missing_files(path)]
     problems += [f"{name} is left out: {why}." for name, why in left_out_files(path, files)]
-    problems += _fewer_than_listed(path, gathered) if not problems else []
+    problems += _fewer_than_listed(path, gathered) if selection.is_whole and not problems else []
     reading.check(path, {topic.name: topic.type for topic in gathered.topics.values()})
-    return Bag(
+    found = Bag(
         reading=reading,
         path=path,
         storage=storage_of(files[0]) or "",
@@ -196,6 +233,11 @@ def open_bag(path: Path, reading: BagReading = AS_IT_IS) -> Bag:
         attachments=gathered.attachments,
         warnings=tuple(problems + gathered.warnings),
     )
+    if reading.robot and found.robots:
+        return found.of_robot(reading.robot)
+    if reading.robot:
+        load_robot(reading.robot)
+    return found
 
 
 def _fewer_than_listed(path: Path, gathered: Gathered) -> list[str]:

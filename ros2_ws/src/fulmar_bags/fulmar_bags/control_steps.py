@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 
 from fulmar_bags.contents import Bag
+from fulmar_bags.controller_changes import controller_changes
 from fulmar_bags.decode import NS, Odometries, Vectors, by_stamp, odometries
-from fulmar_bags.gathered import Topic, json_object
+from fulmar_bags.gathered import Topic
 from fulmar_bags.reading_messages import reader_of
 from fulmar_bags.recorded_estop import estop_messages
 from fulmar_bags.wire_reader import ABSENT, Received, WireReader
@@ -25,9 +26,8 @@ from fulmar_core.robots.topics import (
     ACTION,
     ACTUATORS_STATE,
     AIR_BEARING,
-    METADATA,
+    NEIGHBOURS,
     OBSERVATION,
-    SWAP,
     VELOCITY_COMMAND,
     command_wire,
 )
@@ -35,6 +35,7 @@ from fulmar_core.safety.geofence import NO_AREA
 from fulmar_core.tasks import Task, load_recorded_task, load_task
 from fulmar_core.tasks.goal import PoseTuple
 from fulmar_core.tasks.goal_numbers import GOAL, goes_to_places, whole_pose
+from fulmar_core.wires.neighbours import motions_in, readings_of
 from fulmar_core.wires.reading import Reading
 from fulmar_core.wires.robot_name import Frames
 
@@ -62,7 +63,7 @@ class ControlSteps:
     presses: tuple[Received, ...]  # of the e-stop, see `estop_messages`
     bearing: tuple[Received, ...]  # the air bearing: true is on; empty where nothing is recorded of one
     applied: Vectors  # what the actuators did from each stamp on; empty where that is not recorded
-    changes: tuple[Received, ...]  # folder and SHA-256 of policies that took over
+    changes: tuple[Received, ...]  # `ControllerChange`s
     warnings: tuple[str, ...]
     reader: WireReader
 
@@ -84,6 +85,29 @@ class ControlSteps:
             return (None, found) if isinstance(found, str) else (found, "")
 
         return self.reader.received(kind.wire, value_of)
+
+    def neighbours(self) -> tuple[Received, ...]:
+        """Where the robots of the fleet were that a guard keeps apart from this one, as `readings_of` gives it."""
+        names = [other.name for other in self.settings.others]
+
+        def value_of(message: Any, _frames: Frames) -> tuple[Any, str]:
+            motions = motions_in(message)
+            found = None if motions is None else readings_of(motions, names)
+            return found, "" if found is not None else "a robot is missing"
+
+        return self.reader.received(NEIGHBOURS, value_of) if names else ()
+
+    def changes_by_step(self) -> dict[int, list[Received]]:
+        """`changes` by the step from which on each controls."""
+        found: dict[int, list[Received]] = defaultdict(list)
+        for each in self.changes:
+            step = int(np.searchsorted(self.log_ns, each.log_ns))
+            same = np.flatnonzero(self.stamp_ns == each.stamp_ns) if each.stamp_ns else np.zeros(0, int)
+            if len(same):  # by the clock, one measurement may be answered twice
+                later = [index for index in same if self.log_ns[index] >= each.log_ns]
+                step = int(later[0] if later else same[0])
+            found[step].append(each)
+        return found
 
     def before(self, received: tuple[Received, ...]) -> dict[int, list[Received]]:
         """Messages by the step that they came before; the number of steps for those that came after all of them.
@@ -175,7 +199,7 @@ def control_steps_of(
         presses=estop_messages(reader),
         bearing=reader.received(AIR_BEARING),
         applied=_checked(reader.vectors(ACTUATORS_STATE), names, ACTUATORS_STATE.name, reader.warnings),
-        changes=_changes(reader),
+        changes=controller_changes(reader),
         warnings=tuple(reader.warnings),
         reader=reader,
     )
@@ -209,27 +233,14 @@ def _settings(
             estop=bool(guards.get("estop")),
             max_run_time_s=max_run_time_s,
             area=area,
+            guard=str(guards.get("guard") or ""),
+            neighbours=tuple(str(text) for text in info.get("neighbours") or ("",)),
+            formation=str(info.get("formation") or ""),
         )
     except (AttributeError, TypeError, ValueError) as error:
         raise BagError(
             f"the run record of the bag has invalid settings: {str(error).rstrip('.')}."
         ) from error
-
-
-def _changes(reader: WireReader) -> tuple[Received, ...]:
-    """Folder and SHA-256 of each policy that took over on request, when it did; requests that failed are left out."""
-    requests = reader.received(SWAP)
-    reports = [(each.log_ns, json_object(each.value) or {}) for each in reader.received(METADATA)]
-    ends = [each.log_ns for each in requests[1:]] + [1 << 63]
-    found = []
-    for request, end in zip(requests, ends, strict=False):
-        new = [
-            (log, text) for log, text in reports if request.log_ns <= log < end and not text.get("fallback")
-        ]
-        if new:
-            log, text = new[0]
-            found.append(Received(log, 0, (request.value, str(text.get("sha256") or ""))))
-    return tuple(found)
 
 
 def _name(bag: Bag, key: str, given: str | None) -> str:

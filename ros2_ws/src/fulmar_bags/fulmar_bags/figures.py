@@ -41,7 +41,8 @@ def describe(bag: Bag) -> dict[str, Any]:
         "topics": topics,
         "silent_topics": [name for name, topic in bag.topics.items() if not len(topic)],
         "faults": [asdict(fault) for fault in bag.faults],
-        "fuel": fuel_of(bag),
+        "fuel": None if bag.robots else fuel_of(bag),
+        "robots": {name: provenance(bag.of_robot(name)) for name in bag.robots},
         "provenance": provenance(bag),
         "damage": list(bag.warnings),
     }

@@ -17,6 +17,7 @@ from fulmar_bags.mcap_records import ZSTD_MAGIC, McapFile, PlacedMessage, storag
 from fulmar_bags.message_types import unreadable
 from fulmar_bags.ring import FAULTS
 from fulmar_bags.ros1_records import Ros1File, converter
+from fulmar_bags.selection import Selection
 from fulmar_bags.sqlite_records import SqliteFile
 from fulmar_bags.stored_bytes import PIECE, Payloads, Room, Source, picked
 from fulmar_bags.writer import RUN_KEY, RUN_RECORD
@@ -60,9 +61,10 @@ class Topic:
 class Gathered:
     """Content of the files of one bag, together."""
 
-    def __init__(self) -> None:
-        """Begin without a file."""
+    def __init__(self, selection: Selection | None = None) -> None:
+        """Begin without a file; of each, topics that the selection does not want are left out."""
         self.topics: dict[str, Topic] = {}
+        self._selection = selection or Selection()
         self.info: dict[str, Any] | None = None
         self.faults = ""  # JSON
         self.attachments: dict[str, bytes] = {}
@@ -79,12 +81,16 @@ class Gathered:
         Raises:
             BagError: Nothing of it can be read.
         """
-        reader: Any = _READERS[storage_of(file) or ""](file, self.warnings)
+        selection = self._selection
+        selection.begin_file()
+        reader: Any = _READERS[storage_of(file) or ""](file, self.warnings, selection)
         schemas: dict[int, str] = {}
         channels: dict[int, tuple[Topic, Source, Callable[[bytes], bytes]]] = {}
         lost: Counter[str] = Counter()
         for record in reader.records(self.warnings):
             if isinstance(record, PlacedMessage):
+                if record.channel_id in selection.skipped:
+                    continue
                 channel = channels.get(record.channel_id)
                 if channel is None:
                     lost["messages of channels that are not announced"] += 1
@@ -92,7 +98,11 @@ class Gathered:
                 self._add(record, *channel)
             elif isinstance(record, Schema):
                 schemas[record.id] = record.name
+                selection.see(record)
             elif isinstance(record, Channel):
+                selection.see(record)
+                if record.id in selection.skipped:
+                    continue
                 # The index at the end of a file announces every channel once more.
                 known = channels.get(record.id)
                 topic = self._topic(record.topic, schemas.get(record.schema_id, ""))
@@ -127,7 +137,8 @@ class Gathered:
         """The topic of a name; one with another type gets a name with its type."""
         for key in (name, f"{name} ({kind})"):
             if key not in self.topics:
-                self.topics[key] = Topic(name, kind, Payloads(self._room), array("q"), array("q"), array("L"))
+                data = [] if kind in self._selection.kept else Payloads(self._room)
+                self.topics[key] = Topic(name, kind, data, array("q"), array("q"), array("L"))
             if self.topics[key].type == kind:
                 break
         return self.topics[key]
@@ -136,14 +147,19 @@ class Gathered:
         self, record: PlacedMessage, topic: Topic, source: Source, convert: Callable[[bytes], bytes]
     ) -> None:
         data = convert(record.data)
-        assert isinstance(topic.data, Payloads)
-        topic.data.append(data, source, record.outer, record.at, len(record.data))
+        if isinstance(topic.data, list):
+            topic.data.append(data)
+        else:
+            assert isinstance(topic.data, Payloads)
+            topic.data.append(data, source, record.outer, record.at, len(record.data))
         for column, value in (
             (topic.log_ns, record.log_time),
             (topic.publish_ns, record.publish_time or record.log_time),
             (topic.sequence, record.sequence),
         ):
             column.append(min(value, _LATEST))  # type: ignore[attr-defined]
+        if not self._selection.checks:
+            return
         self._unchecked.setdefault(id(topic), (topic, []))[1].append(data)
         self._waiting += len(data)
         if self._waiting > 4 * PIECE:
@@ -165,10 +181,10 @@ class Gathered:
 
 
 _LATEST = 2**63 - 1
-_READERS: dict[str, Callable[[Path, list[str]], Any]] = {
-    "mcap": lambda path, _: McapFile(path),
-    "sqlite3": SqliteFile,
-    "rosbag1": lambda path, _: Ros1File(path),
+_READERS: dict[str, Callable[[Path, list[str], Selection], Any]] = {
+    "mcap": lambda path, _, selection: McapFile(path, selection),
+    "sqlite3": lambda path, warnings, _: SqliteFile(path, warnings),
+    "rosbag1": lambda path, _warnings, _: Ros1File(path),
 }
 
 

@@ -19,6 +19,7 @@ class FinishedPart:
     name: str
     span: BagSpan
     size: int  # on disk [bytes]
+    written_ns: int = 0  # when it was last written, since the epoch [ns]
 
 
 @dataclass(frozen=True)
@@ -32,8 +33,11 @@ class InterruptedBag:
 
     @property
     def last_ns(self) -> int:
-        """Log time of its last message, since the epoch; 0 without one [ns]."""
-        return max((part.span.end_ns for part in self.parts), default=0)
+        """When something was last recorded, since the epoch; 0 without a file [ns].
+
+        The log time of the last message, or the last write to a file that `metadata.yaml` does not count yet.
+        """
+        return max((part.span.end_ns or part.written_ns for part in self.parts), default=0)
 
 
 def interrupted_bag(directory: Path) -> InterruptedBag:
@@ -52,7 +56,9 @@ def interrupted_bag(directory: Path) -> InterruptedBag:
         for each in _dicts(information.get("topics_with_message_count"))
     }
     parts = (
-        FinishedPart(file.name, spans.get(file.name, BagSpan(0, 0, 0)), file.stat().st_size)
+        FinishedPart(
+            file.name, spans.get(file.name, BagSpan(0, 0, 0)), file.stat().st_size, file.stat().st_mtime_ns
+        )
         for file in files
         if file.suffix != BEGUN
     )

@@ -25,6 +25,7 @@ from mcap.writer import MCAP0_MAGIC
 
 from fulmar_bags.mcap_file import BEGUN
 from fulmar_bags.metadata import read_custom, read_information
+from fulmar_bags.selection import Selection
 from fulmar_bags.stored_bytes import PACKED, WHOLE, FileBytes, Piece, skip, unpack_into, unpacks_to
 from fulmar_core.config.errors import BagError
 
@@ -110,13 +111,14 @@ def read_records(path: Path, damage: list[str]) -> Iterator[Record]:
 class McapFile:
     """An MCAP file, read from front to back and piece by piece; its messages also by their places."""
 
-    def __init__(self, path: Path) -> None:
-        """Look at a file.
+    def __init__(self, path: Path, selection: Selection | None = None) -> None:
+        """Look at a file, of which `selection` may leave topics out.
 
         Raises:
             BagError: It cannot be opened.
         """
         self.path, self._bytes = path, FileBytes(path)
+        self._selection = selection or Selection()
         self._unpacked: tuple[int, bytes] = (WHOLE, b"")  # the chunk that was looked at last
         # Contents of chunks that are too large for memory, in one file without a name, and where each begins there.
         self._spool: IO[bytes] | None = None
@@ -208,9 +210,10 @@ class McapFile:
         chunk.data = stream.read(inner)
         if len(chunk.data) < inner:
             return False
+        self._selection.reached(start)
         # What is not packed lies in the file itself, at the end of its record.
         place = (start, 0) if chunk.compression else (WHOLE, start + _HEAD.size + length - inner)
-        yield from _parse(Opcode.CHUNK, chunk, where, damage, place)
+        yield from _parse(Opcode.CHUNK, chunk, where, damage, place, self._selection)
         return True
 
     def _large_chunk(
@@ -259,12 +262,17 @@ def _attachment(body: bytes) -> Attachment:
 
 
 def _parse(
-    opcode: int, body: bytes | Chunk, where: str, damage: list[str], place: tuple[int, int]
+    opcode: int,
+    body: bytes | Chunk,
+    where: str,
+    damage: list[str],
+    place: tuple[int, int],
+    selection: Selection | None = None,
 ) -> list[Any]:
     """The records of one; `place` is that of a message's content, or of the first byte in a chunk."""
     try:
         if isinstance(body, Chunk):
-            return _records_of(body, *place)
+            return _records_of(body, *place, selection or Selection())
         record = _READERS[opcode](ReadDataStream(BytesIO(body)), len(body))
         return (
             [PlacedMessage(**vars(record), outer=place[0], at=place[1])]
@@ -288,10 +296,10 @@ def _content(chunk: Chunk) -> bytes:
     return bytes(stream.read(size))
 
 
-def _records_of(chunk: Chunk, outer: int, begin: int) -> list[Any]:
+def _records_of(chunk: Chunk, outer: int, begin: int, selection: Selection) -> list[Any]:
     """What `mcap.stream_reader.breakup_chunk` gives, several times as fast: most of a bag are messages."""
     data = _content(chunk)
-    size = len(data)
+    size, skipped = len(data), selection.skipped
     records: list[Any] = []
     offset = 0
     while offset < size:
@@ -301,12 +309,15 @@ def _records_of(chunk: Chunk, outer: int, begin: int) -> list[Any]:
             raise ValueError(f"a record of {length} bytes does not fit.")
         if opcode == Opcode.MESSAGE:
             channel, sequence, log_ns, publish_ns = _MESSAGE.unpack_from(data, start)
+            if channel in skipped:
+                continue
             at = start + _MESSAGE.size
             records.append(
                 PlacedMessage(channel, log_ns, data[at:offset], publish_ns, sequence, outer, begin + at)
             )
         elif opcode in _READERS:
             records.append(_READERS[opcode](ReadDataStream(BytesIO(data[start:offset])), length))
+            selection.see(records[-1])
     return records
 
 

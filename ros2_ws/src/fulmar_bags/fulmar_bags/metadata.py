@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import functools
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -82,7 +83,16 @@ def write_metadata(
 
 
 def read_information(directory: Path) -> dict[str, Any]:
-    """Content of the `metadata.yaml` of a folder, empty where there is none that can be read."""
+    """Content of the `metadata.yaml` of a folder, empty where there is none that can be read; not to be changed."""
+    try:
+        said = (directory / METADATA_FILE).stat()
+    except OSError:
+        return {}
+    return _information(directory, said.st_mtime_ns, said.st_size)
+
+
+@functools.lru_cache(maxsize=4)  # of one bag it is asked several times
+def _information(directory: Path, _changed_ns: int, _size: int) -> dict[str, Any]:
     try:
         found = yaml_text.load(read_bounded(directory / METADATA_FILE, RECORD_BYTES).decode())[
             "rosbag2_bagfile_information"

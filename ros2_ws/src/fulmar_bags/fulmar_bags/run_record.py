@@ -11,6 +11,7 @@ import numpy as np
 from fulmar_bags.bag_reading import AS_IT_IS, BagReading
 from fulmar_bags.contents import Bag, open_bag
 from fulmar_bags.decode import NS, Odometries, Vectors, odometries
+from fulmar_bags.envelope_events import envelope_events
 from fulmar_bags.figures import controller_of
 from fulmar_bags.frame_messages import FRAME_TYPES
 from fulmar_bags.gathered import Topic, json_object
@@ -43,6 +44,7 @@ from fulmar_core.robots.topics import (
     TRUTH,
     VELOCITY_COMMAND,
 )
+from fulmar_core.safety.envelope.event import Event
 from fulmar_core.states.rotation import rotate
 from fulmar_core.states.state import RigidBodyState
 from fulmar_core.tasks import Task, load_recorded_task
@@ -163,6 +165,7 @@ class RunRecord:
     air_data: Series = NO_SERIES  # of an aircraft: airspeed [m/s], angles [rad], height [m]
     gyroscope_s: tuple[float, ...] = ()  # stamps of a satellite's inertial unit [s]
     inertia: Inertias = NO_INERTIAS  # that estimators published
+    envelope: tuple[Event, ...] = ()  # trips and returns of the envelope guard
     actions: Series = NO_SERIES  # of a controller of the user's own, before limits
     images: tuple[Topic, ...] = ()  # topics of cameras; what is in them is read when it is looked at
 
@@ -189,13 +192,19 @@ class RunRecord:
         return next(mine, None)
 
 
-def read_run(path: Path) -> RunRecord:
+def read_run(path: Path, robot: str | None = None) -> RunRecord:
     """Read one run from a bag folder, or a file in it; damaged and missing parts are named in its `warnings`.
 
+    Args:
+        path: Bag folder, or a file in it.
+        robot: Name of the robot, in the bag of a fleet.
+
     Raises:
-        BagError: There is no bag, it is empty, or Fulmar did not record it.
+        BagError: There is no bag, it is empty, Fulmar did not record it, or it is a fleet's and `robot` is not given.
+        ConfigError: The fleet has no such robot.
     """
-    bag = open_bag(Path(path))
+    bag = open_bag(Path(path), BagReading(robot=robot))
+    check_one_robot(bag)
     if bag.info is None:
         found = ", ".join(list(bag.topics)[:3]) or "none"
         raise BagError(
@@ -217,7 +226,20 @@ def read_any_run(path: Path, reading: BagReading = AS_IT_IS) -> RunRecord:
         ConfigError: It has not the topics of `reading`.
     """
     bag = open_bag(Path(path), reading)
-    return _record(bag, {**_named(bag), **reading.named})
+    check_one_robot(bag)
+    return _record(bag, {**_named(bag), **bag.reading.named})
+
+
+def check_one_robot(bag: Bag) -> None:
+    """Refuse the bag of a fleet where one of its robots has to be chosen.
+
+    Raises:
+        BagError: With their names.
+    """
+    if bag.robots:
+        raise BagError(
+            f"{bag.path}: is the bag of a fleet. Choose a robot: --robot {' or '.join(bag.robots)}."
+        )
 
 
 def _named(bag: Bag) -> dict[str, Any]:
@@ -260,6 +282,7 @@ def _record(bag: Bag, info: dict[str, Any]) -> RunRecord:
         wheels=series(reader, SENSOR_WIRES["wheels"], "velocity"),
         air_data=series(reader, SENSOR_WIRES["air_data"], "position"),
         gyroscope_s=gyroscope_s(reader),
+        envelope=envelope_events(bag),
         inertia=inertias(reader),
         actions=series(reader, ACTION, "effort") if is_own(str(info.get("controller", ""))) else NO_SERIES,
         images=tuple(topic for topic in bag.topics.values() if topic.type in FRAME_TYPES and len(topic)),

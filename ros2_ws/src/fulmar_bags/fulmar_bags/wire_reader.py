@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,8 +23,10 @@ from fulmar_bags.decode import (
 from fulmar_bags.gathered import Topic
 from fulmar_bags.message_reader import goal_of, obstacles_of, thing_of
 from fulmar_core.robots.topics import GOAL_WIRES, OBSTACLES, VELOCITY_COMMAND, Wire, goal_wires
-from fulmar_core.tasks import Task
 from fulmar_core.wires.robot_name import Frames
+
+if TYPE_CHECKING:  # the tasks take as long to import as everything else here
+    from fulmar_core.tasks import Task
 
 ABSENT = -1  # index of what is not there
 

@@ -90,6 +90,40 @@ FLIGHTS = Row(
     measures="flights",
 )  # fmt: skip
 
+GUARD = Row(
+    "guard",
+    "fulmar_benchmarks.guard.campaign:GuardRuns",
+    """Let defective controllers drive robots in an area or above the water, with and without the envelope guard.
+
+    Starts and goals lie within 76 % of an area of 2.5 m to each side of the middle, 6 m of boats, whose goals are at
+    most 5 m away. The body differs from its file as one that was identified does: mass by 5 %, inertia by 18 %, thrust
+    down to 90 %, pushes of 10 % of its force and 5 % of its torque, commands late by up to 60 ms. Mass, inertia and
+    drag of boats, wheels and wings lie in the spans of their files; aircraft hold 1 m above the water, without pushes,
+    commands late by up to 20 ms. Each run lasts 60 s, of aircraft 20 s. `defects`: an adversary that drives out, a
+    drift, a reversed sign, a stuck actuator, an untrained network, and none. `beliefs`: the adversary where the body
+    differs by more than the guard believes. `mujoco`: the defects there, with half of the runs; both of robots that
+    float. `decision`: processor time of one for one robot. At most 2 % of the runs of a defect may leave, none by more
+    than 0.3 m.
+
+    Try:
+
+    fulmar benchmark guard --parts defects --robots floating_platform --runs 50
+    """,
+    (
+        Selector("robots", "R,...", "Robots with an envelope guard and a policy: for poses, positions or a height.",
+                 "floating_platform,spacecraft_16,kingfisher,turtlebot2,airship_v7", family="robot",
+                 known="configs/robots"),
+        Selector("parts", "P,...", "Out of defects, beliefs, mujoco and decision, or all.", "all",
+                 family="part", known="fulmar_benchmarks.guard.campaign:PARTS"),
+        Selector("defects", "D,...", "Out of none, adversary, drift, sign, stuck and untrained, or all.", "all",
+                 family="defect", known="fulmar_benchmarks.guard.defects:DEFECTS"),
+        Selector("controller", "C", "What has the defect: policy or a law.", "policy"),
+        Selector("runs", "N", "Runs of each defect.", 200, int, 1, names=("--runs", "--episodes")),
+    ),
+    needs=lambda choice: (*NEEDED.get(choice.controller, ()), *(("mujoco",) if "mujoco" in choice.parts else ())),
+    measures="runs",
+)  # fmt: skip
+
 LATENCY = Row(
     "latency",
     "fulmar_benchmarks.latency.cells:Latency",
@@ -110,10 +144,41 @@ LATENCY = Row(
                  numbers=(5.0, 500.0)),
         Selector("seconds", "S", "Seconds of each measurement.", 6.0, float, 1.0),
         Selector("executors", "E,...", "Executors of the nodes: events, default.", "events,default",
-                 family="executor", known="fulmar_benchmarks.latency.cells:EXECUTORS", as_given=True),
+                 family="executor", known="fulmar_benchmarks.latency:EXECUTORS", as_given=True),
     ),
     needs=lambda choice: DEPLOYED,
     shared=("ray", "resume", "check"),
+    always_checked=True,
+    timed=True,
+)  # fmt: skip
+
+CONSOLE = Row(
+    "console",
+    "fulmar_benchmarks.console.campaign:Console",
+    """Measure the operator's page in a real browser: cost, first image, latency, e-stop and bags.
+
+    server: processor time and bytes a second of a console that receives ten robots from a bag at 50 Hz over ROS and
+    serves one page. first: from `fulmar up --console` to the first image, in a browser that is there. latency: the
+    control loop's p99 with a client that receives everything beside without, in turn. stop: clicks on the e-stop while
+    a valve is open, until `actuators/state` stays zero. unconfirmed: clicks while the console's process stands still.
+    bag: until five minutes of three robots are open, and requests while scrubbing. Nothing else should run meanwhile.
+
+    Try:
+
+    fulmar benchmark console --parts server,first
+
+    fulmar benchmark console --parts stop --clicks 5
+    """,
+    (
+        Selector("parts", "P,...", "Out of server, first, latency, stop, unconfirmed and bag, or all.", "all",
+                 family="part", known="fulmar_benchmarks.console.campaign:PARTS"),
+        Selector("clicks", "N", "On the e-stop, each way.", 50, int, 1),
+        Selector("robots", "N", "That the server shows.", 10, int, 1),
+        Selector("rounds", "N", "Starts for the first image.", 5, int, 1),
+        Selector("pairs", "N", "Of runs for the latency.", 5, int, 1),
+    ),
+    needs=lambda choice: (*DEPLOYED, "websockets", "playwright"),
+    shared=("resume", "check"),
     always_checked=True,
     timed=True,
 )  # fmt: skip

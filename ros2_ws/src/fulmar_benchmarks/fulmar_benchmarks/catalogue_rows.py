@@ -5,10 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 from fulmar_benchmarks.catalogue_own import (
+    CONSOLE,
     DESCENT,
     ENDURANCE,
     EVERY,
     FLIGHTS,
+    GUARD,
     LATENCY,
     PACE,
     POLICY,
@@ -270,12 +272,14 @@ ROBORAN = Row(
 ROWS = (
     EVERY,
     AVIST,
+    CONSOLE,
     DESCENT,
     DRIFT,
     ENDURANCE,
     EVENTS,
     FALCON,
     FLIGHTS,
+    GUARD,
     INERTIA,
     LATENCY,
     PACE,

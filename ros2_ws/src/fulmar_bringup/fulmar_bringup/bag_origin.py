@@ -89,6 +89,7 @@ def effective_system(plan: RunPlan) -> System:
         guards=plan.guards,
         recorder=plan.recording,
         camera=CAMERA in plan.extras,
+        origin=plan.origin,
     )
 
 

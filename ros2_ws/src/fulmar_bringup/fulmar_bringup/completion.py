@@ -155,7 +155,8 @@ def _as_its_system(plan: RunPlan) -> RunPlan:
         nodes = own_nodes(replace(system, name=plan.name)) if system is not None and same else ()
         seen = (CAMERA,) if system is not None and same and system.camera else ()
         extras = tuple(dict.fromkeys((*plan.extras, *seen)))
-        plan = replace(plan, recording=recording, nodes=nodes, extras=extras)
+        origin = plan.origin or (system.origin if system is not None and same else ())
+        plan = replace(plan, recording=recording, nodes=nodes, extras=extras, origin=origin)
     if not plan.recording_mode:
         return plan
     if plan.recording_mode not in MODES:

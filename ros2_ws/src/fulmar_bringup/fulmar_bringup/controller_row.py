@@ -9,9 +9,11 @@ from fulmar_bringup.lockstep_chain import estimates_odometry
 from fulmar_bringup.node_row import NodeRow, robot_spec
 from fulmar_bringup.node_spec import CONTROLLER, NodeSpec, Parameter, given
 from fulmar_bringup.run_plan import RunPlan
+from fulmar_core.loop.envelope import watches_envelope
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.robots.topics import (
     ACTION,
+    ENVELOPE_STATE,
     METADATA,
     OBSERVATION,
     OBSTACLES,
@@ -39,11 +41,11 @@ def controller_spec(plan: RunPlan) -> NodeSpec:
         "goals_streamed": bool(plan.goals),
     }
     guards, entry = plan.guards, controller_entry(plan.controller)
-    if entry.draws:
-        parameters["seed"] = plan.seed
+    # Seed and keys also for controllers that take over on request.
+    keys = "" if guards.trusted_keys is None else str(Path(guards.trusted_keys).absolute())
+    parameters |= given(seed=plan.seed, trusted_keys=keys)
     if entry.runs_bundle:
-        keys = "" if guards.trusted_keys is None else str(Path(guards.trusted_keys).absolute())
-        parameters |= given(policy=plan.policy, fallback=guards.fallback, trusted_keys=keys)
+        parameters |= given(policy=plan.policy, fallback=guards.fallback)
     hardware = load_hardware(plan.hardware) if plan.backend == "hardware" else None
     # Encoders of a base at rest repeat; motion capture never does.
     encoded = hardware is not None and not (estimates_odometry(plan) or hardware.seen_from_outside)
@@ -52,6 +54,7 @@ def controller_spec(plan: RunPlan) -> NodeSpec:
         excitation=plan.excitation,
         max_run_time_s=guards.max_run_time_s,
         area=list(guards.area) if guards.area != NO_AREA else None,
+        guard=guards.guard,
         estop=guards.estop,
         unattended=plan.unattended,
         air_bearing=hardware is not None and hardware.has_bearing,
@@ -70,7 +73,11 @@ def controller_spec(plan: RunPlan) -> NodeSpec:
             *((OBSTACLES.name,) if task.sees_obstacles else ()),
             *(thing.wire.name for thing in task.things),
         ),
-        outputs=(command_wire(robot).name, STATUS.name, METADATA.name, OBSERVATION.name, ACTION.name),
+        outputs=(
+            command_wire(robot).name,
+            *(wire.name for wire in (STATUS, METADATA, OBSERVATION, ACTION)),
+            *((ENVELOPE_STATE.name,) if watches_envelope(robot, guards.guard, guards.area) else ()),
+        ),
     )
 
 

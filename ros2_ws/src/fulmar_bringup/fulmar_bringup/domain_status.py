@@ -16,7 +16,7 @@ from fulmar_core.robots.topics import DIAGNOSTICS, ESTOP_TRIGGER
 from fulmar_core.safety.arbiter import Mode, asks_for_a_goal
 from fulmar_core.safety.estop import HOLDS, SILENT
 from fulmar_core.safety.watchdog import NO_COMMAND
-from fulmar_core.wires.robot_name import namespace_of
+from fulmar_core.wires.robot_name import FLEET, namespace_of
 from fulmar_ros.operator_subscription import subscribe_every
 from fulmar_ros.runtime import ros_node
 
@@ -66,6 +66,10 @@ class RobotStatus:
     name: str
     estop: str  # pressed, silent, released, or none: no e-stop node runs and none is pressed
     nodes: list[NodeStatus] = field(default_factory=list)
+    estop_by: str = ""  # who pressed, as far as the plant knows
+    controller: str = ""  # what controls now, by name
+    goal_by: str = ""  # who gave the goal that counts, as far as the controller knows
+    swap: str = ""  # what became of the last request to change the controller
 
     @property
     def active(self) -> bool:
@@ -79,7 +83,7 @@ class RobotStatus:
 
 def all_active(robots: Sequence[RobotStatus]) -> bool:
     """Whether there are robots, and the controller of each takes goals."""
-    return bool(robots) and all(robot.active for robot in robots)
+    return bool(robots) and all(robot.active for robot in robots if robot.name != FLEET)
 
 
 def domain_status(
@@ -109,6 +113,11 @@ def domain_status(
         while not (errors or complete() or time.monotonic() > until_s):
             time.sleep(LOOK_S if until is None else WAIT_LOOK_S)
         return look.robots()
+
+
+def _parts_of(robot: str) -> tuple[str, ...]:
+    """Nodes that every robot has; what robots of a fleet share is no robot."""
+    return () if robot == FLEET else PARTS
 
 
 class _Look:
@@ -157,7 +166,8 @@ class _Look:
 
     def _silent(self) -> set[tuple[str, str]]:
         """Nodes that have not reported yet, plant and controller of each robot among them, discovered or not."""
-        parts = {(robot, part) for robot, _ in self._graph | self._reports.keys() for part in PARTS}
+        robots = {robot for robot, _ in self._graph | self._reports.keys()}
+        parts = {(robot, part) for robot in robots for part in _parts_of(robot)}
         return {each for each in self._graph | parts if each[1] in REPORTING} - self._reports.keys()
 
     def robots(self) -> list[RobotStatus]:
@@ -168,9 +178,17 @@ class _Look:
 
     def _robot(self, name: str) -> RobotStatus:
         kinds = {node for robot, node in self._graph | self._reports.keys() if robot == name}
-        kinds = {self._wanted} if self._wanted else kinds | set(PARTS)
+        kinds = {self._wanted} if self._wanted else kinds | set(_parts_of(name))
         nodes = [self._status(name, node) for node in NODES if node in kinds]
-        return RobotStatus(name, self._estop(name), nodes)
+        plant, controller = self._values(name, PLANT), self._values(name, CONTROLLER)
+        said = {key: controller.get(key, "") for key in ("controller", "goal_by", "swap")}
+        return RobotStatus(name, self._estop(name), nodes, estop_by=plant.get("estop_by", ""), **said)
+
+    def _values(self, robot: str, node: str) -> dict[str, str]:
+        """Values of the newest status of a node; none before its first."""
+        if (robot, node) not in self._reports:
+            return {}
+        return {pair.key: pair.value for pair in self._reports[robot, node][0].values}
 
     def _status(self, robot: str, node: str) -> NodeStatus:
         if (robot, node) not in self._reports:
@@ -178,7 +196,7 @@ class _Look:
             silent = "silent" if node in REPORTING else "ok"  # an emulator publishes no diagnostics
             return NodeStatus(node, silent if there else "absent")
         status, stamp_s = self._reports[robot, node]
-        values = {pair.key: pair.value for pair in status.values}
+        values = self._values(robot, node)
         return NodeStatus(
             node,
             LEVELS.get(status.level, "error"),

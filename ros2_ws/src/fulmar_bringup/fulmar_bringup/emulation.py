@@ -9,6 +9,9 @@ from pathlib import Path
 
 from fulmar_core.config.errors import ConfigError
 from hardware_drivers.hardware import Hardware
+from hardware_drivers.plane_settings import MavlinkPlane
+from hardware_drivers.presence import check_messages
+from hardware_drivers.px4_settings import BY_MAVLINK, Px4Thrusters, Px4Wing
 from hardware_drivers.settings import (
     Driver,
     GpioValves,
@@ -37,10 +40,14 @@ class Emulation:
 
 
 def check_emulated(driver: Driver) -> None:
-    """Raise ConfigError for a driver whose device has no emulator, such as a user's own, and for a boat that signs."""
-    if isinstance(driver, MavlinkBoat) and driver.signing_key:
+    """Raise ConfigError for a device without an emulator, such as of a user's own driver, and for a boat that signs.
+
+    The messages of a driver must be installed, too.
+    """
+    check_messages(driver)
+    if isinstance(driver, (MavlinkBoat, MavlinkPlane)) and driver.signing_key:
         raise ConfigError(
-            "the emulated boat has no key: leave 'signing_key' out of the hardware file, or --emulate."
+            "the emulated autopilot has no key: leave 'signing_key' out of the hardware file, or --emulate."
         )
     if not driver.emulator:
         whose = "your own driver" if isinstance(driver, OwnDriver) else "driver"
@@ -83,6 +90,11 @@ def emulation_of(hardware: Hardware, folder: Path) -> Emulation:
     if isinstance(driver, XPlane):
         number = _free_port(socket.SOCK_DGRAM)
         return Emulation(driver.emulator, f"udp:{number}", f"udp://127.0.0.1:{number}")
+    if isinstance(driver, (Px4Thrusters, Px4Wing)):
+        return _px4_emulation(driver)
+    if isinstance(driver, MavlinkPlane):
+        number = _free_port(socket.SOCK_DGRAM)
+        return Emulation(driver.emulator, f"udp:{number}", f"udpin:127.0.0.1:{number}")
     assert isinstance(driver, (MavlinkBoat, Kobuki, KingfisherNmea))
     more = {"sides": list(driver.wiring)}
     if isinstance(driver, MavlinkBoat):
@@ -92,6 +104,18 @@ def emulation_of(hardware: Hardware, folder: Path) -> Emulation:
         number = _free_port(socket.SOCK_STREAM)
         return Emulation(driver.emulator, f"tcp:{number}", f"tcp://127.0.0.1:{number}", more)
     return Emulation(driver.emulator, str(folder / "serial"), str(folder / "serial"), more)
+
+
+def _px4_emulation(driver: Px4Thrusters | Px4Wing) -> Emulation:
+    """Its topics are those of the file; the driver's port is that of its parameters, where they go by MAVLink."""
+    more: Parameters = {"order": list(driver.order)} if isinstance(driver, Px4Thrusters) else {}
+    link = f"topics:{driver.topics}"
+    if driver.failsafe.confirm != BY_MAVLINK:
+        return Emulation(driver.emulator, link, "", more)
+    number = _free_port(socket.SOCK_DGRAM)
+    return Emulation(
+        driver.emulator, link, f"udpin:127.0.0.1:{number}", {**more, "parameters": f"udp:{number}"}
+    )
 
 
 def _free_port(kind: socket.SocketKind) -> int:

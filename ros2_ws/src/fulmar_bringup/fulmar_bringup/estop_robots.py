@@ -27,7 +27,9 @@ from fulmar_core.robots.topics import (
     Wire,
 )
 from fulmar_core.safety.estop import EstopButton
+from fulmar_core.wires import operator_action
 from fulmar_core.wires.robot_name import namespace_of
+from fulmar_ros.operator_actions import OperatorActions
 from fulmar_ros.qos import publisher_qos, subscriber_qos
 
 Answer = tuple[bool, str]  # whether it was done, and the answer of the service
@@ -85,6 +87,7 @@ class _Robot:
     def __init__(self, node: Node, space: str, found_s: float) -> None:
         self._space, self._found_s = space, found_s
         self._wire: Publisher = node.create_publisher(Bool, f"{space}/{ESTOP.name}", publisher_qos(ESTOP))
+        OperatorActions(node, space).say(operator_action.ESTOP)
         self._button: Client = node.create_client(Trigger, f"{space}/{ESTOP_TRIGGER}")
         self._asked: tuple[float, Future] | None = None  # when [s], and what will be answered
         self._reached = False

@@ -8,7 +8,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import IO, Any
 
@@ -16,6 +16,7 @@ import psutil
 
 COMMAND = (sys.executable, "-m", "fulmar_cli.main")
 NODE = "__node:="  # in the command line of each process that runs a node
+SPACE = "__ns:="
 START_S = 40.0  # for a node or an event of a system that starts on a busy computer
 STOP_S = 15.0  # for a command to end after SIGTERM, before it is killed with its nodes
 LOOK_S = 0.02
@@ -37,6 +38,7 @@ class LaunchedCommand:
         environment: Mapping[str, str],
         folder: Path,
         command: Sequence[str] = COMMAND,
+        spaces: Collection[str] = (),
     ) -> None:
         """Start a command.
 
@@ -45,7 +47,9 @@ class LaunchedCommand:
             environment: Of the command, with its ROS domain.
             folder: Where it runs.
             command: What the words follow.
+            spaces: Namespaces whose nodes `nodes` gives, of a fleet, where several have one name; empty: every one.
         """
+        self._spaces = tuple(spaces)
         self.events: list[dict[str, Any]] = []
         self.log: list[str] = []
         self._output: list[str] = []
@@ -79,7 +83,8 @@ class LaunchedCommand:
                 self._seen[child.pid] = child
                 name = _name_of(child)
                 with contextlib.suppress(psutil.Error):  # it may have ended meanwhile
-                    if name and child.status() != psutil.STATUS_ZOMBIE:
+                    counts = not self._spaces or _word_of(child, SPACE) in self._spaces
+                    if name and counts and child.status() != psutil.STATUS_ZOMBIE:
                         found[name] = child
         return found
 
@@ -193,8 +198,13 @@ def launched(
 
 def _name_of(process: psutil.Process) -> str:
     """The node that a process runs; empty once it has ended, and of one that runs none."""
+    return _word_of(process, NODE)
+
+
+def _word_of(process: psutil.Process, prefix: str) -> str:
+    """What follows a prefix in the command line of a process; empty where it has none, or has ended."""
     with contextlib.suppress(psutil.Error):
-        return next((word.removeprefix(NODE) for word in process.cmdline() if word.startswith(NODE)), "")
+        return next((word.removeprefix(prefix) for word in process.cmdline() if word.startswith(prefix)), "")
     return ""
 
 

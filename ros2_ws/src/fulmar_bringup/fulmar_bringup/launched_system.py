@@ -10,6 +10,8 @@ from pathlib import Path
 
 from fulmar_bringup.bag_origin import attachments, run_info
 from fulmar_bringup.completion import completed
+from fulmar_bringup.fleet_file import is_fleet
+from fulmar_bringup.fleet_plan import FleetChoices, fleet_plan, fleet_rows
 from fulmar_bringup.node_spec import NodeSpec
 from fulmar_bringup.node_table import OPTIONS, USUALLY_ON
 from fulmar_bringup.plan_checks import checked
@@ -25,7 +27,7 @@ ARGUMENTS = {
     "name": "what the robot is called: its namespace; its type by default",
     "task": "a file of configs/tasks, without .yaml, or your own class: mypackage.mymodule:MyTask",
     "controller": "policy, a classical one such as lqr, mymodule:MyController, or external: a node of yours",
-    "backend": "mujoco, mock, jsbsim or hardware",
+    "backend": "mujoco, mock, jsbsim, basilisk or hardware",
     "hardware": "a file of configs/hardware, without .yaml, or a path to one",
     "policy": "folder of a policy bundle",
     "adapter": "with controller external, a file of configs/hardware: commands come in as its driver sends them",
@@ -55,6 +57,9 @@ def list_nodes(**asked: str | None) -> tuple[NodeSpec, ...]:
     for word in ("emulate", *OPTIONS):
         if asked.get(word) not in (None, "true", "false"):
             raise ConfigError(f"{word} = '{asked[word]}' must be true or false.")
+    system = asked.get("system")
+    if system is not None and is_fleet(system):
+        return _fleet_nodes(system, asked)
     choices = {name: asked.get(name) for name in ("robot", "name", "task", "controller", "backend")}
     plan = replace(
         system_plan(asked.get("system"), **choices),
@@ -72,6 +77,15 @@ def list_nodes(**asked: str | None) -> tuple[NodeSpec, ...]:
         atexit.register(shutil.rmtree, wires, ignore_errors=True)  # with the launch itself
     record = {"info": run_info(plan), "files": attachments(plan)}
     return tuple(system_rows(plan, record=record, wires_folder=wires).values())
+
+
+def _fleet_nodes(system: str, asked: dict[str, str | None]) -> tuple[NodeSpec, ...]:
+    """Nodes of a fleet, whose file says everything for each robot."""
+    for name, value in asked.items():
+        if value is not None and name != "system":
+            raise ConfigError(f"{name}:={value}: the file of the fleet '{system}' says it for each robot.")
+    shared, robots = fleet_rows(fleet_plan(system, FleetChoices(standing=True, launched=True)))
+    return (*shared, *(spec for rows in robots.values() for spec in rows))
 
 
 def _runs(asked: str | None, name: str, plan: RunPlan) -> bool:

@@ -1,6 +1,8 @@
-"""Builds tf2_msgs, for which there is no wheel, from ROS's wheels, and installs it into this environment.
+"""Builds message packages for which there is no wheel from ROS's wheels, and installs them into this environment.
 
-On a Jazzy machine ROS's own tf2_msgs is there. Elsewhere /tf stays silent until it is built; nothing else needs it.
+On a Jazzy machine ROS's own packages are there. Elsewhere /tf stays silent until tf2_msgs is built; action servers
+need nav2_msgs, services for simulations simulation_interfaces, the broadcaster control_msgs, and the drivers of PX4
+px4_msgs.
 """
 
 from __future__ import annotations
@@ -12,68 +14,86 @@ import subprocess
 import sys
 import sysconfig
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 
 from fulmar_core.config.errors import ConfigError, FulmarError
 
-PACKAGE = "tf2_msgs"
-SOURCE = Path(__file__).parent / PACKAGE
+TF2_MSGS, NAV2_MSGS, SIMULATION_INTERFACES, CONTROL_MSGS, PX4_MSGS = PACKAGES = (
+    "tf2_msgs",
+    "nav2_msgs",
+    "simulation_interfaces",
+    "control_msgs",
+    "px4_msgs",
+)
+SOURCE = Path(__file__).parent / TF2_MSGS  # with the lock of what builds every package
 ERROR = re.compile(r"CMake Error|\berror: [^s]|No matching|ERROR:")
 SHOWN = 15  # lines of a failed step
 COMPILERS = {"CC": ("cc", "gcc", "clang"), "CXX": ("c++", "g++", "clang++")}
 
 
-def install_tf2_msgs(report: Callable[[str], None]) -> bool:
-    """Build and install the package in an environment of its own, which is removed afterwards.
+def install_messages(packages: str | Sequence[str], report: Callable[[str], None]) -> bool:
+    """Build packages in an environment of their own, which is removed afterwards, and install them.
 
     Args:
+        packages: One or several of `PACKAGES`.
         report: Called with a line for each step.
 
     Returns:
-        False if it is installed already.
+        False if all are installed already.
 
     Raises:
         ConfigError: ROS, a compiler or the module `venv` is missing.
         FulmarError: A step failed; with what it printed.
     """
-    if find_spec(PACKAGE) is not None:
+    asked = (packages,) if isinstance(packages, str) else packages
+    missing = [package for package in asked if find_spec(package) is None]
+    if not missing:
         return False
-    _check_tools()
+    words = ", ".join(missing)
+    _check_tools(words)
     with tempfile.TemporaryDirectory(prefix="fulmar_tf_") as folder:
         prefix = Path(folder) / "environment"
-        source = shutil.copytree(SOURCE, Path(folder) / "source")
         python = str(prefix / "bin" / "python")
         # Packages on PYTHONPATH would pass for installed ones, and be missing where CMake looks.
         clean = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
         pip = [python, "-m", "pip", "--disable-pip-version-check", "--no-input", "--quiet"]
         report("1/3 install ROS's generators of messages into a temporary environment (250 MB)")
-        _run([sys.executable, "-m", "venv", str(prefix)], "make an environment", clean)
-        lock = str(source / "requirements.lock")
-        _run([*pip, "install", "--require-hashes", "-r", lock], "install the generators", clean)
-        report(f"2/3 compile {PACKAGE}")
-        environment = {
-            **clean,
-            "PATH": f"{prefix / 'bin'}{os.pathsep}{os.environ.get('PATH', os.defpath)}",
-            "AMENT_PREFIX_PATH": str(prefix),
-            "CMAKE_PREFIX_PATH": str(prefix),
-        }
-        build = [*pip, "wheel", "--no-build-isolation", "--no-deps", "--wheel-dir", folder, str(source)]
-        _run(build, "compile", environment)
-        report(f"3/3 install it into {sys.prefix}")
+        run = partial(_run, words)
+        run([sys.executable, "-m", "venv", str(prefix)], "make an environment", clean)
+        lock = str(SOURCE / "requirements.lock")
+        run([*pip, "install", "--require-hashes", "-r", lock], "install the generators", clean)
+        report(f"2/3 compile {words}")
+        for package in missing:
+            _compile(package, pip, clean, Path(folder))
+        report(f"3/3 install {'it' if len(missing) == 1 else 'them'} into {sys.prefix}")
         wheels = [str(wheel) for wheel in Path(folder).glob("*.whl")]
-        _run(
-            [*pip, "--python", sys.executable, "install", "--no-deps", "--no-index", *wheels],
-            "install",
-            clean,
-        )
+        into = [*pip, "--python", sys.executable, "install", "--no-deps", "--no-index", *wheels]
+        run(into, "install", clean)
     return True
 
 
-def _check_tools() -> None:
+def _compile(package: str, pip: Sequence[str], clean: Mapping[str, str], folder: Path) -> None:
+    """Make a wheel of a package in a folder, which has the environment of the generators."""
+    prefix = folder / "environment"
+    source = shutil.copytree(SOURCE.parent / package, folder / "source" / package)
+    environment = {
+        **clean,
+        "PATH": f"{prefix / 'bin'}{os.pathsep}{os.environ.get('PATH', os.defpath)}",
+        "AMENT_PREFIX_PATH": str(prefix),
+        "CMAKE_PREFIX_PATH": str(prefix),
+    }
+    build = [*pip, "wheel", "--no-build-isolation", "--no-deps", "--wheel-dir", str(folder), str(source)]
+    _run(package, build, "compile", environment)
+
+
+def _check_tools(packages: str) -> None:
     if find_spec("rclpy") is None:
-        raise ConfigError("tf2_msgs needs ROS in this environment, and there is none: install 'fulmar[ros]'.")
+        raise ConfigError(
+            f"{packages} needs ROS in this environment, and there is none: install 'fulmar[ros]'."
+        )
     for variable, names in COMPILERS.items():
         if not any(shutil.which(name) for name in (os.environ.get(variable) or "", *names) if name):
             raise ConfigError(
@@ -91,7 +111,7 @@ def _check_tools() -> None:
         )
 
 
-def _run(command: Sequence[str], step: str, environment: dict[str, str]) -> None:
+def _run(packages: str, command: Sequence[str], step: str, environment: dict[str, str]) -> None:
     """Run a command in silence.
 
     Raises:
@@ -102,4 +122,4 @@ def _run(command: Sequence[str], step: str, environment: dict[str, str]) -> None
         lines = (done.stdout + done.stderr).strip().splitlines()
         first = next((at for at, line in enumerate(lines) if ERROR.search(line)), max(0, len(lines) - SHOWN))
         shown = "\n".join(lines[first : first + SHOWN])
-        raise FulmarError(f"{PACKAGE}: could not {step}:\n{shown}")
+        raise FulmarError(f"{packages}: could not {step}:\n{shown}")

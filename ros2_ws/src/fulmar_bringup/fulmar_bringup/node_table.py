@@ -27,6 +27,10 @@ TABLE = {
     "controller": "",
     "adapter": "",
     "goals": "",
+    "actions": "Serve Nav2's actions, such as `navigate_to_pose`, to action clients. See docs/actions.md.",
+    "simulation_interfaces": "Serve ROS's standard services for simulators: reset, pause, step, states. "
+    "See docs/simulation_interfaces.md.",
+    "broadcast": "Publish observation and action as ros2_control's broadcasters do. See docs/broadcast.md.",
     "own": "",
     "markers": "Draw goal, limits and thrust for RViz and Foxglove, on the topic `markers`. See `fulmar layout`.",
 }
@@ -34,7 +38,11 @@ OPTIONS = {name: text for name, text in TABLE.items() if text}
 USUALLY_ON = (
     "markers",
 )  # of these, what standing systems have unless it is switched off; all else is asked for
-IN_LOCKSTEP = ("camera",)  # of these, what answers each period of lock step
+IN_LOCKSTEP = (
+    "camera",
+    "simulation_interfaces",
+    "broadcast",
+)  # of these, what leaves the steps of lock step as they are
 
 
 @cache

@@ -13,6 +13,8 @@ import numpy as np
 
 from fulmar_bringup.emulation import check_emulated
 from fulmar_bringup.estimator_row import camera_specs
+from fulmar_bringup.extra_checks import check_extras
+from fulmar_bringup.lockstep_chain import chain_of
 from fulmar_bringup.node_spec import CONTROLLER, PARTS
 from fulmar_bringup.node_table import IN_LOCKSTEP
 from fulmar_bringup.renderer_check import check_renderer
@@ -24,14 +26,17 @@ from fulmar_core.config.paths import config_names
 from fulmar_core.controllers.classical import has_law
 from fulmar_core.estimators.kinds import check_estimator
 from fulmar_core.loop.bundle_signature import verify_bundle
+from fulmar_core.loop.envelope import check_guard
 from fulmar_core.loop.policy_bundle import check_fit, check_folder, read_bundle, read_passport
 from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.robots.sensors.catalogue import catalogue_path
 from fulmar_core.robots.topics import COMMAND, MOCAP, SENSOR_WIRES, TRUTH, VELOCITY_COMMAND
 from fulmar_core.safety.geofence import NO_AREA, check_area_of
-from fulmar_core.safety.watchdog import default_timeout
 from fulmar_core.tasks import Task, load_task
+from fulmar_core.wires.silence import default_timeout
+from fulmar_core.worlds.link import check_chain
+from fulmar_core.worlds.scenario import load_scenario
 from hardware_drivers.hardware import TOPIC_DRIVERS, load_hardware
 from hardware_drivers.own_driver import check_own_driver
 from hardware_drivers.settings import UNARMED, MavlinkBoat
@@ -67,6 +72,7 @@ def checked(plan: RunPlan) -> RunPlan:
     if policy is not None and plan.guards.trusted_keys is not None:
         check_signed(policy, Path(plan.guards.trusted_keys), fallback=plan.guards.fallback)
     _check_recording(plan, task)
+    check_extras(plan, task)
     if not plan.standing:
         _check_distance(plan, robot, task)
     return plan
@@ -79,6 +85,7 @@ def _check_surroundings(plan: RunPlan, robot: Robot) -> None:
             f"--scenario {plan.scenario} disturbs simulations and emulated devices; a real robot has its own "
             "surroundings. Leave it out, or add --emulate."
         )
+    check_chain(load_scenario(plan.scenario).link, chain_of(plan))
     if camera_specs(plan) and catalogue_path() is None:
         raise ConfigError(
             f"the simulated event cameras of '{robot.name}' look at the stars, and the star catalogue is not "
@@ -93,7 +100,8 @@ def _check_pace(plan: RunPlan) -> None:
     by_the_clock = [name for name in plan.extras if name not in IN_LOCKSTEP]
     if plan.lockstep and by_the_clock:
         raise ConfigError(
-            f"--lockstep gives the same bytes each time; it takes no --{by_the_clock[0]}, which goes by the clock."
+            f"--lockstep gives the same bytes each time; it takes no "
+            f"--{by_the_clock[0].replace('_', '-')}, which goes by the clock."
         )
     if plan.mocap_hz and plan.is_real:
         raise ConfigError("--mocap-hz simulates a motion capture; a real robot has its own. Leave it out.")
@@ -141,10 +149,11 @@ def check_arming(hardware: str, *, arm: bool) -> None:
     if file is None or not file.arms:
         if arm:
             raise ConfigError(
-                "--arm is for boats with an autopilot (driver 'mavlink_boat') and own drivers with `arm`; leave it out."
+                "--arm is for autopilots (drivers 'mavlink_boat', 'mavlink_plane', 'px4_thrusters', 'px4_wing') and "
+                "own drivers with `arm`; leave it out."
             )
     elif not (arm or getattr(file.driver, "arm", None)):
-        driver, does = file.driver, "arms the device"
+        driver, does = file.driver, file.driver.arming
         if isinstance(driver, MavlinkBoat):
             channels = f"{driver.steering_channel} and {driver.throttle_channel}"
             does = f"sets MANUAL, arms the boat and overrides RC channels {channels}"
@@ -157,6 +166,8 @@ def check_arming(hardware: str, *, arm: bool) -> None:
 def _check_guards(plan: RunPlan, robot: Robot, task: Task) -> None:
     """Refuse an area of the other space, a fallback that has nothing for the pair, and estimators of other robots."""
     check_area_of(robot, plan.guards.area)
+    if plan.guards.guard:
+        check_guard(robot, plan.guards.area)
     if plan.guards.fallback:
         controller_entry(plan.guards.fallback).check(robot, task)
     for file in plan.guards.files:
@@ -198,6 +209,7 @@ def _refuse_own_guards(guards: Guards) -> None:
         "trusted_keys": guards.trusted_keys is not None,
         "max_run_time_s": guards.max_run_time_s > 0.0,
         "area": guards.area != NO_AREA,
+        "guard": bool(guards.guard),
     }
     without_effect = [name for name, is_asked in asked.items() if is_asked]
     if without_effect:

@@ -17,16 +17,20 @@ from fulmar_core.robots.topics import (
     MOCAP,
     ODOMETRY,
     PERIOD,
+    ROBOT_INFO,
     STATIC_TRANSFORMS,
     TRANSFORMS,
     TRUTH,
     command_wire,
 )
+from fulmar_core.robots.topics import ORIGIN as ORIGIN_WIRE
+from fulmar_core.safety.geofence import NO_AREA
 from fulmar_core.tasks import load_task
+from policy_server.controllers import controller_entry, shipped_policy
 
 STOPS_S = 4.0  # for a plant to end once its robot is down [s]
 # Of every plant; the last two need tf2_msgs.
-MODEL = (DESCRIPTION.name, TRANSFORMS.name, STATIC_TRANSFORMS.name)
+MODEL = (DESCRIPTION.name, ROBOT_INFO.name, ORIGIN_WIRE.name, TRANSFORMS.name, STATIC_TRANSFORMS.name)
 
 
 def plant_spec(plan: RunPlan, *, port: str = "") -> NodeSpec:
@@ -56,6 +60,7 @@ def plant_spec(plan: RunPlan, *, port: str = "") -> NodeSpec:
         thing=plan.thing,
         estop=plan.guards.estop,
         estimated=estimated,
+        **system_facts(plan),
         truth_in_period=bool(chain)
         and any(TRUTH.name in node.inputs for node in (*plan.nodes, *between(plan))),
         chain=list(chain),
@@ -78,6 +83,19 @@ def plant_spec(plan: RunPlan, *, port: str = "") -> NodeSpec:
     return robot_spec(
         plan, "plant", module, parameters, inputs=inputs, outputs=outputs, ends_within_s=lands_s
     )
+
+
+def system_facts(plan: RunPlan) -> dict[str, Parameter | None]:
+    """What a plant publishes of its system, as parameters."""
+    robot, guards, entry = load_robot(plan.robot), plan.guards, controller_entry(plan.controller)
+    return {
+        "controller": plan.controller,
+        "fallback": guards.fallback if entry.runs_bundle else "",
+        "bundle": bool(plan.policy) or shipped_policy(robot.name, plan.task) is not None,
+        "emulated": plan.emulated,
+        "origin": list(plan.origin) or None,
+        "area": list(guards.area) if guards.area != NO_AREA else None,
+    }
 
 
 def _sensor_topics(plan: RunPlan) -> tuple[str, ...]:

@@ -54,8 +54,9 @@ class Ended:
 class ProcessGroup:
     """The children of one run."""
 
-    def __init__(self, environment: Mapping[str, str] | None = None) -> None:
-        """Begin without children, whose environment is ours and what is given."""
+    def __init__(self, environment: Mapping[str, str] | None = None, *, label: str = "") -> None:
+        """Begin without children, whose environment is ours and what is given; `label` begins what they print."""
+        self._label = label
         given = {**os.environ, **child_environment(), **(environment or {})}
         given |= safe_environment(given)
         self._environment = given | environment_of_any_node(given)
@@ -73,7 +74,7 @@ class ProcessGroup:
             stderr=subprocess.STDOUT,
             start_new_session=True,  # Ctrl-C reaches us alone; we stop the children in order
         )
-        self._relays[spec.name] = _Relay(spec.name, child.stdout)
+        self._relays[spec.name] = _Relay(self._label + spec.name, child.stdout)
         self._specs[spec.name] = spec
         self._children[spec.name] = child
         self._relays[spec.name].start()

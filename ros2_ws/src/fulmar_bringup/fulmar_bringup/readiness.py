@@ -31,21 +31,21 @@ def raise_if_ended(group: ProcessGroup) -> None:
         raise RunFailed(f"{end.text} before the run was over" + (f": {words}" if words else ""))
 
 
-def while_starting(group: ProcessGroup, overseer: Supervisor) -> Callable[[], None]:
-    """A check to call while nodes get ready.
+def while_starting(group: ProcessGroup, overseer: Supervisor, more_s: float = 0.0) -> Callable[[], None]:
+    """A check to call while nodes get ready, for `START_TIMEOUT_S` and `more_s` at most [s].
 
     It raises RunFailed once a process ended or the time is over, and TwinRunError where another run of this name
     begins at the same time.
     """
-    began_s = time.monotonic()
+    began_s, within_s = time.monotonic(), START_TIMEOUT_S + more_s
 
     def alive() -> None:
         overseer.refuse_twins()  # first: they make each other's nodes end
         raise_if_ended(group)
-        if time.monotonic() - began_s > START_TIMEOUT_S:
+        if time.monotonic() - began_s > within_s:
             plant, controller = _last_status(overseer.plant), _last_status(overseer.controller)
             raise RunFailed(
-                f"the nodes did not get ready within {START_TIMEOUT_S:g} s (the plant said: {plant}; "
+                f"the nodes did not get ready within {within_s:g} s (the plant said: {plant}; "
                 f"the controller said: {controller}). "
                 "Is another system running in this ROS domain? Try `fulmar doctor`."
             )

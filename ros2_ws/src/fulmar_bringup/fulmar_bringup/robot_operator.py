@@ -5,13 +5,14 @@ from __future__ import annotations
 import contextlib
 import os
 import time
-from collections.abc import Iterator, Sequence
+import uuid
+from collections.abc import Callable, Iterator, Sequence
+from typing import TypeVar
 
-from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
 from rclpy.task import Future
 from std_msgs.msg import String
-from std_srvs.srv import Trigger
+from std_srvs.srv import SetBool, Trigger
 
 from fulmar_bringup.estop_robots import (
     ANSWER_S,
@@ -23,10 +24,12 @@ from fulmar_bringup.estop_robots import (
     stop_robots,
 )
 from fulmar_core.config.errors import RunFailed
-from fulmar_core.robots.topics import ESTOP_RESET, STATUS, SWAP, WIRES, Wire
+from fulmar_core.loop.swap_request import SwapRequest, SwapResult, read_result
+from fulmar_core.robots.topics import ESTOP_RESET, SWAP, SWAP_RESULT, WIRES, Wire
 from fulmar_core.robots.wire_check import wire_problems
 from fulmar_core.wires.robot_name import namespace_of
 from fulmar_ros.graph import full_name, offers_of, robot_namespaces, running_robots_text
+from fulmar_ros.operator_actions import who
 from fulmar_ros.operator_subscription import subscribe_every
 from fulmar_ros.qos import publisher_qos
 from fulmar_ros.runtime import ros_node
@@ -58,7 +61,8 @@ def _of_wire(node: Node, wire: Wire, topic: str) -> list[str]:
 
 FIND_S = 7.0  # a node whose first announcements are lost announces itself again after 3 s
 LOOK_S, SETTLE_S, ASK_S = 0.05, 0.3, 0.005
-ASK_AGAIN_S = 0.5  # a controller says at once that it has a request
+Result = TypeVar("Result")
+ASK_AGAIN_S = 0.5  # a request that is being loaded is not loaded again
 
 
 class Operator:
@@ -81,22 +85,28 @@ class Operator:
                 until = min(until, time.monotonic() + SETTLE_S)
             time.sleep(LOOK_S)
 
-    def ask(self, service: str) -> tuple[bool, str]:
-        """Call a Trigger service by its full name; raises RunFailed where no answer comes."""
-        answer = self.ask_all([service])[service]
+    def ask(self, service: str, *, on: bool | None = None) -> tuple[bool, str]:
+        """Call a service by its full name, as `ask_all`; raises RunFailed where no answer comes."""
+        answer = self.ask_all([service], on=on)[service]
         if answer is None:
             raise RunFailed(f"no node answers on {service} within {ANSWER_S:g} s.")
         return answer
 
-    def ask_all(self, services: Sequence[str]) -> dict[str, Answer | None]:
-        """Call Trigger services by their full names, all at once; None where no answer comes within 2 s."""
-        clients = {service: self._node.create_client(Trigger, service) for service in services}
+    def ask_all(self, services: Sequence[str], *, on: bool | None = None) -> dict[str, Answer | None]:
+        """Call services by their full names, all at once; None where no answer comes within 2 s.
+
+        Args:
+            services: Of type Trigger; of type SetBool where `on` is given.
+            on: What a SetBool is called with.
+        """
+        kind, request = (Trigger, Trigger.Request()) if on is None else (SetBool, SetBool.Request(data=on))
+        clients = {service: self._node.create_client(kind, service) for service in services}
         futures: dict[str, Future] = {}
         until = time.monotonic() + ANSWER_S
         while True:
             for name, client in clients.items():
                 if name not in futures and client.service_is_ready():
-                    futures[name] = client.call_async(Trigger.Request())
+                    futures[name] = client.call_async(request)
             answered = all(name in futures and futures[name].done() for name in clients)
             if answered or time.monotonic() > until:
                 break
@@ -131,58 +141,96 @@ class Operator:
         spaces = running_robots(self._node)
         return spaces, unfit_publishers(self._node, spaces)
 
-    def say_swap(self, robot: str, folder: str, *, find_s: float, answer_s: float) -> str:
-        """Ask a controller to go on with another policy, and again until its status answers this very request.
-
-        A recorder subscribes to the same topic, so that a subscription alone shows no controller. The first request
-        gets lost where discovery has not matched it with the controller yet.
+    def ask_swap(
+        self, robot: str, *, controller: str = "", bundle: str = "", find_s: float, answer_s: float
+    ) -> SwapResult:
+        """Ask a robot's controller node to go on with another controller, and again until it answers this request.
 
         Args:
-            robot: Name of the robot whose controller it is.
-            folder: The bundle, on the robot's own disk.
-            find_s: How long to look for the controller [s].
-            answer_s: How long the policy may take to take over [s].
+            robot: Name of the robot.
+            controller: Name of a controller, of those in its `robot_info`; empty: the policy of `bundle`.
+            bundle: Folder of a policy, on the robot's own disk.
+            find_s: How long to look for the controller node [s].
+            answer_s: How long the controller may take to take over [s].
 
         Returns:
-            What came of it: a text that begins with `done` or `refused`.
+            The answer.
 
         Raises:
-            RunFailed: There is no controller, or it does not answer.
+            RunFailed: There is no controller node, or it does not answer.
         """
-        status: dict[str, str] = {}
+        request = SwapRequest("", uuid.uuid4().hex, controller, bundle, who(self._node))
+        return self.ask_on_wire(
+            robot,
+            (SWAP, SWAP_RESULT),
+            request.to_text(),
+            lambda text: found if (found := read_result(text)) and found.id == request.id else None,
+            "controller",
+            find_s=find_s,
+            answer_s=answer_s,
+        )
 
-        def read(message: DiagnosticArray) -> None:
-            if message.status:
-                status.update({pair.key: pair.value for pair in message.status[0].values})
+    def ask_on_wire(
+        self,
+        robot: str,
+        wires: tuple[Wire, Wire],
+        text: str,
+        read: Callable[[str], Result | None],
+        who_answers: str,
+        *,
+        find_s: float,
+        answer_s: float,
+    ) -> Result:
+        """Publish a request to a robot, again and again, until its answer comes.
 
+        A recorder subscribes to the same topic, so that a subscription alone shows no one who answers. The first
+        request gets lost where discovery has not matched it yet; one that is repeated with the same id is done once.
+
+        Args:
+            robot: Name of the robot.
+            wires: Of request and answer.
+            text: The request.
+            read: The answer to this request in a text, or None.
+            who_answers: In words, for errors.
+            find_s: How long to look for who answers [s].
+            answer_s: How long it may take [s].
+
+        Raises:
+            RunFailed: Nothing takes such requests, or the answer does not come.
+        """
+        answers: list[Result] = []
         space = namespace_of(robot)
-        subscribe_every(self._node, DiagnosticArray, STATUS, read, topic=f"{space}/{STATUS.name}")
-        publisher = self._node.create_publisher(String, f"{space}/{SWAP.name}", publisher_qos(SWAP))
+        asked, answered = (f"{space}/{wire.name}" for wire in wires)
+
+        def take(message: String) -> None:
+            if (result := read(message.data)) is not None:
+                answers.append(result)
+
+        subscribe_every(self._node, String, wires[1], take, topic=answered)
+        publisher = self._node.create_publisher(String, asked, publisher_qos(wires[0]))
         until = time.monotonic() + find_s
-        while not (status and self._takes_swaps(space)):
+        while not self._takes(asked, answered):
             if time.monotonic() > until:
                 raise RunFailed(
-                    f"no controller of '{robot}' runs in this ROS domain. {self.running_robots_text()}"
+                    f"no {who_answers} of '{robot}' runs in this ROS domain. {self.running_robots_text()}"
                 )
             time.sleep(LOOK_S)
-        before, until, asked_s = status.get("swap_requests"), time.monotonic() + answer_s, 0.0
-        while True:
-            swap, now_s = status.get("swap", ""), time.monotonic()
-            taken = status.get("swap_requests") != before and folder in swap
-            if taken and swap.startswith(("done", "refused")):
-                return swap
+        until, asked_s = time.monotonic() + answer_s, 0.0
+        while not answers:
+            now_s = time.monotonic()
             if now_s > until:
-                raise RunFailed(f"the controller of '{robot}' did not answer within {answer_s:g} s.")
-            if not taken and now_s - asked_s > ASK_AGAIN_S:
-                publisher.publish(String(data=folder))
+                raise RunFailed(f"the {who_answers} of '{robot}' did not answer within {answer_s:g} s.")
+            if now_s - asked_s > ASK_AGAIN_S:
+                publisher.publish(String(data=text))
                 asked_s = now_s
             time.sleep(ASK_S)
+        return answers[0]
 
-    def _takes_swaps(self, space: str) -> bool:
-        """Whether a node that publishes the status of a controller subscribes to requests, too."""
-        asked = self._node.get_subscriptions_info_by_topic(f"{space}/{SWAP.name}")
-        answering = self._node.get_publishers_info_by_topic(f"{space}/{STATUS.name}")
-        return bool({full_name(info) for info in asked} & {full_name(info) for info in answering})
+    def _takes(self, asked: str, answered: str) -> bool:
+        """Whether a node that answers requests subscribes to them, too."""
+        takes = self._node.get_subscriptions_info_by_topic(asked)
+        answers = self._node.get_publishers_info_by_topic(answered)
+        return bool({full_name(info) for info in takes} & {full_name(info) for info in answers})
 
 
 @contextlib.contextmanager

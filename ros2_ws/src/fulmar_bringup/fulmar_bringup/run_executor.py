@@ -136,7 +136,7 @@ def _run(plan: RunPlan, watch: Watch, on_restart: OnRestart) -> Execution:
         shutil.rmtree(plan.record, ignore_errors=True)  # nothing has run
         raise ConfigError(failure)
     warnings = tuple(restart.warning for restart in restarts)
-    return Execution(_with_ends(failure, ends), int(plant.values.get("steps", 0)), warnings)
+    return Execution(with_ends(failure, ends), int(plant.values.get("steps", 0)), warnings)
 
 
 def _withdraw(group: ProcessGroup, specs: list[NodeSpec], record: str) -> None:
@@ -148,7 +148,7 @@ def _withdraw(group: ProcessGroup, specs: list[NodeSpec], record: str) -> None:
     shutil.rmtree(record, ignore_errors=True)  # absent before; a quick recorder may have made it
 
 
-def _with_ends(failure: str, ends: list[Ended]) -> str:
+def with_ends(failure: str, ends: list[Ended]) -> str:
     """Add the children that did not end well when they were stopped, unless the failure names them already."""
     # SIGTERM itself ends a child only before its handler is installed, and then nothing is lost.
     bad = [end for end in ends if not end.optional and end.returncode not in (0, -signal.SIGTERM)]
@@ -219,45 +219,81 @@ def _wait_for_end(
     end_on_estop: bool,
 ) -> None:
     """Watch a run until its time is over; an e-stop holds the robot meanwhile, and ends the run only if asked to."""
-    began = time.monotonic()
-    plant_limit_s, controller_limit_s = silence_limits_s(plan)
-    limit_s = 30.0 + 1.5 * plan.duration_s / plan.rate
-    limit_s += LANDS_S if plan.hardware and not load_robot(plan.robot).kind.rests else 0.0
-    steps = Stall(overseer)
+    watch = EndWatch(plan, overseer, keeper, end_on_estop=end_on_estop)
 
-    def failed() -> bool:
+    def running() -> None:
+        plant, controller = overseer.plant, overseer.controller
+        moved(passed_s(plan, plant), state_words(distance_of(controller.values), mode_of(plant, controller)))
+        watch.look()
+
+    overseer.wait_until(watch.finished, running)
+    if watch.errors:
+        raise RunFailed(f"plant: {watch.errors[0]}")
+    running()
+
+
+class EndWatch:
+    """Watches one robot of a run: whether it goes on, fails, or has come to its planned end.
+
+    Attributes:
+        errors: Of the plant, the first of which ended the run.
+    """
+
+    def __init__(
+        self,
+        plan: RunPlan,
+        overseer: Supervisor,
+        keeper: NodeKeeper,
+        *,
+        end_on_estop: bool,
+        patience: float = 1.0,
+    ) -> None:
+        """Begin with the run; in lock step, silences may be `patience` times as long as those of a robot alone."""
+        self._plan, self._overseer, self._keeper = plan, overseer, keeper
+        self._end_on_estop, self._began = end_on_estop, time.monotonic()
+        longer = patience if plan.lockstep else 1.0
+        self._plant_limit_s, self._controller_limit_s = (longer * limit for limit in silence_limits_s(plan))
+        limit_s = 30.0 + 1.5 * plan.duration_s / plan.rate
+        self._limit_s = limit_s + (
+            LANDS_S if plan.hardware and not load_robot(plan.robot).kind.rests else 0.0
+        )
+        self._steps = Stall(overseer)
+        self.errors: list[str] = []
+
+    def _failed(self) -> bool:
+        overseer = self._overseer
         message = overseer.plant.message
-        held = message.startswith(HOLDS) and not end_on_estop
+        held = message.startswith(HOLDS) and not self._end_on_estop
         # Before the controller acts, a late command changes nothing; one that hangs or dies is noticed all the same.
         waits = message.startswith(NO_COMMAND) and overseer.controller.values.get("mode") == "armed"
         return overseer.plant.level == "error" and not (held or waits)
 
-    def running() -> None:
-        keeper.look()
-        plant, controller = overseer.plant, overseer.controller
-        moved(passed_s(plan, plant), state_words(distance_of(controller.values), mode_of(plant, controller)))
-        if failed():
+    def look(self) -> None:
+        """Look at the processes and at what they report.
+
+        Raises:
+            RunFailed: The run cannot go on.
+        """
+        self._keeper.look()
+        plan, overseer = self._plan, self._overseer
+        if self._failed():
             raise RunFailed(f"plant: {overseer.plant.message}")
         if overseer.controller.level == "error":
             raise RunFailed(f"controller: {overseer.controller.message}")
-        raise_if_silent("controller", overseer.silent_s(controller), controller_limit_s)
-        raise_if_silent("plant", overseer.silent_s(plant), plant_limit_s)
+        raise_if_silent("controller", overseer.silent_s(overseer.controller), self._controller_limit_s)
+        raise_if_silent("plant", overseer.silent_s(overseer.plant), self._plant_limit_s)
         if plan.lockstep:  # which takes as long as it takes, as long as it goes on
-            steps.look(passed_s(plan, plant))
-        elif time.monotonic() - began > limit_s:
-            raise RunFailed(f"the run did not end within {limit_s:.0f} s of wall-clock time")
+            self._steps.look(passed_s(plan, overseer.plant))
+        elif time.monotonic() - self._began > self._limit_s:
+            raise RunFailed(f"the run did not end within {self._limit_s:.0f} s of wall-clock time")
 
-    errors: list[str] = []
-
-    def finished() -> bool:
-        if failed():
-            errors.append(overseer.plant.message)  # kept: a command that comes now takes the error back
-        return bool(errors) or overseer.plant.values.get("mode") == "finished"
-
-    overseer.wait_until(finished, running)
-    if errors:
-        raise RunFailed(f"plant: {errors[0]}")
-    running()
+    def finished(self) -> bool:
+        """Whether the run is over, or has failed."""
+        if self._failed():
+            self.errors.append(
+                self._overseer.plant.message
+            )  # kept: a command that comes now takes the error back
+        return bool(self.errors) or self._overseer.plant.values.get("mode") == "finished"
 
 
 class Stall:

@@ -81,6 +81,8 @@ class How:
     thing: str = ""  # in space, of `configs/things`; empty: as the task has it
     seed: int = 0
     start: PoseTuple = ()  # as `State.NUMBERS`, or a place alone; empty: as the seed draws it [m, deg]
+    # Where `odom` lies in `map`, as in `fulmar_core.wires.origin.FORMS`; empty: they are one [m, deg]
+    origin: tuple[float, ...] = ()
     goal: PoseTuple | None = None  # the same; None: as the seed draws it, or not one place [m, deg]
     velocity: tuple[float, ...] = ()  # the goal of a task of velocities, as `Kind.velocity_form` [m/s, deg/s]
     height: float = (

@@ -27,9 +27,11 @@ from fulmar_core.robots.wire_check import Offer
 from fulmar_core.safety.estop import HOLDS, SILENT
 from fulmar_core.tasks import load_task
 from fulmar_core.tasks.goal import Goal, goal_at
+from fulmar_core.wires.operator_action import GOAL
 from fulmar_ros.goal_messages import TYPES, GoalMessage, goal_message, obstacles_message
 from fulmar_ros.graph import offers_of
 from fulmar_ros.living_plant import refuse_living_plant, refuse_twins, sees_living_plant
+from fulmar_ros.operator_actions import OperatorActions
 from fulmar_ros.operator_subscription import SUBSCRIPTIONS, LateSubscribers, subscribe_every
 from fulmar_ros.qos import publisher_qos
 from fulmar_ros.runtime import ros_node
@@ -71,6 +73,7 @@ class Supervisor:
         self._errors: list[Exception] = [] if errors is None else errors
         self.fail = self._errors.append  # gives up the wait of whoever waits
         self._sent: list[GoalMessage] = []  # of the current goal
+        self._actions = OperatorActions(node)
         if not plan.standing:
             _ = self._goal  # nodes that start now find it at once
         self._obstacles = (
@@ -206,6 +209,7 @@ class Supervisor:
                     part, self._task.goal_topic, stamp, self._plan.frames, form=self._task.state_type
                 )
             )
+            self._actions.say(GOAL, stamp)
             self._goal.publish(self._sent[-1])
             if not self._before_silence(partial(self._has, stamp), stamps_ns, alive):
                 return False
@@ -253,10 +257,13 @@ class Supervisor:
             lambda: self._goal.get_subscription_count() > SUBSCRIPTIONS or time.monotonic() > until_s, alive
         )
         self.publish_obstacles(goal, time_ns)
+        parts = self._timed(goal, time_ns)
         self._sent = [
             goal_message(part, self._task.goal_topic, stamp, self._plan.frames, form=self._task.state_type)
-            for part, stamp in self._timed(goal, time_ns)
+            for part, stamp in parts
         ]
+        for _, stamp in parts:
+            self._actions.say(GOAL, stamp)
         for message in self._sent:
             self._goal.publish(message)
 

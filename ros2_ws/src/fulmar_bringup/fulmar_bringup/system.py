@@ -13,15 +13,18 @@ from fulmar_core.config.recording import Recording
 from fulmar_core.config.strict_yaml import load_config
 from fulmar_core.controllers.classical import default_gains_note
 from fulmar_core.estimators.kinds import default_estimator, estimator_kind
+from fulmar_core.loop.controller_settings import GUARDS
+from fulmar_core.robots.basilisk_robots import BASILISK, check_basilisk
 from fulmar_core.robots.jsbsim_models import JSBSIM, is_jsbsim, jsbsim_model
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.safety.geofence import NO_AREA, check_area
 from fulmar_core.tasks import Task, load_task
+from fulmar_core.wires.origin import check_origin
 from fulmar_core.wires.robot_name import check_robot_name
 from hardware_drivers.hardware import hardware_of, hardware_path, load_hardware
 from policy_server.controllers import FALLBACKS, controller_entry, usual_hz
 
-SIMULATED = ("mujoco", "mock", JSBSIM)
+SIMULATED = ("mujoco", "mock", JSBSIM, BASILISK)
 BACKENDS = (*SIMULATED, "hardware")
 
 
@@ -38,6 +41,7 @@ class Guards:
     trusted_keys: str | None = None  # file or folder of public keys: only bundles that one of them has signed
     max_run_time_s: float = 0.0  # 0: none [s]
     area: tuple[float, ...] = NO_AREA  # x_min, x_max, y_min, y_max, in space also z_min, z_max [m]
+    guard: str = ""  # `envelope`: a backup law takes over before a robot leaves its bounds
 
     def __post_init__(self) -> None:
         """Refuse what has no meaning."""
@@ -53,6 +57,8 @@ class Guards:
             raise ValueError(f"'max_run_time_s' = {self.max_run_time_s:g} must not be negative.")
         if self.area != NO_AREA:
             check_area(self.area)
+        if self.guard not in GUARDS:
+            raise ValueError(f"'guard' = '{self.guard}' is not known.{did_you_mean(self.guard, GUARDS)}")
 
     @property
     def files(self) -> tuple[str, ...]:
@@ -95,6 +101,9 @@ class System:
     recorder: Recording = Recording()
     nodes: tuple[OwnNode, ...] = ()  # beside plant, controller, recorder and guards
     camera: bool = False  # a node draws what the camera of a simulated robot sees
+    origin: tuple[
+        float, ...
+    ] = ()  # where `odom` lies in `map`: x, y, deg, or with z, or six; empty: they are one
 
     def __post_init__(self) -> None:
         """Refuse a rate that nothing could run at, and a name that ROS cannot take."""
@@ -102,6 +111,8 @@ class System:
             raise ValueError(f"control_hz = {self.control_hz:g} must be greater than 0.")
         if self.name:
             check_robot_name(self.name)
+        if self.origin:
+            check_origin(self.origin)
 
 
 def load_system(name: str) -> System:
@@ -155,6 +166,8 @@ def check_names(
     controller_entry(controller).check(the_robot, the_task)
     if is_jsbsim(backend):
         jsbsim_model(the_robot, backend)
+    elif backend == BASILISK:
+        check_basilisk(the_robot)
     elif backend not in BACKENDS:
         raise UnknownNameError("backend", backend, BACKENDS)
     if backend == "hardware":

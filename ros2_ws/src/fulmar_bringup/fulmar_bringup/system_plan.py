@@ -42,6 +42,7 @@ def system_plan(system: str | None, **choices: str | None) -> RunPlan:
         recording=chosen.recorder,
         nodes=own_nodes(chosen),
         extras=(CAMERA,) if chosen.camera else (),
+        origin=chosen.origin,
         standing=True,
     )
 

@@ -16,8 +16,10 @@ from fulmar_bringup.console import console, output, showing_warnings
 from fulmar_cli.commands.bag import bag
 from fulmar_cli.commands.benchmark import benchmark
 from fulmar_cli.commands.bundle import bundle
+from fulmar_cli.commands.certify import certify
 from fulmar_cli.commands.check import check
 from fulmar_cli.commands.commission import commission
+from fulmar_cli.commands.console import console as console_page
 from fulmar_cli.commands.demo import demo
 from fulmar_cli.commands.doctor import doctor
 from fulmar_cli.commands.estop import estop
@@ -28,21 +30,28 @@ from fulmar_cli.commands.faults import faults
 from fulmar_cli.commands.goals import goals
 from fulmar_cli.commands.identify import identify
 from fulmar_cli.commands.import_policy import import_policy
+from fulmar_cli.commands.install_actions import install_actions
+from fulmar_cli.commands.install_interfaces import install_interfaces
+from fulmar_cli.commands.install_px4 import install_px4
 from fulmar_cli.commands.install_stars import install_stars
 from fulmar_cli.commands.install_tf import install_tf
 from fulmar_cli.commands.layout import layout
 from fulmar_cli.commands.list import list_names
 from fulmar_cli.commands.new import new
+from fulmar_cli.commands.parity import parity
 from fulmar_cli.commands.policies import policies
 from fulmar_cli.commands.rates import rates
 from fulmar_cli.commands.report import report
 from fulmar_cli.commands.run import run
 from fulmar_cli.commands.service import service
+from fulmar_cli.commands.simulation import simulation
 from fulmar_cli.commands.status import status
 from fulmar_cli.commands.swap import swap
 from fulmar_cli.commands.teleop import teleop
 from fulmar_cli.commands.train import train
+from fulmar_cli.commands.twin import twin
 from fulmar_cli.commands.up import up
+from fulmar_cli.commands.view import view
 from fulmar_cli.installation.extras import advice_for
 from fulmar_cli.process_environment import settle
 from fulmar_core.config.errors import (
@@ -88,29 +97,38 @@ app.command()(run)
 app.command()(up)
 app.command()(goals)
 app.command()(layout)
+app.command()(view)
 app.command()(teleop)
 app.command()(status)
 app.command()(estop)
 app.command()(swap)
 app.command()(commission)
+app.command("console")(console_page)
 app.command()(faults)
 app.command()(train)
 app.command()(policies)
 app.command()(export)
 app.command("import")(import_policy)
 app.command(epilog=MEANINGS)(evaluate)
+app.command()(certify)
+app.command()(parity)
 app.add_typer(benchmark, name="benchmark")
 app.add_typer(bundle, name="bundle")
 app.add_typer(bag, name="bag")
 app.add_typer(check, name="check")
 app.add_typer(new, name="new")
 app.add_typer(service, name="service")
+app.add_typer(simulation, name="simulation")
 app.command()(report)
 app.command()(identify)
+app.command()(twin)
 app.command()(rates)
 app.command()(demo)
 app.command()(doctor)
 app.command()(install_tf)
+app.command()(install_actions)
+app.command()(install_px4)
+app.command()(install_interfaces)
 app.command()(install_stars)
 
 

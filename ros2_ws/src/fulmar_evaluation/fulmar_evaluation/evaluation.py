@@ -17,6 +17,7 @@ from fulmar_core.estimators.readings import readings_of
 from fulmar_core.loop.fallback import warm_up
 from fulmar_core.loop.policy_bundle import read_passport
 from fulmar_core.loop.rollout import WORLDS, batches, roll_out_in_backends
+from fulmar_core.robots.basilisk_robots import BASILISK
 from fulmar_core.robots.jsbsim_models import jsbsim_model
 from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.robot_file import load_robot
@@ -36,7 +37,8 @@ from sim_nodes.camera.opengl import check_loadable
 if TYPE_CHECKING:
     from fulmar_evaluation.ros_evaluation import RosPool
 
-WAYS = ("batch", "mujoco", "ros")  # aircraft may go through `jsbsim` and `jsbsim:MODEL` too
+# Aircraft may go through `jsbsim` and `jsbsim:MODEL` too, spacecraft and satellites through `basilisk`.
+WAYS = ("batch", "mujoco", "ros")
 EPISODES, BATCH_EPISODES = 256, 4096  # by default; the second in the batch
 BOUNDED_EPISODES = 256  # whose bound `evaluate` computes by default: a boat's takes 40 ms each
 Progress = Callable[[int], None]
@@ -47,7 +49,7 @@ class Trial:
     """What to evaluate, and how."""
 
     plan: RunPlan  # robot, task, controller, rate, scenario, seed; its duration is the length of an episode
-    through: str  # one of WAYS, `jsbsim` or `jsbsim:MODEL`
+    through: str  # one of WAYS, `jsbsim`, `jsbsim:MODEL` or `basilisk`
     episodes: int
     worlds: int = WORLDS  # of a batch at once
     jobs: int = 1  # pairs of processes, through ros
@@ -162,12 +164,16 @@ def _takes_images(trial: Trial) -> bool:
 
 
 def _simulator(trial: Trial, robot: Robot, task: Task, scenario: Scenario) -> Callable[[], Backend]:
-    """What builds one simulator of a trial through MuJoCo or JSBSim."""
+    """What builds one simulator of a trial through MuJoCo, JSBSim or Basilisk."""
     if trial.through == "mujoco":
         check_loadable()
         from sim_nodes.mujoco_backend import MujocoBackend
 
         return lambda: MujocoBackend.of(robot, task, scenario)
+    if trial.through == BASILISK:
+        from sim_nodes.basilisk_backend import BasiliskBackend
+
+        return lambda: BasiliskBackend.of(robot, task, scenario)
     from sim_nodes.jsbsim_backend import JsbsimBackend
 
     model = jsbsim_model(robot, trial.through)

@@ -7,6 +7,7 @@ from math import sqrt
 
 import numpy as np
 
+from fulmar_core.robots.hydrodynamics import Hydrodynamics
 from fulmar_core.robots.robot import Robot
 from fulmar_evaluation.wrench_limits import WrenchSet
 
@@ -22,22 +23,11 @@ def performance_gaps(robot: Robot, wrenches: WrenchSet) -> Iterator[tuple[float,
 
 def _gaps(robot: Robot, wrenches: WrenchSet) -> Iterator[tuple[float, str]]:
     """How many times numbers of `performance` differ from what the actuators give, with a line."""
-    angles = np.arange(32) * 2.0 * np.pi / 32
-    forces = [i for i, axis in enumerate(wrenches.axes) if axis in ("force_x", "force_y")]
-    given = []
-    if forces:
-        directions = np.zeros((len(angles), len(wrenches.axes)))
-        directions[:, forces] = np.stack((np.cos(angles), np.sin(angles)), axis=-1) * wrenches.scale[0]
-        free = [i for i in range(len(wrenches.axes)) if i not in forces]
-        most = max(wrenches.most_along(way, free=free) for way in directions) * wrenches.scale[0]
-        given.append(("force", "N", robot.performance.force, float(most)))
-    yaw = wrenches.axes.index("torque_z")
-    if wrenches.columns[yaw].any():
-        way = np.zeros(len(wrenches.axes))
-        way[yaw] = wrenches.scale[yaw]
-        others = [i for i in range(len(wrenches.axes)) if i != yaw]
-        most = max(wrenches.most_along(sign * way, free=others) for sign in (1.0, -1.0)) * wrenches.scale[yaw]
-        given.append(("torque", "N·m", robot.performance.torque, float(most)))
+    force, torque = most_in_plane(wrenches)
+    given = [
+        ("force", "N", robot.performance.force, force),
+        ("torque", "N·m", robot.performance.torque, torque),
+    ]
     for name, unit, wanted, found in given:
         if found < 1e-9:  # none at all: that is a matter of rank
             continue
@@ -67,10 +57,36 @@ def _water_gaps(robot: Robot, wrenches: WrenchSet) -> Iterator[tuple[float, str]
         return
     gap = max(push / taken, taken / push)
     if gap > USUAL_GAP:
-        fastest = 2.0 * push / (linear + sqrt(linear**2 + 4.0 * quadratic * push))
+        fastest = fastest_in_water(water, push)
         yield (
             gap,
             f"'performance.top_speed' = {wanted:g} m/s, where 'hydrodynamics' takes {taken:.4g} N; its actuators push "
             f"by {push:.4g} N, good for {fastest:.4g} m/s. Correct whichever is wrong: linear_damping and "
             "quadratic_damping are in N per m/s and N per (m/s)².",
         )
+
+
+def most_in_plane(wrenches: WrenchSet) -> tuple[float, float]:
+    """Largest force along x and y in any direction [N], and largest torque about z [N·m]; 0 where there is none."""
+    angles = np.arange(32) * 2.0 * np.pi / 32
+    forces = [i for i, axis in enumerate(wrenches.axes) if axis in ("force_x", "force_y")]
+    force = torque = 0.0
+    if forces:
+        directions = np.zeros((len(angles), len(wrenches.axes)))
+        directions[:, forces] = np.stack((np.cos(angles), np.sin(angles)), axis=-1) * wrenches.scale[0]
+        free = [i for i in range(len(wrenches.axes)) if i not in forces]
+        force = max(wrenches.most_along(way, free=free) for way in directions) * float(wrenches.scale[0])
+    yaw = wrenches.axes.index("torque_z")
+    if wrenches.columns[yaw].any():
+        way = np.zeros(len(wrenches.axes))
+        way[yaw] = wrenches.scale[yaw]
+        others = [i for i in range(len(wrenches.axes)) if i != yaw]
+        most = max(wrenches.most_along(sign * way, free=others) for sign in (1.0, -1.0))
+        torque = most * float(wrenches.scale[yaw])
+    return force, torque
+
+
+def fastest_in_water(water: Hydrodynamics, push: float) -> float:
+    """Speed at which the drag of surge is a push ahead [N], both dampings not 0 [m/s]."""
+    linear, quadratic = water.linear_damping[0], water.quadratic_damping[0]
+    return 2.0 * push / (linear + sqrt(linear**2 + 4.0 * quadratic * push))

@@ -77,6 +77,11 @@ def check_robot(
             robot = load_robot_file(path) if path.suffix in (".yaml", ".yml") else load_robot(name)
         except ImplausibleError as error:
             return RobotCheck(path.stem, problems=(str(error),), warnings=tuple(warnings))
+        if path.suffix and robot.name != path.stem:
+            plausibility.warning(
+                f"{path}: 'name' is '{robot.name}', the file's own name is '{path.stem}'. Runs refuse it until they "
+                "are equal."
+            )
         findings = CHECKS[robot.kind.name](robot, speed=speed, altitude=altitude, height=height)
         problems = (*findings.problems(), *_controller_problems(robot))
     return RobotCheck(robot.name, robot, findings, problems, tuple(warnings))

@@ -13,6 +13,7 @@ from fulmar_core.estimators.actuator_health.supply_check import TANK_EMPTY
 from fulmar_core.robots.wire_check import BETWEEN, WARNINGS, WIRE_WARNINGS
 from fulmar_core.safety.command_range import CommandRange
 from fulmar_core.safety.estop import HOLDS
+from fulmar_evaluation.guard_figures import guard_figures, guard_text
 from fulmar_evaluation.run_evaluation import KEEP_OUT_OF, RunResult, evaluate_run
 from policy_server.controllers import EXTERNAL, controller_entry
 
@@ -77,6 +78,7 @@ def summarise(record: RunRecord) -> dict[str, Any]:
         "overruns": _total(plant, controller, "overruns"),
         "watchdog_trips": _total(plant, None, "watchdog_trips"),
         "actuator_use": _use(result),
+        "guard": guard_figures(record, result.robot if result else None),
         "estop_pressed": estop_pressed(record),
         "warnings": [*warnings_of(record), *_beyond_limits(record, result)],
         "believed_dead": believed(record, "believed_dead"),
@@ -309,6 +311,7 @@ def summary_text(summary: dict[str, Any]) -> str:
         counts = [(summary[key], key) for key in ("overruns", "watchdog_trips")]
         counted = ", ".join(f"{count} {key.replace('_', ' ')}" for count, key in counts if count is not None)
         lines.append(f"  {summary['steps']} commands{spread}" + (f"; {counted}" if counted else ""))
+    lines += guard_text(summary["guard"])
     lines += [f"  warning: {warning}" for warning in summary["warnings"]]
     for key in ("believed_dead", "believed_open"):
         if summary[key]:

@@ -15,14 +15,16 @@ from fulmar_bringup.progress import step_bar
 from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.system import check_names
 from fulmar_core.config.errors import ConfigError, UnknownNameError
+from fulmar_core.config.seeds import EVALUATION_SEED
 from fulmar_core.loop.rollout import WORLDS
+from fulmar_core.robots.basilisk_robots import BASILISK
 from fulmar_core.robots.jsbsim_models import JSBSIM, is_jsbsim
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.simulation.counts import check_episodes
 from fulmar_core.simulation.episode import episode_steps
 from fulmar_core.tasks.path_task import evaluated_task
 from fulmar_core.worlds.by_kind import check_scenario
-from fulmar_core.worlds.scenario import check_delays, load_scenario
+from fulmar_core.worlds.scenario import check_delays, check_no_link, load_scenario
 from fulmar_evaluation.evaluation import (
     BATCH_EPISODES,
     BOUNDED_EPISODES,
@@ -40,17 +42,17 @@ def plan_trial(
     robot: str,
     task: str,
     controller: str,
-    policy: Path | None,
-    through: str,
-    episodes: int | None,
-    seed: int,
-    scenario: str,
-    control_hz: float | None,
-    jobs: int | None,
-    episode_s: float | None,
-    steps: int | None,
-    worlds: int | None,
-    bounds: int | None,
+    policy: Path | None = None,
+    through: str = "mujoco",
+    episodes: int | None = None,
+    seed: int = EVALUATION_SEED,
+    scenario: str = "nominal",
+    control_hz: float | None = None,
+    jobs: int | None = None,
+    episode_s: float | None = None,
+    steps: int | None = None,
+    worlds: int | None = None,
+    bounds: int | None = None,
     thing: str = "",
     along: str = "",
 ) -> Trial:
@@ -61,7 +63,7 @@ def plan_trial(
         task: Name of the task.
         controller: Name of the controller.
         policy: Bundle.
-        through: One of `WAYS`, `jsbsim` or `jsbsim:MODEL`.
+        through: One of `WAYS`, `jsbsim`, `jsbsim:MODEL` or `basilisk`.
         episodes: Number of episodes.
         seed: Seed of the episodes.
         scenario: Name of the scenario.
@@ -78,9 +80,10 @@ def plan_trial(
         ConfigError: Unknown name or impossible value.
         BundleError: The policy is damaged or made for something else.
     """
-    if through not in WAYS and not is_jsbsim(through):
-        raise UnknownNameError("way", through, (*WAYS, JSBSIM))
-    backend = through if is_jsbsim(through) else "mujoco"
+    is_simulator = is_jsbsim(through) or through == BASILISK
+    if through not in WAYS and not is_simulator:
+        raise UnknownNameError("way", through, (*WAYS, JSBSIM, BASILISK))
+    backend = through if is_simulator else "mujoco"
     the_task = evaluated_task(task, thing=thing, along=along)
     check_names(robot, the_task, controller, backend)
     if controller_entry(controller).is_external:
@@ -91,6 +94,8 @@ def plan_trial(
     the_robot = load_robot(robot)
     check_scenario(the_robot, scenario)
     check_delays(the_robot, load_scenario(scenario))
+    if through not in ("ros", "batch"):
+        check_no_link(load_scenario(scenario), f"--through {through}")
     hz = checked_rate(the_robot, control_hz or usual_hz(controller, the_robot, the_task, policy))
     if episode_s is not None and steps is not None:
         raise ConfigError("--episode-s and --steps say the same thing. Give one of them.")

@@ -10,16 +10,18 @@ from functools import partial
 import numpy as np
 from geometry_msgs.msg import PoseStamped
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, String
 from visualization_msgs.msg import MarkerArray
 
-from fulmar_core.config.errors import FAILED, BundleError, FulmarError, TaskError
+from fulmar_core.config.errors import FAILED, FulmarError, TaskError
 from fulmar_core.controllers.controller import Controller, Inputs
 from fulmar_core.estimators.actuator_health.applied import AppliedHistory
 from fulmar_core.estimators.actuator_health.beliefs import DEAD, Beliefs
-from fulmar_core.loop.controller_settings import POLICY, ControllerSettings
+from fulmar_core.loop.controller_settings import ControllerSettings
 from fulmar_core.loop.fallback import Standby
 from fulmar_core.loop.guarded_loop import GuardedLoop
+from fulmar_core.loop.swap_request import SwapRequest
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.robots.topics import ODOMETRY
 from fulmar_core.safety.arbiter import Decision, Mode
@@ -27,16 +29,20 @@ from fulmar_core.safety.estop import EstopMonitor
 from fulmar_core.safety.input_gate import Measurement
 from fulmar_core.tasks import load_task
 from fulmar_ros.actuator_beliefs import ActuatorBeliefs
+from fulmar_ros.controller_loading import ControllerLoader, MakeController
 from fulmar_ros.controller_status import PERIOD_S, ControllerStatus
+from fulmar_ros.controller_swap import ControllerSwap
 from fulmar_ros.controller_wires import ControllerWires
 from fulmar_ros.convert import OdometryReader, VectorReader
 from fulmar_ros.deadline import ControlBeat
-from fulmar_ros.fallback import MakeController, PolicySwap, controllers_of, load_other
+from fulmar_ros.envelope_wire import EnvelopeWire
+from fulmar_ros.fallback import controllers_of
 from fulmar_ros.goal_messages import GoalMessage
 from fulmar_ros.graph import WireWatch, WriterWatch
 from fulmar_ros.mission_inputs import MissionInputs
+from fulmar_ros.neighbour_messages import NeighbourInputs
 from fulmar_ros.node_identity import identity_of
-from fulmar_ros.parameters import own_frames, read_parameters
+from fulmar_ros.parameters import name_of, own_frames, read_parameters
 from fulmar_ros.qos import SAFE_REPEATS
 from fulmar_ros.reading_inputs import ReadingInputs
 from fulmar_ros.runtime import RequestExit, settle_memory
@@ -73,10 +79,12 @@ class ControllerNode(LifecycleNode):
         hz = self.settings.control_rate(self.robot)
         self.guard: GuardedLoop | None = None  # while configured
         self._estop = EstopMonitor(required=self.settings.estop)  # a press outlives a new configuration
-        self._swap = PolicySwap(
-            self._load if self.settings.controller == POLICY else None,
+        self._loader = ControllerLoader(make_controller, self.robot, self.task, self.settings)
+        self._swap = ControllerSwap(
+            self._load,
             propose=lambda candidate: self._guarded.switch.propose(candidate),
             warn=self.get_logger().warning,
+            answer=lambda result: self.wires.publish_swap(result),
         )
         self._names, self._safe = self.robot.actuators.names, self.robot.actuators.safe_command
         frames = own_frames(self, self.robot)
@@ -84,6 +92,7 @@ class ControllerNode(LifecycleNode):
             frames, self.get_logger().warning, refuses_old_goals=self.settings.unattended
         )
         self._read_odometry, self._read_applied = OdometryReader(frames), VectorReader(self._names)
+        self._neighbours = NeighbourInputs(self.settings.others)
         self._late: Measurement | None = (
             None  # waits in lock step for the things or the goal of the same stamp
         )
@@ -145,7 +154,14 @@ class ControllerNode(LifecycleNode):
             on_bearing=self._on_bearing if self.settings.has_bearing(self.robot) else None,
             believes=any(each.controller.observer is not None for each in switch.known),
             lockstep=self.settings.lockstep,
+            goals_streamed=self.settings.goals_streamed,
+            on_neighbours=self._on_neighbours if self._keeps_apart else None,
+            fleet=self.settings.fleet,
         )
+        envelope = self.guard.loop.envelope
+        self._envelope_wire = None
+        if envelope is not None and envelope.watches:
+            self._envelope_wire = EnvelopeWire(self, name_of(self, self.robot), envelope)
         self.wires.publish_metadata(switch.current.metadata)
         self._wire_watch = WireWatch(self, self.wires.subscribed | self._readings.subscribed)
         followed = self.wires.followed | self._readings.followed
@@ -213,6 +229,8 @@ class ControllerNode(LifecycleNode):
             self.destroy_timer(self._status_timer)
             self._readings.destroy(self)
             self.wires.destroy(self)
+            if self._envelope_wire is not None:
+                self._envelope_wire.destroy()
 
     def _on_estop(self, message: Bool) -> None:
         self._estop.receive(bool(message.data), time.monotonic_ns())
@@ -227,14 +245,8 @@ class ControllerNode(LifecycleNode):
         self._swap.ask(message.data)
         self._publish_status()  # at once: an operator repeats the request until then
 
-    def _load(self, folder: str) -> Standby:
-        candidate = load_other(self._make_controller, self.robot, self.task, self.settings, folder)
-        unheard = set(candidate.controller.readings) - self._readings.newest.kinds.keys()
-        if unheard:  # subscriptions are made when the node is configured
-            raise BundleError(
-                f"policy '{folder}' takes {min(unheard)}, which this node does not receive. Start a run with it."
-            )
-        return candidate
+    def _load(self, request: SwapRequest) -> Standby:
+        return self._loader.load(request, self._guarded.switch, self._readings.newest.kinds)
 
     def _announce(self) -> None:
         """Publish the identity of the controller that acts from now on; estimates begin anew."""
@@ -265,6 +277,15 @@ class ControllerNode(LifecycleNode):
     def _on_bearing(self, message: Bool) -> None:
         self._guarded.take_bearing(bool(message.data))
         self._publish_status()
+        self._go_on()
+
+    @property
+    def _keeps_apart(self) -> bool:
+        """Whether a guard keeps the robot apart from others."""
+        return self._guarded.loop.keep_apart is not None
+
+    def _on_neighbours(self, message: JointState) -> None:
+        self._neighbours.take(message)
         self._go_on()
 
     def _go_on(self) -> None:
@@ -306,12 +327,14 @@ class ControllerNode(LifecycleNode):
         guard, answered_ns = self._guarded, self._guarded.loop.answered_ns
         if guard.mission.lacks_something_of(stamp) or not guard.bearing_known:
             return True
+        if self._keeps_apart and self._neighbours.stamp_ns < stamp:
+            return True
         reads = bool(self._readings.subscribed)
         if reads and answered_ns < 0 and self._readings.lacks_the_first(again=again):
             return True
         if reads and not again and self._readings.lacks_something_of(stamp):
             return True
-        if again or guard.loop.controller.estimator is None or not 0 < stamp - answered_ns <= self._pause_ns:
+        if again or not guard.loop.estimates or not 0 < stamp - answered_ns <= self._pause_ns:
             return False
         return self._applied.newest_ns < answered_ns and self.wires.state_published()
 
@@ -325,15 +348,16 @@ class ControllerNode(LifecycleNode):
 
     def _control(self, measurement: Measurement | None) -> None:
         """One control step on one measurement: decide, act, publish."""
-        guard = self._guarded
+        guard, stamp = self._guarded, measurement.stamp_ns if measurement else 0
         if guard.switch_controller():
-            self._swap.took_over()
+            self._swap.took_over(stamp)
             self._announce()
-        stamp = measurement.stamp_ns if measurement else 0
         if self._readings.subscribed:
             guard.readings = self._readings.newest.at(stamp)
             taken = guard.loop.controller.readings
             guard.set(image_problem=self._readings.newest.image_problem(taken, stamp))
+        if self._keeps_apart:
+            guard.readings = {**guard.readings, **self._neighbours.at(stamp)}
         command, step, took_ns = self._safe, None, 0
         try:
             decision, inputs = guard.begin_step(measurement, time.monotonic_ns())
@@ -352,6 +376,8 @@ class ControllerNode(LifecycleNode):
         speaks = step is not None or decision.mode is not Mode.IDLE
         if speaks and not self._send(partial(self.wires.publish_command, command, stamp)):
             return
+        if self._envelope_wire is not None:
+            self._envelope_wire.publish()
         self._status.steps += 1
         if inputs is not None and step is not None:
             self._status.inference_ms.add(took_ns / 1e6)
@@ -430,12 +456,20 @@ class ControllerNode(LifecycleNode):
     def _publish_idle_status(self) -> None:
         """Publish the status where no control step does it."""
         self.wires.relayed.look()
+        self._see_goal_giver()
+        self._swap.look()
         self._status.wire_problems = self._wire_watch.look()
         self._see_writers()
         self._status.inputs_refused = self._readings.newest.refused, self._readings.newest.refusal
         flags = self._guarded.flags
         if self.settings.lockstep or not flags.activated or flags.latched_fault:
             self._publish_status()
+
+    def _see_goal_giver(self) -> None:
+        """Find out who gave the goal that counts."""
+        stamp_ns = self._guarded.mission.goal_stamp_ns
+        self.wires.goal_givers.look(stamp_ns)
+        self._status.goal_by = self.wires.goal_givers.by(stamp_ns)
 
     def _see_writers(self) -> None:
         """Follow no odometry while more than one node publishes an input."""

@@ -10,8 +10,8 @@ from fulmar_core.loop.guarded_loop import GuardedLoop
 from fulmar_core.robots.wire_check import BETWEEN, WIRE_WARNINGS
 from fulmar_core.safety.arbiter import Decision, Mode
 from fulmar_core.safety.keep_out import ENTERED, HAD_ENTERED, HAD_HELD
+from fulmar_ros.controller_swap import ControllerSwap
 from fulmar_ros.deadline import Deadlines, Spread
-from fulmar_ros.fallback import PolicySwap
 from fulmar_ros.health import Health
 
 PERIOD_S = 0.4  # at least 2 Hz
@@ -26,18 +26,20 @@ class ControllerStatus:
         wire_problems: Publishers from which nothing arrives, in words.
         contested: Which nodes publish one input, where more than one does, in words.
         two_cameras: The same of images, which is a warning alone: a camera that died is started anew.
+        goal_by: Which node gave the goal that counts, as far as that is known.
         inputs_refused: How many readings beside the odometry were refused, and why the newest of them was; empty if it
             was not.
     """
 
-    def __init__(self, swap: PolicySwap, identity: Mapping[str, str], *, goals_streamed: bool) -> None:
-        """Report swaps of policies and the values of `node_identity` too; streamed goals count as no change."""
+    def __init__(self, swap: ControllerSwap, identity: Mapping[str, str], *, goals_streamed: bool) -> None:
+        """Report swaps of controllers and the values of `node_identity` too; streamed goals count as no change."""
         self._swap, self._identity, self._goals_streamed = swap, dict(identity), goals_streamed
         self.steps = 0
         self.inference_ms = Spread()
         self.wire_problems: list[str] = []
         self.contested = self.two_cameras = ""
         self.inputs_refused = 0, ""
+        self.goal_by = ""
         self._said: tuple[object, ...] = ()
         self._said_at = 0.0
 
@@ -60,7 +62,8 @@ class ControllerStatus:
         """
         mission, switch = guard.mission, guard.switch
         refusal = guard.refusal if guard.refusal.reason else guard.too_far
-        held = guard.held
+        held, apart, leaderless = guard.held, guard.kept_apart, guard.lost_leader
+        hindered = leaderless or apart
         standby, last_input_ns = switch.current, guard.flags.last_input_ns
         changed = (
             decision.mode,
@@ -79,10 +82,13 @@ class ControllerStatus:
             len(beliefs.words),
             guard.flags.unconverged,
             bool(held),
+            apart,
+            leaderless,
             guard.input_warning,
             self.contested,
             self.two_cameras,
             self._swap.requests,
+            self.goal_by,
         )
         now = time.monotonic()
         if changed == self._said and now - self._said_at < PERIOD_S:
@@ -92,7 +98,14 @@ class ControllerStatus:
         level = {Mode.ACTIVE: "ok", Mode.FAULT: "error"}.get(decision.mode, "warn")
         level = "error" if unconverged or self.contested else level
         level = "error" if ENTERED in held else level
-        doubtful = switch.fell_back or held or self.wire_problems or beliefs.words or self.inputs_refused[1]
+        doubtful = (
+            switch.fell_back
+            or held
+            or hindered
+            or self.wire_problems
+            or beliefs.words
+            or self.inputs_refused[1]
+        )
         level = "warn" if level == "ok" and doubtful else level
         age_ms = (time.monotonic_ns() - last_input_ns) / 1e6 if last_input_ns else 0.0
         values = {
@@ -108,9 +121,13 @@ class ControllerStatus:
             "beliefs": "; ".join(beliefs.words),
             "unconverged": unconverged,
             "keep_out": held,
+            "keep_apart": apart,
+            "formation": leaderless,
+            "keep_apart_steps": str(guard.loop.keep_apart.interventions if guard.loop.keep_apart else 0),
             "swap_requests": str(self._swap.requests),
             "epoch": str(guard.epoch),
             "goal_stamp_ns": str(mission.goal_stamp_ns),
+            "goal_by": self.goal_by,
             "obstacles_stamp_ns": str(mission.obstacles_stamp_ns),
             "goal_refused": refusal.reason,
             "goal_refused_stamp_ns": str(refusal.stamp_ns),
@@ -130,7 +147,7 @@ class ControllerStatus:
             **deadlines.period_error_ms.percentiles("period_error_ms"),
         }
         warnings = BETWEEN.join([*self.wire_problems, *beliefs.words])
-        message = decision.reason or held or warnings or decision.mode.value
+        message = decision.reason or held or hindered or warnings or decision.mode.value
         entered = HAD_ENTERED if ENTERED in held else HAD_HELD if held else ""
         its = unconverged, entered, self.contested, self.two_cameras, guard.input_warning
         warned = [*beliefs.warnings, *(words for words in its if words)]

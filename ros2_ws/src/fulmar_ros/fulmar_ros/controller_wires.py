@@ -17,6 +17,7 @@ from std_msgs.msg import Bool, String
 from visualization_msgs.msg import MarkerArray
 
 from fulmar_core.estimators.actuator_health.thruster_health import can_estimate_health
+from fulmar_core.loop.swap_request import SwapResult
 from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.topics import (
     ACTION,
@@ -26,12 +27,16 @@ from fulmar_core.robots.topics import (
     BELIEVED,
     ESTOP,
     ESTOP_RELEASED,
+    FLEET_ESTOP,
     METADATA,
+    NEIGHBOURS,
     OBSERVATION,
     OBSTACLES,
     ODOMETRY,
+    OPERATOR_ACTION,
     STATUS,
     SWAP,
+    SWAP_RESULT,
     VELOCITY_COMMAND,
     Wire,
     command_wire,
@@ -40,6 +45,7 @@ from fulmar_core.robots.topics import (
 from fulmar_core.states.state import RigidBodyState
 from fulmar_core.tasks import Task
 from fulmar_ros.convert import OdometryWriter, TwistWriter, VectorWriter
+from fulmar_ros.goal_givers import GoalGivers
 from fulmar_ros.goal_messages import TYPES, GoalMessage
 from fulmar_ros.health import Health
 from fulmar_ros.operator_subscription import destroy_all, subscribe_every
@@ -71,6 +77,9 @@ class ControllerWires:
         on_bearing: Callable[[Bool], None] | None,
         believes: bool,
         lockstep: bool,
+        goals_streamed: bool = False,
+        on_neighbours: Callable[[JointState], None] | None = None,
+        fleet: bool = False,
     ) -> None:
         """Create every endpoint.
 
@@ -85,11 +94,14 @@ class ControllerWires:
             on_thing: Receives the name of a thing and its pose.
             on_estop: Receives whether the e-stop is pressed.
             on_estop_released: Receives each reset of the e-stop.
-            on_swap: Receives the folder of the policy that shall take over.
+            on_swap: Receives each request to change the controller.
             on_applied: Receives what the actuators do, serialised.
             on_bearing: Receives whether the air bearing is on; None where there is none.
             believes: Whether a controller has an observer whose state is published.
             lockstep: Ask for lost odometry again, since the plant waits, and wait for readers that lag behind.
+            goals_streamed: A goal comes with each odometry.
+            on_neighbours: Receives where the other robots of a fleet are; None: nothing depends on it.
+            fleet: Whether the e-stop of a fleet counts, too.
         """
         wire = command_wire(robot)
         qos = partial(publisher_qos, lockstep=lockstep)
@@ -105,12 +117,13 @@ class ControllerWires:
             self._health = node.create_publisher(JointState, ACTUATORS_HEALTH.name, qos(ACTUATORS_HEALTH))
         self._believed = node.create_publisher(Odometry, BELIEVED.name, qos(BELIEVED)) if believes else None
         self._metadata = node.create_publisher(String, METADATA.name, publisher_qos(METADATA))
+        self._swapped = node.create_publisher(String, SWAP_RESULT.name, publisher_qos(SWAP_RESULT))
         status = node.create_publisher(DiagnosticArray, STATUS.name, publisher_qos(STATUS))
         self.health = Health(node, f"{name_of(node, robot)}: controller", status)
         self._actuators, self._frames = robot.actuators, own_frames(node, robot)
         streams = (self._command, self._observation, self._action, self._health, self._believed)
         self._streams = [publisher for publisher in streams if publisher is not None]
-        self._publishers = (*self._streams, self._metadata, *self.health.publishers)
+        self._publishers = (*self._streams, self._metadata, self._swapped, *self.health.publishers)
         self._write_command = self._command_writer()
         self._newest: bytes | None = None
         self._action_size = len(robot.actuators.names)
@@ -129,15 +142,24 @@ class ControllerWires:
         # Before the odometry: of two messages that wait, an executor takes that of the older subscription first.
         if on_bearing is not None:
             self.followed[AIR_BEARING.name] = self._every(Bool, AIR_BEARING, on_bearing)
+        if on_neighbours is not None:
+            others = subscriber_qos(NEIGHBOURS, reliable=lockstep)
+            made = node.create_subscription(JointState, NEIGHBOURS.name, on_neighbours, others)
+            self._follow(NEIGHBOURS, made, lockstep=lockstep)
         applied = subscriber_qos(ACTUATORS_STATE, reliable=lockstep, depth=APPLIED_DEPTH)
         made = node.create_subscription(JointState, ACTUATORS_STATE.name, on_applied, applied, raw=True)
         self._follow(ACTUATORS_STATE, made, lockstep=lockstep)
         made = node.create_subscription(Odometry, ODOMETRY.name, on_odometry, odometry_qos, raw=True)
         self._follow(ODOMETRY, made, lockstep=lockstep)
         self._operated(Bool, ESTOP, self._relay.relaying(ESTOP, partial(self._see_estop, on_estop)))
+        if fleet:
+            self._every(Bool, FLEET_ESTOP, partial(self._see_fleet_estop, on_estop))
         self._every(String, ESTOP_RELEASED, partial(self._see_release, on_estop_released))
         self._every(String, SWAP, on_swap)
-        for goal in goal_wires(task.goal_topic):
+        goals = goal_wires(task.goal_topic)
+        self.goal_givers = GoalGivers(node, goals, streamed=goals_streamed)
+        self.subscribed[OPERATOR_ACTION] = False
+        for goal in goals:
             self._operated(TYPES[goal.name], goal, on_goal)
         if task.sees_obstacles:
             self._operated(MarkerArray, OBSTACLES, lambda message, _info: on_obstacles(message))
@@ -160,6 +182,10 @@ class ControllerWires:
         if message.data:
             self.relayed.forget()
         on_estop(message)
+
+    def _see_fleet_estop(self, on_estop: Callable[[Bool], None], message: Bool) -> None:
+        if message.data:  # the reset is that of each robot
+            self._see_estop(on_estop, message, {})
 
     def _see_release(self, on_released: Callable[[String], None], message: String) -> None:
         self.relayed.forget()  # what came while the e-stop was pressed is refused, whichever way it comes
@@ -206,6 +232,7 @@ class ControllerWires:
     def destroy(self, node: LifecycleNode) -> None:
         """Destroy every endpoint."""
         destroy_all(node, self._subscriptions)
+        self.goal_givers.destroy(node)
         self.relayed.destroy(node)
         self._relay.destroy(node)
         for publisher in self._publishers:
@@ -249,3 +276,7 @@ class ControllerWires:
     def publish_metadata(self, text: str) -> None:
         """Publish the metadata of the controller that acts: a JSON object."""
         self._metadata.publish(String(data=text))
+
+    def publish_swap(self, result: SwapResult) -> None:
+        """Publish the answer to a request to change the controller."""
+        self._swapped.publish(String(data=result.to_text()))

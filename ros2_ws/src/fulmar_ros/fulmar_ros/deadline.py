@@ -68,6 +68,14 @@ class Deadlines:
         """
         self._anchor_ns = anchor_ns
 
+    def change(self, period_s: float) -> None:
+        """Beat with another period, > 0 [s], from the next beat on."""
+        self._period_ns, self._last_ns = round(period_s * NS), None
+
+    def begin_anew(self) -> None:
+        """The beat has rested on purpose: what passed meanwhile is no overrun, and the next deadline is now."""
+        self._next_ns = self._last_ns = None
+
     def wait(self, stop: threading.Event) -> bool:
         """Sleep until the next deadline; the first one is now. False once another thread has set `stop`.
 

@@ -28,7 +28,9 @@ from fulmar_core.robots.topics import (
     command_wire,
 )
 from fulmar_core.safety.estop import REPUBLISH_HZ, EstopButton
+from fulmar_core.wires import operator_action
 from fulmar_ros.health import Health
+from fulmar_ros.operator_actions import OperatorActions, who
 from fulmar_ros.operator_subscription import subscribe_every
 from fulmar_ros.parameters import name_of, read_parameters
 from fulmar_ros.qos import LAST_WORDS_S, publisher_qos, subscriber_qos
@@ -68,6 +70,7 @@ class EstopNode(Node):
         self._own: deque[tuple[int, int, int]] = deque(maxlen=OWN_MESSAGES)  # number, and sent between [ns]
         self._publisher = self.create_publisher(Bool, ESTOP.name, publisher_qos(ESTOP))
         self._released = self.create_publisher(String, ESTOP_RELEASED.name, publisher_qos(ESTOP_RELEASED))
+        self._actions = OperatorActions(self, by=f"{who(self)}, by its service")
         self._relayed = RelayedInputs(self)
         pressed = self._relayed.receiver(Bool, ESTOP, self._on_estop)
         subscribe_every(self, Bool, ESTOP, pressed, with_info=True)
@@ -110,6 +113,8 @@ class EstopNode(Node):
         return any(number == own and begin <= sent_ns <= end for own, begin, end in self._own)
 
     def _trigger(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        if not self._button.pressed:
+            self._actions.say(operator_action.ESTOP)
         self._button.press()
         self._publish()
         self.get_logger().warning("e-stop pressed")

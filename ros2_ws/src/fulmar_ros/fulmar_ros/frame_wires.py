@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
+import numpy as np
 from geometry_msgs.msg import TransformStamped
 from rclpy.node import Node
 from rclpy.publisher import Publisher
@@ -12,7 +13,7 @@ from rclpy.qos import QoSProfile
 from std_msgs.msg import String
 
 from fulmar_core.robots.robot import Robot
-from fulmar_core.robots.topics import DESCRIPTION, STATIC_TRANSFORMS, TRANSFORMS, Wire
+from fulmar_core.robots.topics import DESCRIPTION, ORIGIN, STATIC_TRANSFORMS, TRANSFORMS, Wire
 from fulmar_core.robots.urdf import body_frames, urdf_of
 from fulmar_core.states.state import RigidBodyState
 from fulmar_core.wires.robot_name import Frames
@@ -71,7 +72,7 @@ def odometry_transform(
 
 
 class ModelWires:
-    """`robot_description` and /tf_static of one robot, published once and latched."""
+    """`robot_description`, `origin` and /tf_static of one robot, published once and latched."""
 
     def __init__(
         self,
@@ -80,8 +81,9 @@ class ModelWires:
         frames: Frames,
         qos: Callable[[Wire], QoSProfile],
         *,
-        simulated: bool,
         transforms: bool,
+        origin: Sequence[float],
+        in_map: bool,
     ) -> None:
         """Publish them.
 
@@ -90,20 +92,31 @@ class ModelWires:
             robot: The robot.
             frames: Of the robot.
             qos: Quality of service of a wire.
-            simulated: Whether `map`, the frame of the ground truth, is connected with `odom`.
             transforms: Whether /tf_static is published, where tf2_msgs is installed.
+            origin: Pose of `odom` in `map`: x, y, z [m], quaternion x, y, z, w.
+            in_map: Whether /tf_static says it too; on a real robot another node may know better.
         """
         description = node.create_publisher(String, DESCRIPTION.name, qos(DESCRIPTION))
         description.publish(String(data=urdf_of(robot, frames)))
-        self.publishers = [description]
+        x, y, z, *turned = origin
+        begins = _fixed("map", frames.odom, (x, y, z), (turned[0], turned[1], turned[2], turned[3]))
+        where = node.create_publisher(TransformStamped, ORIGIN.name, qos(ORIGIN))
+        where.publish(begins)
+        self.publishers = [description, where]
         if transforms and TFMessage is not None:
             fixed = [_fixed(frames.base, frames.named(part.name), part.position, part.quat_xyzw)
                      for part in body_frames(robot)]  # fmt: skip
-            if simulated:
-                fixed.append(_fixed("map", frames.odom))
+            if in_map:
+                fixed.append(begins)
             static = node.create_publisher(TFMessage, STATIC_TRANSFORMS.name, qos(STATIC_TRANSFORMS))
             static.publish(TFMessage(transforms=fixed))
             self.publishers.append(static)
+
+
+def pose_of(message: TransformStamped) -> np.ndarray:
+    """Pose of a transform's child in its parent: x, y, z [m], quaternion x, y, z, w."""
+    t, q = message.transform.translation, message.transform.rotation
+    return np.array([t.x, t.y, t.z, q.x, q.y, q.z, q.w], dtype=float)
 
 
 def _fixed(

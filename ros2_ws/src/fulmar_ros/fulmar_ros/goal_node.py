@@ -25,16 +25,17 @@ from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.robots.topics import GOAL_PATH, GOAL_WIRES, ODOMETRY, STATUS
 from fulmar_core.safety.arbiter import BEYOND_GEOFENCE
 from fulmar_core.safety.geofence import OUT_OF_BOUNDS
-from fulmar_core.safety.input_gate import InputGate, Measurement
-from fulmar_core.states.spatial import SpatialState
+from fulmar_core.safety.input_gate import Measurement, helper_gate
 from fulmar_core.states.state import State
 from fulmar_core.tasks import load_task
 from fulmar_core.tasks.goal import Goal
 from fulmar_core.tasks.goal_files import GoalFile, load_goals
 from fulmar_core.tasks.goal_sequence import goal_sequence
+from fulmar_core.wires.operator_action import GOAL
 from fulmar_ros.goal_messages import TYPES, GoalMessage, goal_message
 from fulmar_ros.graph import UNNAMED_NODE, running_robots_text
 from fulmar_ros.health import Health
+from fulmar_ros.operator_actions import OperatorActions
 from fulmar_ros.operator_subscription import LateSubscribers, subscribe_every
 from fulmar_ros.parameters import name_of, own_frames, read_parameters
 from fulmar_ros.qos import EVERYTHING, publish_patiently, publisher_qos
@@ -101,13 +102,7 @@ class GoalNode(Node):
         self._title = goals.title
         self._sequence = goal_sequence(goals, robot, as_path=self._settings.as_path)
         self._request_exit = request_exit
-        # Controllers check for stuck sensors.
-        self._gate = InputGate(
-            robot.limits,
-            frozen_after=0,
-            turns_freely=robot.state_type is SpatialState,
-            turns_only=robot.actuators.turns_only,
-        )
+        self._gate = helper_gate(robot)
         self._lock = threading.Lock()
         self._sent: Goal | None = None
         self._newest: Measurement | None = None
@@ -132,6 +127,7 @@ class GoalNode(Node):
         self._publisher = self.create_publisher(
             TYPES[wire.name], wire.name, publisher_qos(wire, depth=EVERYTHING if streamed else None)
         )
+        self._actions = OperatorActions(self)
         self._message: GoalMessage | None = None  # the newest
         if not self._settings.lockstep:  # there a goal comes with each odometry
             LateSubscribers(self, self._publisher, lambda: [self._message] if self._message else [])
@@ -202,6 +198,8 @@ class GoalNode(Node):
         self._message = goal_message(
             goal, self._sequence.topic, stamp_ns, self._frames, form=self._sequence.form
         )
+        if not self._settings.lockstep:  # there a goal comes with each odometry
+            self._actions.say(GOAL, stamp_ns)
         self._publish(self._publisher, self._message)
         if self._single and self._sent is None:
             self.get_logger().info(f"published {self._title} on {self._publisher.topic_name}")

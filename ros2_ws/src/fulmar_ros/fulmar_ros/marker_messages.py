@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from geometry_msgs.msg import Point
 from visualization_msgs.msg import Marker, MarkerArray
 
@@ -17,6 +19,7 @@ TYPES = {
     "line": Marker.LINE_STRIP,
     "segments": Marker.LINE_LIST,
     "spheres": Marker.SPHERE_LIST,
+    "mesh": Marker.MESH_RESOURCE,
 }
 
 
@@ -32,6 +35,8 @@ def marker_of(shape: Shape, frames: Frames) -> Marker:
     marker.scale.x, marker.scale.y, marker.scale.z = shape.size
     marker.color.r, marker.color.g, marker.color.b, marker.color.a = shape.color
     marker.points = [Point(x=x, y=y, z=z) for x, y, z in shape.points]
+    if shape.file:
+        marker.mesh_resource = Path(shape.file).as_uri()
     return marker
 
 

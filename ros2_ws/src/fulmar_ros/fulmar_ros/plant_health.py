@@ -34,6 +34,8 @@ class PlantHealth:
         reason: Why it is in fault, or could not be configured.
         awaited: Subscribers without whom it does not begin.
         more: Health that a device reports; see `hardware_drivers.driver.DeviceDriver`.
+        simulation: What a person does to a simulation; see `simulation_wires`.
+        link: What a simulated link has lost; see `plant_link`.
         feedback: Finds parts that do not do what is applied to them; None before the loops are made.
     """
 
@@ -48,6 +50,8 @@ class PlantHealth:
         self._said_at = 0.0
         self.more: Callable[[], dict[str, str]] = dict
         self.feedback: ActuatorFeedback | None = None
+        self.simulation: Callable[[], dict[str, str]] = dict
+        self.link: Callable[[], dict[str, str]] = dict
 
     def open(self, node: LifecycleNode, identity: Mapping[str, str]) -> None:
         """Begin to publish, with the values of `node_identity`."""
@@ -77,6 +81,7 @@ class PlantHealth:
     def publish(self) -> None:
         """Publish on change, to a subscriber that has come, and once a second."""
         self._wires.see_writers()
+        self._wires.estop.look()
         level, message, key = self._status()
         more = self.more()
         unfit = BETWEEN.join(self._wire_watch.look())
@@ -87,9 +92,13 @@ class PlantHealth:
         warning = more.get("warning", "") or "; ".join(failed) or low or unfit
         if warning and level == "ok":
             level, message = "warn", warning
-        guard, listeners = self._guard, self._health.listeners()
+        guard, listeners, simulation = self._guard, self._health.listeners(), self.simulation()
+        if simulation.get("paused") == "true" and level == "ok":
+            message = "paused"
         changed = (
-            self.mode, self.reason, key, warning, guard.watchdog.trips, guard.rejected, listeners, self._doing
+            self.mode, self.reason, key, warning, guard.watchdog.trips, guard.rejected, listeners, self._doing,
+            self._wires.estop.held(), self._wires.estop.by,
+            *simulation.values(),
         )  # fmt: skip
         now = time.monotonic()
         if changed == self._said and now - self._said_at < AT_LEAST_S:
@@ -97,7 +106,8 @@ class PlantHealth:
         self._said, self._said_at = changed, now
         held = self._held()
         parts = ", ".join(finding.part for finding in findings if finding.part)
-        values = self._values() | {"failed_parts": parts, WIRE_WARNINGS: unfit} | more
+        values = self._values() | {"failed_parts": parts, WIRE_WARNINGS: unfit} | more | simulation
+        values |= self.link()
         if supply is not None and supply.pressure is not None:
             values["supply_pressure_bar"] = f"{1e-5 * supply.pressure:.2f}"
         if supply is not None and supply.empty is not None:
@@ -191,6 +201,8 @@ class PlantHealth:
             "watchdog_trips": str(self._guard.watchdog.trips),
             "rejected_commands": str(self._guard.rejected),
             "commanded_by": self._commander(),
+            "estop": str(self._wires.estop.held()).lower(),
+            "estop_by": self._wires.estop.by,
             "safe_controller": self._doing,
             "answers": str(self._wires.answers),
             **self._wires.latency_ms.percentiles("latency_ms"),

@@ -15,8 +15,10 @@ from fulmar_core.estimators.actuator_health.feedback_check import ActuatorFeedba
 from fulmar_core.robots.actuators.refuge import DOWN
 from fulmar_core.robots.robot import Robot
 from fulmar_core.safety.actuator_guard import ActuatorGuard
+from fulmar_core.safety.command_end import TakesEnds
 from fulmar_core.simulation.backend import AirBearing, Backend, Sample
 from fulmar_ros.deadline import Deadlines
+from fulmar_ros.pace import ALWAYS, Pace
 from fulmar_ros.plant_clock import SimulatedTime, WallTime
 from fulmar_ros.plant_wires import PlantWires
 
@@ -38,13 +40,15 @@ class LockstepLoop:
         answer_timeout_s: float,
         publish_bearing: Callable[[], None] = lambda: None,
         feedback: ActuatorFeedback | None = None,
+        pace: Pace = ALWAYS,
     ) -> None:
         """Step a simulator at `control_hz` [Hz], waiting at most `answer_timeout_s` [s] for each command.
 
         `publish_bearing` publishes the state of the air bearing, and waits until every subscriber has it; `feedback`
-        compares what is applied with what is measured.
+        compares what is applied with what is measured; `pace` says when a step may begin.
         """
         self._backend, self._wires, self._guard, self._clock = backend, wires, guard, clock
+        self._pace = pace
         self._bearing = (
             backend if isinstance(backend, AirBearing) else None
         )  # asking takes as long as a sensor
@@ -67,6 +71,9 @@ class LockstepLoop:
         """
         done = 0
         while not stop.is_set() and (steps is None or done < steps):
+            if self._pace.paused:  # who steps it sees what each step led to
+                self._wires.publish_truth(sample, self._clock.now_ns)
+            self._pace.wait(stop)
             command = self._exchange(sample, stop)
             if command is None:
                 return
@@ -229,13 +236,16 @@ class RealtimeLoop:
         *,
         rate: float,
         feedback: ActuatorFeedback | None = None,
+        pace: Pace = ALWAYS,
     ) -> None:
         """Step a simulator or a robot; `rate` is simulated seconds a wall-clock second, > 0.
 
-        `feedback` compares what is applied with what is measured.
+        `feedback` compares what is applied with what is measured; `pace` says when a tick may begin.
         """
-        self._feedback = feedback
+        self._feedback, self._pace = feedback, pace
+        self._fastest = self.rate = rate
         self._backend, self._wires, self._guard, self._clock = backend, wires, guard, clock
+        self._ends = backend if isinstance(backend, TakesEnds) else None
         self._dt = backend.robot.timing.physics_dt
         self.period_s = self._dt / rate
         self.deadlines = Deadlines(self.period_s)
@@ -252,6 +262,10 @@ class RealtimeLoop:
         self._ticked_ns = time.monotonic_ns()
         self._wires.publish_sample(sample, self._clock.now_ns)
         while self._goes_on(ticks, lands=lands) and self.deadlines.wait(stop):
+            if self._pace.paused:
+                self._stand_still(stop)
+                if stop.is_set():
+                    return
             command, begun_ns = self._command(sample), self._clock.now_ns
             sample = self._backend.step(command)
             applied = command if sample.applied is None else sample.applied
@@ -262,6 +276,15 @@ class RealtimeLoop:
             self._ticked_ns = time.monotonic_ns()
             self._wires.publish_sample(sample, self._clock.now_ns)
 
+    def _stand_still(self, stop: threading.Event) -> None:
+        """Wait for the next step, or for the end of the pause; the silence of a controller does not grow meanwhile."""
+        with self._wires.lock:
+            self._guard.watchdog.hold(time.monotonic_ns())
+        self._pace.wait(stop)
+        with self._wires.lock:
+            self._guard.watchdog.go_on(time.monotonic_ns())
+        self.deadlines.begin_anew()
+
     def _goes_on(self, ticks: int | None, *, lands: bool) -> bool:
         if ticks is None or self.ticks < ticks:
             return True
@@ -271,14 +294,31 @@ class RealtimeLoop:
                 return True  # one tick more, by which the safe controller begins
             return self._guard.handed_over and self._guard.doing not in ("", DOWN)
 
+    def change_rate(self, rate: float) -> str:
+        """Tick at another rate from the next tick on, from any thread; returns why not."""
+        if rate > self._fastest:
+            return (
+                f"'rate' is {rate:g}, at most {self._fastest:g}: the controller keeps the beat that it was started "
+                "with, and would be too slow. Start both with --rate."
+            )
+        self.rate, self.period_s = rate, self._dt / rate
+        self.deadlines.change(self.period_s)
+        return ""
+
     def since_tick_s(self, now_ns: int) -> float:
         """Time since the last finished step, 0 before the first [s]; `now_ns` by the monotonic clock."""
+        if self._pace.paused:
+            self._ticked_ns = now_ns
         return 0.0 if self._ticked_ns is None else (now_ns - self._ticked_ns) / 1e9
 
     def _command(self, sample: Sample) -> np.ndarray:
         with self._wires.lock:
+            self._wires.take_arrived()
             self._guard.see_refusal(sample.refusal)
-            return self._guard.output(time.monotonic_ns(), sample.odometry, plant_ns=self._clock.steady_ns)
+            now_ns = time.monotonic_ns()
+            if self._ends is not None:
+                self._ends.take_end(self._guard.end(now_ns))
+            return self._guard.output(now_ns, sample.odometry, plant_ns=self._clock.steady_ns)
 
 
 def _compare(
@@ -297,4 +337,4 @@ def _compare(
     if failed is not None:
         stuck = None if failed.value is None else (failed.part, failed.value)
         with wires.lock:
-            guard.fail(failed.words, time.monotonic_ns(), stuck)
+            guard.fail(failed.words, wires.steady_ns, stuck)

@@ -17,11 +17,14 @@ from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.robots.topics import CLOCK, DIAGNOSTICS
 from fulmar_core.safety.actuator_guard import ActuatorGuard
+from fulmar_core.safety.command_end import TakesEnds
 from fulmar_core.safety.estop import EstopMonitor
 from fulmar_core.safety.watchdog import Watchdog
 from fulmar_core.simulation.backend import AirBearing, Backend, Sample
+from fulmar_core.simulation.disturbed import Disturbed
 from fulmar_core.simulation.episode import Episode
 from fulmar_core.tasks import load_task
+from fulmar_core.wires.origin import origin_pose
 from fulmar_core.worlds.scenario import load_scenario
 from fulmar_ros.air_bearing import AirBearingWires
 from fulmar_ros.lifecycle_requests import refuse_impossible_transitions
@@ -29,14 +32,19 @@ from fulmar_ros.living_plant import BRIEFLY_S, LATE_S, others_in, refuse_living_
 from fulmar_ros.motion_capture import MakeCapture, capture_maker
 from fulmar_ros.node_identity import identity_of
 from fulmar_ros.operator_subscription import destroy_all, subscribe_every
+from fulmar_ros.pace import Pace
 from fulmar_ros.parameters import name_of, read_parameters
 from fulmar_ros.plant_clock import SimulatedTime, WallTime, other_clocks
 from fulmar_ros.plant_health import PlantHealth
+from fulmar_ros.plant_link import plant_link
+from fulmar_ros.plant_link_loop import LinkLoop
 from fulmar_ros.plant_loops import ChainLoop, LockstepLoop, OnStep, RealtimeLoop, UnansweredLoop
 from fulmar_ros.plant_settings import PlantSettings, first_episode
 from fulmar_ros.plant_wires import PlantWires
 from fulmar_ros.qos import SAFE_REPEATS
+from fulmar_ros.robot_info_wire import RobotInfoWire
 from fulmar_ros.runtime import RequestExit, settle_memory
+from fulmar_ros.simulation_wires import SimulationWires
 
 MakeBackend = Callable[[Robot, PlantSettings], Backend]
 DONE, REFUSED = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
@@ -73,16 +81,19 @@ class PlantNode(LifecycleNode):
         Raises:
             FulmarError: A parameter or a configuration file is wrong, or another plant of this name lives.
         """
-        super().__init__("plant", cli_args=cli_args)
+        super().__init__("plant", cli_args=cli_args, use_global_arguments=cli_args is None)
         refuse_impossible_transitions(self)
         self._made_s = time.monotonic()
         self._started_ns = time.time_ns()
         self.settings = read_parameters(self, settings_class)
         self.robot = load_robot(self.settings.robot)
-        load_scenario(self.settings.scenario)  # a wrong name is refused before anything starts
+        link = load_scenario(self.settings.scenario).link  # a wrong name is refused before anything starts
+        self._link = plant_link(link, lockstep=self.settings.lockstep, chain=self.settings.between)
+        in_step = self.settings.lockstep and self._link is None  # time stands still until a command comes
         load_task(self.settings.task, self.settings.thing)
         self._make_backend, self._request_exit, self._simulated = make_backend, request_exit, simulated
         self._backend: Backend | None = None
+        self._simulation: SimulationWires | None = None
         self._exit_code = 0
         self._air: AirBearingWires | None = None
         self._thread: threading.Thread | None = None
@@ -107,8 +118,9 @@ class PlantNode(LifecycleNode):
             estop=EstopMonitor(required=self.settings.estop),
             control_dt=1.0 / rate,
             period_s=1.0 / (rate * min(self.settings.rate, 1.0)),
-            lockstep=self.settings.lockstep,
-            refuge=refuge_of(self.robot, rate if self.settings.lockstep else ticks_hz),
+            lockstep=in_step,
+            refuge=refuge_of(self.robot, rate if in_step else ticks_hz),
+            wall_ns=time.monotonic_ns,
         )
         self.clock = SimulatedTime() if simulated else WallTime()
         if self.settings.autostart:
@@ -124,7 +136,8 @@ class PlantNode(LifecycleNode):
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Build the backend and every endpoint."""
         try:
-            self.robot.timing.substeps(self.settings.control_rate(self.robot))
+            ticks = self.robot.timing.substeps(self.settings.control_rate(self.robot))
+            self._pace = Pace(1 if self.settings.lockstep else ticks)
             self._backend = self._make_backend(self.robot, self.settings)
         except (FulmarError, ValueError, ImportError) as error:
             self.health.reason = str(error)
@@ -137,7 +150,7 @@ class PlantNode(LifecycleNode):
             self.robot,
             self.guard,
             simulated=self._simulated,
-            clock=self._simulated and not self._clock_is_taken(),
+            clock=self._simulated and self.settings.clock and not self._clock_is_taken(),
             odometry=self.settings.publishes_odometry,
             mocap=self._motion_capture(),
             lockstep=self.settings.lockstep,
@@ -145,10 +158,26 @@ class PlantNode(LifecycleNode):
             chain=self.settings.between,
             transforms=self.settings.transforms,
             truth_in_period=self.settings.truth_in_period,
+            origin=origin_pose(self.settings.origin),
+            link=self._link,
+            fleet=self.settings.fleet,
+            neighbours=self.settings.neighbours,
         )
         if isinstance(self._backend, AirBearing):
             self._air = AirBearingWires(self, self._backend, watched=not self.settings.between)
         self._make_loops(self._backend)
+        if isinstance(self._backend, Disturbed):
+            self._simulation = SimulationWires(
+                self,
+                self._backend,
+                self._pace,
+                self._change_rate,
+                self.clock,
+                lockstep=self.settings.lockstep,
+                first=lambda: (first_episode(self.robot, self.settings), self.settings.seed),
+            )
+            self._backend.moved = lambda: self._feedback.reset()
+            self.wires.cuts, self.health.simulation = self._backend.cuts, self._simulation.values
         identity = identity_of(
             self,
             started_ns=self._started_ns,
@@ -158,6 +187,7 @@ class PlantNode(LifecycleNode):
             rate=self.settings.rate,
         )
         self.health.open(self, identity)
+        self._info = RobotInfoWire(self, self.robot, self.settings, self.guard, started_ns=self._started_ns)
         return DONE
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -192,12 +222,14 @@ class PlantNode(LifecycleNode):
     def bring_down(self, cut_short: Callable[[], bool]) -> None:
         """Let the safe controller of an aircraft in flight bring it to the ground, before the process ends.
 
-        Returns at once for what can stop, what is on the ground, and in lock step, where time stands still.
+        Returns at once for what can stop, what is on the ground, what an autopilot flies on, and in lock step, where
+        time stands still.
 
         Args:
             cut_short: Whether the process has been asked once more to end.
         """
-        if self.robot.kind.rests or self.settings.lockstep or self.health.mode != "running":
+        rests = self.robot.kind.rests or isinstance(self._backend, TakesEnds)
+        if rests or self.settings.lockstep or self.health.mode != "running":
             return
         self.get_logger().warning(
             f"asked to end in flight: the safe controller flies down, within {LANDS_S:g} s; asked again, the plant ends"
@@ -237,6 +269,8 @@ class PlantNode(LifecycleNode):
         """
         assert self._backend is not None
         sample = self._backend.reset(episode, seed=seed, number=number)
+        if self._link is not None:
+            self._link.begin(seed, number)
         with self.wires.lock:
             self.guard.reset()  # actuators begin with the episode, not where the one before left them
             self.guard.begin_with(episode.command)
@@ -274,7 +308,10 @@ class PlantNode(LifecycleNode):
     def _make_loops(self, backend: Backend) -> None:
         """New loops with new counts and deadlines."""
         self._feedback = ActuatorFeedback(self.robot, moves=self.settings.publishes_odometry)
-        kind = ChainLoop if self.settings.between else LockstepLoop
+        kind = LinkLoop if self._link else ChainLoop if self.settings.between else LockstepLoop
+        self._pace.pause(False)
+        if self._simulation is not None:
+            self._simulation.begin_anew()
         self._lockstep = kind(
             backend,
             self.wires,
@@ -284,13 +321,25 @@ class PlantNode(LifecycleNode):
             answer_timeout_s=self.settings.answer_timeout_s,
             publish_bearing=self._air.publish_and_wait if self._air else lambda: None,
             feedback=self._feedback,
+            pace=self._pace,
         )
         self._realtime = RealtimeLoop(
-            backend, self.wires, self.guard, self.clock, rate=self.settings.rate, feedback=self._feedback
-        )
+            backend,
+            self.wires,
+            self.guard,
+            self.clock,
+            rate=self.settings.rate,
+            feedback=self._feedback,
+            pace=self._pace,
+        )  # fmt: skip
         realtime = None if self.settings.lockstep else self._realtime
         self.health.watch(self.guard, self.wires, self.clock, self._lockstep, realtime)
         self.health.feedback = self._feedback
+        if self._link is not None:
+            self.health.link = self._link.values
+
+    def _change_rate(self, rate: float) -> str:
+        return "lock step has no rate" if self.settings.lockstep else self._realtime.change_rate(rate)
 
     def _halt(self) -> None:
         self._stop.set()
@@ -305,9 +354,13 @@ class PlantNode(LifecycleNode):
         if self._backend is not None:
             self._backend = None
             self.health.close(self)  # first: it looks at the wires
+            if self._simulation is not None:
+                self._simulation.destroy()
+                self._simulation = None
             if self._air is not None:
                 self._air.destroy(self)
                 self._air = None
+            self._info.destroy(self)
             self.wires.destroy(self)
 
     def _run(self, backend: Backend) -> None:
@@ -316,6 +369,8 @@ class PlantNode(LifecycleNode):
             self.health.mode = "running"
             episode = first_episode(self.robot, self.settings)
             sample = backend.reset(episode, seed=self.settings.seed)
+            if self._link is not None:
+                self._link.begin(self.settings.seed)
             if self._simulated:
                 with self.wires.lock:
                     self.guard.begin_with(episode.command)
@@ -323,8 +378,8 @@ class PlantNode(LifecycleNode):
                 steps = self._count(1.0 / self.settings.control_rate(self.robot))
                 self._lockstep.run(sample, steps, self._stop)
             else:
-                # What ends in the air falls; a simulated one is put back at its next start.
-                lands = not self.robot.kind.rests and not self._simulated
+                # What ends in the air falls; a simulated one is put back at its next start, and an autopilot flies on.
+                lands = not (self.robot.kind.rests or self._simulated or isinstance(backend, TakesEnds))
                 ticks = self._count(self.robot.timing.physics_dt)
                 self._realtime.run(sample, ticks, self._stop, lands=lands)
             self.health.mode = "stopping"

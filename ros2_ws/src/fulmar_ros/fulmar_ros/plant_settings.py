@@ -10,9 +10,12 @@ import numpy as np
 from fulmar_core.config.errors import ConfigError
 from fulmar_core.dynamics.by_kind import begin_of
 from fulmar_core.robots.robot import Robot
-from fulmar_core.safety.watchdog import checked_timeout, default_timeout
+from fulmar_core.safety.geofence import NO_AREA, check_area
+from fulmar_core.safety.watchdog import checked_timeout
 from fulmar_core.simulation.episode import Episode, draw_episode
 from fulmar_core.tasks import load_task
+from fulmar_core.wires.origin import HERE, check_origin
+from fulmar_core.wires.silence import default_timeout
 from fulmar_core.worlds.scenario import load_scenario
 
 MOST_MOCAP_HZ = 1000.0  # the fastest cameras; a plant could not publish more often in real time [Hz]
@@ -50,6 +53,16 @@ class PlantSettings:
         True  # publish /tf and /tf_static, where tf2_msgs is installed; off where another node does
     )
     estop: bool = False  # nothing moves before a message of an e-stop
+    # Of the system that the plant is part of, for `robot_info`: the plant does nothing with them.
+    controller: str = ""  # that was started with it; empty: not known
+    fallback: str = ""  # law that takes over by itself; empty: none
+    bundle: bool = False  # a policy is shipped for robot and task, or was given
+    emulated: bool = False  # an emulator stands in for the device
+    origin: tuple[float, ...] = HERE  # where `odom` lies in `map`, as in `origin.FORMS` [m, deg]
+    area: tuple[float, ...] = NO_AREA  # that the controller keeps the robot in [m]
+    clock: bool = True  # publish /clock, where no other node does; off where the fleet's node does
+    fleet: bool = False  # listen to the e-stop of a fleet, too
+    neighbours: bool = False  # publish where the other robots of the fleet are
     autostart: bool = True
 
     def __post_init__(self) -> None:
@@ -74,6 +87,9 @@ class PlantSettings:
             raise ValueError(
                 "in lock step, the nodes that make odometry of poses must be named: give 'chain', such as [estimator]."
             )
+        check_origin(self.origin)
+        if self.area != NO_AREA:
+            check_area(self.area)
         if self.seed < 0:
             raise ValueError(f"seed = {self.seed} must not be negative.")
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 
 import numpy as np
@@ -12,9 +12,9 @@ from geometry_msgs.msg import PoseStamped, TwistStamped
 from nav_msgs.msg import Odometry
 from rclpy.lifecycle import LifecycleNode
 from rclpy.publisher import Publisher
+from rclpy.subscription import Subscription
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Bool, String
 from std_srvs.srv import Trigger
 
 from fulmar_core.config.process import CONTROL_PRIORITY, take_priority_with_helpers
@@ -22,10 +22,9 @@ from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.topics import (
     ACTUATORS_STATE,
     CLOCK,
-    ESTOP,
-    ESTOP_RELEASED,
     GIVE_BACK,
     MOCAP,
+    NEIGHBOURS,
     TELEOP,
     TRUTH,
     VELOCITY_COMMAND,
@@ -34,9 +33,13 @@ from fulmar_core.robots.topics import (
 )
 from fulmar_core.safety.actuator_guard import ActuatorGuard
 from fulmar_core.simulation.backend import Sample
+from fulmar_core.simulation.disturbances import COMMANDS
+from fulmar_core.simulation.disturbances import ODOMETRY as ODOMETRY_LINK
 from fulmar_core.states.planar import at_rest
 from fulmar_core.states.state import RigidBodyState
+from fulmar_core.wires.origin import origin_pose
 from fulmar_core.wires.reading import BACK_NS
+from fulmar_ros import plant_estop
 from fulmar_ros.convert import (
     OdometryWriter,
     PoseWriter,
@@ -49,9 +52,12 @@ from fulmar_ros.deadline import Spread
 from fulmar_ros.frame_wires import ModelWires, odometry_transform
 from fulmar_ros.graph import writers_of
 from fulmar_ros.motion_capture import MakeCapture
+from fulmar_ros.neighbour_messages import neighbours_message
 from fulmar_ros.operator_subscription import destroy_all, subscribe_every
 from fulmar_ros.parameters import own_frames
 from fulmar_ros.plant_clock import SimulatedTime
+from fulmar_ros.plant_estop import PlantEstop
+from fulmar_ros.plant_link import PlantLink, SentCommand
 from fulmar_ros.plant_period import PlantPeriod
 from fulmar_ros.qos import FLUSH_S, LAST_WORDS_S, flush, publish_patiently, publisher_qos, subscriber_qos
 from fulmar_ros.relay import RelayedInputs
@@ -79,6 +85,10 @@ class PlantWires:
         chain: Sequence[str] = (),
         transforms: bool = True,
         truth_in_period: bool = False,
+        origin: Sequence[float] = (),
+        link: PlantLink | None = None,
+        fleet: bool = False,
+        neighbours: bool = False,
     ) -> None:
         """Create every endpoint.
 
@@ -96,7 +106,13 @@ class PlantWires:
             chain: Nodes between plant and controller that take part in lock step.
             transforms: Whether frames are published, where tf2_msgs is installed.
             truth_in_period: Whether nodes of the chain wait for the truth, as simulated cameras do.
+            origin: Pose of `odom` in `map`: x, y, z [m], quaternion x, y, z, w; empty: they are one.
+            link: Between plant and controller; None: neither readings nor commands are late.
+            fleet: Whether the e-stop of a fleet counts, too.
+            neighbours: Whether is published where the other robots of a fleet are.
         """
+        self._link, self._lockstep = link, lockstep
+        self._awaited_ns = -1  # stamp of the odometry over a link that no command has answered yet
         self._mocap = mocap(self._publish_pose) if mocap is not None else None
         self._prior = lockstep  # whether the threads that commands pass have what priority they need
         self._publish = publish = publish_patiently if lockstep else Publisher.publish
@@ -105,6 +121,7 @@ class PlantWires:
         self.latency_ms = Spread()
         self.answers = 0  # states that a command has answered
         self.listening = True  # whether commands of controllers count
+        self.cuts: Callable[[str], bool] = lambda _side: False  # whether messages of `SIDES` are lost
         self._robot, self._guard = robot, guard
         self._simulated_time = simulated_time
         self._sent = SentStates(guard.watchdog.timeout_ns)
@@ -124,7 +141,11 @@ class PlantWires:
         self._sensors = SensorWires(
             node, robot, frames, qos, self._publish, odometry=odometry, lockstep=lockstep, transform=transform
         )
-        self._model = ModelWires(node, robot, frames, qos, simulated=simulated, transforms=transforms)
+        origin = origin or origin_pose(())
+        moved = tuple(origin) != origin_pose(())
+        self._model = ModelWires(
+            node, robot, frames, qos, transforms=transforms, origin=origin, in_map=simulated or moved
+        )
         self._poses = (
             node.create_publisher(PoseStamped, MOCAP.name, qos(MOCAP)) if mocap is not None else None
         )
@@ -139,8 +160,13 @@ class PlantWires:
                 counts_truth=truth_in_period,
             )
         self._write_pose = PoseWriter(frames)
-        self._write_truth = OdometryWriter(None, frame="map", child_frame=frames.base)
+        self._write_truth = OdometryWriter(
+            None, frame=frames.odom if moved else "map", child_frame=frames.base
+        )
         self._write_state = VectorWriter(robot.actuators.names)
+        self._neighbours = (
+            node.create_publisher(JointState, NEIGHBOURS.name, qos(NEIGHBOURS)) if neighbours else None
+        )
         self._node = node
         self._things: dict[str, Publisher] = {}  # each made with its first pose: most robots are alone
         wire = command_wire(robot)
@@ -154,13 +180,10 @@ class PlantWires:
             TwistStamped if by_velocity else JointState, wire.name, self._on_command, commands, raw=True
         )
         self._relayed = RelayedInputs(node)
-        pressed = self._relayed.receiver(Bool, ESTOP, self._on_estop)
-        self._operator = [
-            subscribe_every(node, Bool, ESTOP, pressed, with_info=True),
-            subscribe_every(node, String, ESTOP_RELEASED, self._on_estop_released),
-        ]
+        self.estop = PlantEstop(node, guard, self.lock, self._relayed, fleet=fleet)
+        self._operator: list[list[Subscription]] = []
         # The wires that are subscribed; the values say whether a best-effort publisher is refused.
-        self.subscribed = {wire: lockstep, ESTOP: False, ESTOP_RELEASED: False}
+        self.subscribed = {wire: lockstep, **dict.fromkeys(plant_estop.wires_of(fleet=fleet), False)}
         if not lockstep:
             self._operator.append(subscribe_every(node, JointState, TELEOP, self._on_teleop))
             self.subscribed[TELEOP] = False
@@ -170,6 +193,7 @@ class PlantWires:
         """Destroy every endpoint."""
         self.end_capture()
         destroy_all(node, ([self._commands], *self._operator))
+        self.estop.destroy(node)
         self._relayed.destroy(node)
         if self._period is not None:
             node.destroy_subscription(self._period.answers)
@@ -178,7 +202,7 @@ class PlantWires:
             node.destroy_publisher(publisher)
 
     def _publishers(self) -> list[Publisher]:
-        made = (self._poses, self._state, self._truth, self._clock)
+        made = (self._poses, self._state, self._truth, self._clock, self._neighbours)
         rest = (publisher for publisher in made if publisher is not None)
         period = [self._period.publisher] if self._period is not None else []
         return [
@@ -200,18 +224,45 @@ class PlantWires:
         """
         if sample.stamp_ns is not None:
             if 0 <= self._captured_ns - sample.stamp_ns <= BACK_NS:
+                self._publish_arrived()
                 self._sensors.publish_stamped(sample.readings, time_ns)
                 return  # a device that has nothing else that is new; further back, the clock was set
             time_ns = self._captured_ns = sample.stamp_ns
-        self._publish_things(sample, time_ns)
-        self._publish_readings(sample, time_ns)
+        with self.lock:
+            self._sent.note(time_ns, self.steady_ns)
+        if self._link is None:
+            self.publish_measured(sample, time_ns)
+        else:
+            self._link.readings.send((sample, time_ns), self._now_ns)
+            self._publish_arrived()
         self.publish_truth(sample, time_ns)
         now = time.monotonic_ns()
         if self._clock is not None and now - self._clock_ns >= CLOCK_PERIOD_NS:
             self._publish(self._clock, Clock(clock=stamp_of(time_ns)))
             self._clock_ns = now
 
+    def _publish_arrived(self) -> None:
+        """Publish what the link has carried by now; in lock step its loop does."""
+        for sample, stamp in () if self._lockstep else self.arrived_readings():
+            self.publish_measured(sample, stamp)
+
+    def arrived_readings(self) -> list[tuple[Sample, int]]:
+        """Samples that the link has carried to the controller by now, with their stamps [ns]."""
+        return [] if self._link is None else self._link.readings.arrived(self._now_ns)
+
+    def publish_measured(self, sample: Sample, time_ns: int) -> None:
+        """Publish what a controller receives of a sample: readings, and where things are.
+
+        Args:
+            sample: From the backend.
+            time_ns: Time of measurement [ns].
+        """
+        self._publish_things(sample, time_ns)
+        self._publish_readings(sample, time_ns)
+
     def _publish_readings(self, sample: Sample, time_ns: int) -> None:
+        if self.cuts(ODOMETRY_LINK):
+            return
         self._sensors.publish(sample.readings, time_ns)
         if self._mocap is not None and sample.odometry is not None:
             for stamp, state in self._mocap.see(sample.odometry, time_ns):
@@ -232,10 +283,10 @@ class PlantWires:
             self._sensors.publish_odometry(sample.readings, time_ns)
 
     def _publish_things(self, sample: Sample, time_ns: int) -> None:
-        with self.lock:
-            self._sent.note(time_ns, time.monotonic_ns())
         for name, pose in sample.things.items():
             self._publish_thing(name, pose, time_ns)
+        if self._neighbours is not None:
+            self._publish(self._neighbours, neighbours_message(sample.neighbours, time_ns))
 
     def _publish_pose(self, stamp: int, state: RigidBodyState) -> None:
         if self._poses is not None:
@@ -280,7 +331,7 @@ class PlantWires:
         assert self._period is not None
         self._period.within = True
         with self.lock:
-            self._sent.note(time_ns, time.monotonic_ns())
+            self._sent.note(time_ns, self.steady_ns)
         self._publish_readings(sample, time_ns)
         self._period.within = False
 
@@ -329,14 +380,6 @@ class PlantWires:
         if command is not None:  # what is damaged feeds no watchdog
             self._take(command.names, command.values, command.stamp_ns)
 
-    def _on_estop(self, message: Bool, _info: dict[str, int]) -> None:
-        with self.lock:
-            self._guard.estop.receive(bool(message.data), time.monotonic_ns())
-
-    def _on_estop_released(self, _message: String) -> None:
-        with self.lock:
-            self._guard.estop.release(time.monotonic_ns())
-
     def _on_teleop(self, message: JointState) -> None:
         with self.lock:
             self._guard.offer_by_hand(
@@ -345,7 +388,7 @@ class PlantWires:
 
     def _on_give_back(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         with self.lock:
-            problem = self._guard.give_back(time.monotonic_ns())
+            problem = self._guard.give_back(self.steady_ns)
         response.success, response.message = not problem, problem or "the controller has the robot again"
         return response
 
@@ -356,26 +399,56 @@ class PlantWires:
             self._guard.publishers.see(writers, time.monotonic_ns())
 
     @property
+    def steady_ns(self) -> int:
+        """Steady clock of watchdog and ages: the plant's own where a link loses commands in lock step [ns]."""
+        by_plant = self._link is not None and self._lockstep and self._simulated_time is not None
+        return self._now_ns if by_plant else time.monotonic_ns()
+
+    @property
+    def _now_ns(self) -> int:
+        """Time on the plant's clock [ns]."""
+        return time.time_ns() if self._simulated_time is None else self._simulated_time.now_ns
+
+    @property
     def _plant_ns(self) -> int | None:
         return None if self._simulated_time is None else self._simulated_time.now_ns
 
+    def await_answer(self, time_ns: int) -> None:
+        """Let the first command that answers the odometry of a stamp go over the link, and no repetition [ns]."""
+        with self.lock:
+            self._awaited_ns = time_ns
+
+    def take_arrived(self) -> None:
+        """Take the commands that the link has carried to the plant by now; call with `lock` held."""
+        if self._link is not None:
+            for command in self._link.commands.arrived(self._now_ns):
+                self._offer(command.names, command.values, command.stamp_ns)
+
     def _take(self, names: Sequence[str], values: Sequence[float], stamp: int) -> None:
-        now = time.monotonic_ns()
-        if not self.listening:
+        if not self.listening or self.cuts(COMMANDS):
             return
         if not self._prior:
             take_priority_with_helpers(CONTROL_PRIORITY)
             self._prior = True
         self.see_writers()  # before the first command of a second publisher is carried out
         with self.lock:
-            outdated = self._knows_ages and self._sent.outdated(stamp, now)
-            taken = self._guard.offer(
-                names, values, now, stamp_ns=stamp, outdated=outdated, plant_ns=self._plant_ns
-            )
-            latency_ns = self._sent.answered(stamp, now)
-            if taken and latency_ns is not None:
-                self.latency_ms.add(latency_ns / 1e6)
-                self.answers += 1
-            if taken:
-                self.answered_ns = stamp
+            if self._link is None:
+                if self._offer(names, values, stamp):
+                    self.answered_ns = stamp
+            elif not self._lockstep or stamp == self._awaited_ns:
+                self._link.commands.send(SentCommand(names, values, stamp), self._now_ns)
+                self._awaited_ns, self.answered_ns = -1, stamp
             self.lock.notify_all()
+
+    def _offer(self, names: Sequence[str], values: Sequence[float], stamp: int) -> bool:
+        """Offer a command that has arrived to the guard; returns whether it was taken."""
+        now = self.steady_ns
+        outdated = self._knows_ages and self._sent.outdated(stamp, now)
+        taken = self._guard.offer(
+            names, values, now, stamp_ns=stamp, outdated=outdated, plant_ns=self._plant_ns
+        )
+        latency_ns = self._sent.answered(stamp, now)
+        if taken and latency_ns is not None:
+            self.latency_ms.add(latency_ns / 1e6)
+            self.answers += 1
+        return taken

@@ -6,7 +6,7 @@ import contextlib
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import asdict
 from pathlib import Path
 
@@ -41,6 +41,7 @@ from fulmar_core.robots.topics import (
     SENSOR_WIRES,
     VELOCITY_COMMAND,
     WIRES,
+    Wire,
     thing_wire,
 )
 from fulmar_ros.message_class import message_class
@@ -98,6 +99,7 @@ class RecorderNode(Node):
         classes = {wire: kind for wire, kind in found.items() if kind is not None}
         # The bag names topics as every reader of bags knows them, whatever they are remapped to on the wire.
         self._topics = {wire: self.resolve_topic_name(wire.name, only_expand=True) for wire in classes}
+        self._routes = self._routes_of(classes)
         self._ring = self._new_ring() if settings.mode == "ring" else None
         whole = self._bag_per_goal if settings.mode == "goals" else self._open_bag
         before = (json_object(custom_text(self._directory, RECORDING)) or {}) if settings.resume else {}
@@ -114,8 +116,8 @@ class RecorderNode(Node):
         self._provenance = threading.Thread(target=self._attach_provenance, name="provenance", daemon=True)
         self._provenance.start()
         commands: list[list[Subscription]] = []
-        relay = Relay(self)
-        for wire, topic in self._topics.items():
+        relays = {space: Relay(self, space) for space in self._spaces}
+        for space, wire, topic in self._routes:
             put = self._keep(topic)
             if settings.lossless and wire in REPEATED:
                 put = once(put, REPEATED[wire])
@@ -127,7 +129,8 @@ class RecorderNode(Node):
                 self,
                 classes[wire],
                 wire,
-                relay.relaying(wire, put),
+                relays[space].relaying(wire, put),
+                topic=f"{space}/{wire.name}" if space and not wire.name.startswith("/") else "",
                 depth=EVERYTHING,
                 raw=True,
                 with_info=True,
@@ -146,6 +149,20 @@ class RecorderNode(Node):
         doing = "recording to" if self._ring is None else f"keeping {settings.before_fault_s:g} s for"
         sys.stdout.write(f"{doing} {self._directory}\n")
         sys.stdout.flush()
+
+    @property
+    def _spaces(self) -> tuple[str, ...]:
+        """Namespaces of the robots of a fleet; of a robot alone an empty one, the node's own."""
+        return tuple(f"/{name}" for name in self._settings.robots if name) or ("",)
+
+    def _routes_of(self, wires: Iterable[Wire]) -> list[tuple[str, Wire, str]]:
+        """Namespace, wire and absolute topic of all that is recorded, each topic once."""
+        found: dict[str, tuple[str, Wire, str]] = {}
+        for space in self._spaces:
+            for wire in wires:
+                whole = self._topics[wire] if not space or wire.name[0] == "/" else f"{space}/{wire.name}"
+                found.setdefault(whole, (space, wire, whole))
+        return list(found.values())
 
     @property
     def _mode(self) -> str:
@@ -179,7 +196,7 @@ class RecorderNode(Node):
             split_s=self._settings.split_s,
             resume=self._settings.resume,
         )
-        for wire, topic in self._topics.items():
+        for _, wire, topic in self._routes:
             bag.add_topic(topic, wire.type, wire.delivery)
             if wire.type == IMAGE and wire not in CAMERA_IMAGES:  # of a sensor of the user's own
                 for ending in PACKED_ENDINGS:

@@ -21,6 +21,9 @@ class RecorderSettings(Recording):
     things: tuple[str, ...] = ("",)  # names of the things of the task, beside the topics of the table
     # Topics of the robot's own sensors, each with its type: `range/front sensor_msgs/msg/Range`.
     own_topics: tuple[str, ...] = ("",)
+    robots: tuple[str, ...] = (
+        "",
+    )  # of a fleet, by name: topics of each are recorded, in the place of the node's own
     lossless: bool = False  # lock step with nodes between: lose nothing, and leave repetitions out
     resume: bool = False  # go on with what a recorder that died has left in the directory
     directory: str = ""  # bag folder to make; "" makes one under `runs/` that is named after robot and time

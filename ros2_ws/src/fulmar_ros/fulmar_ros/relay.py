@@ -35,9 +35,10 @@ Receive = Callable[[Any, dict[str, int]], None]  # message and its info
 class Relay:
     """Passes on what a node received."""
 
-    def __init__(self, node: Node) -> None:
-        """Make the publisher."""
-        self._publisher = node.create_publisher(UInt8MultiArray, RELAY.name, publisher_qos(RELAY))
+    def __init__(self, node: Node, space: str = "") -> None:
+        """Make the publisher, in the namespace of a robot; empty: the node's own."""
+        topic = f"{space}/{RELAY.name}" if space else RELAY.name
+        self._publisher = node.create_publisher(UInt8MultiArray, topic, publisher_qos(RELAY))
 
     def relaying(self, wire: Wire, receive: Receive) -> Receive:
         """A callback that passes messages on, raw or not, after it has called back."""

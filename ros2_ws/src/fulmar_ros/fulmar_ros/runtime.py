@@ -59,7 +59,7 @@ def run_node(make_node: Callable[[RequestExit], Node], argv: Sequence[str] | Non
     for an orderly end with exit code 0, and so does the death of the launcher. A node may have a method
     `bring_down(cut_short)`, which ends a flight, and a method `stop()`: both are called in the main thread while
     messages still flow (publish zeros, flush, close). What `stop` returns, if anything, is the exit code of a run that
-    would otherwise end with 0.
+    would otherwise end with 0. Nodes that share its process are in an attribute `companions`.
 
     Args:
         make_node: Builds the node. It is given a function that ends the process with an exit code.
@@ -154,7 +154,9 @@ def _spin(node: Node, exit_codes: queue.SimpleQueue[int]) -> int:
         node.get_logger().error(_one_line(error))
         exit_codes.put(FAILED)
 
-    with spinning(node, on_error):
+    with contextlib.ExitStack() as spun:
+        for each in (node, *getattr(node, "companions", ())):  # a thread for each: none holds up another
+            spun.enter_context(spinning(each, on_error))
         settle_memory()
         take_place()
         asked = exit_codes.get()
@@ -249,11 +251,22 @@ def _spin_for_a_while(executor: Executor, over: Future) -> None:
 @contextlib.contextmanager
 def ros_node(name: str, on_error: Callable[[Exception], None], *, namespace: str = "") -> Iterator[Node]:
     """A node of a process that is no node itself: rclpy starts, the node spins, and both end with the context."""
+    with ros_nodes(name, on_error, namespaces=(namespace,)) as (node,):
+        yield node
+
+
+@contextlib.contextmanager
+def ros_nodes(
+    name: str, on_error: Callable[[Exception], None], *, namespaces: Sequence[str]
+) -> Iterator[list[Node]]:
+    """As `ros_node`, a node of this name in each namespace."""
     init_ros()
     try:
-        node = rclpy.create_node(name, namespace=namespace or None)
-        with spinning(node, on_error):
-            yield node
+        with contextlib.ExitStack() as spun:
+            nodes = [rclpy.create_node(name, namespace=space or None) for space in namespaces]
+            for node in nodes:
+                spun.enter_context(spinning(node, on_error))
+            yield nodes
     finally:
         with _within(DESTROYED_S):
             rclpy.try_shutdown()

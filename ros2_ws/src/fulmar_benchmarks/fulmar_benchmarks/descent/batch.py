@@ -12,9 +12,10 @@ from fulmar_core.controllers.controller import Controller
 from fulmar_core.controllers.flight_refuge import refuge_of
 from fulmar_core.loop.control_loop import ControlLoop
 from fulmar_core.safety.actuator_guard import ActuatorGuard
-from fulmar_core.safety.watchdog import Watchdog, default_timeout
+from fulmar_core.safety.watchdog import Watchdog
 from fulmar_core.simulation.simulation import BatchSimulation
 from fulmar_core.tasks.goal import goal_in_float64
+from fulmar_core.wires.silence import default_timeout
 from policy_server.controllers import Choice, load_controller
 
 

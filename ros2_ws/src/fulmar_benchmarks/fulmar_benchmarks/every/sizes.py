@@ -13,6 +13,7 @@ _FALCON = "--tasks hold,a,d --controllers lqi,lqr --scenarios exact,calm --episo
 _AVIST_FEW = "--parts tasks --tasks go_to_pose_3d --controllers lqr,pd --episodes 4 --no-report"
 OPTIONS = {  # smoke, quick; full: no options
     "avist": (_AVIST_FEW, "--parts tasks,inspect --episodes 64 --rounds 4"),
+    "console": ("--parts server --robots 2", "--parts server,first,stop --clicks 5 --rounds 2"),
     "descent": (_LIVE, "--flights 16 --real-time 1"),
     "drift": ("--through batch --episodes 16 --no-report", "--through batch"),
     "endurance": ("--seconds 20 --rate 5", "--seconds 600 --rate 10"),
@@ -20,6 +21,7 @@ OPTIONS = {  # smoke, quick; full: no options
     "events": ("--runs 4 --parts table --no-report", "--runs 20 --parts table,fields,sensitivity"),
     "falcon": (_FALCON, "--controllers lqi,lqr,policy --episodes 16"),
     "flights": ("--episodes 2 --real-time 0 --episode-s 10", "--episodes 16 --real-time 1"),
+    "guard": ("--runs 8 --parts defects,decision --robots floating_platform", "--runs 50"),
     "hardware": ("--hardware zero_g_lab --episodes 1 --seconds 10", "--episodes 4"),
     "identify": ("--platforms 1 --robots turtlebot2 --duration 30", "--platforms 4"),
     "inertia": ("--satellites microsat --draws 1 --no-report", "--draws 1"),

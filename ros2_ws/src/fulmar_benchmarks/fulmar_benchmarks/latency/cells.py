@@ -20,7 +20,6 @@ from fulmar_benchmarks.tables import Entry, Row, Shown, Table, number
 from fulmar_core.config.errors import RunFailed
 from fulmar_ros.runtime import EXECUTOR
 
-EXECUTORS = ("events", "default")
 REQUIRED_HZ, REQUIRED_P99_MS = 50.0, 3.0
 
 

@@ -29,9 +29,9 @@ from fulmar_benchmarks.rans3d.targets import (
 )
 from fulmar_benchmarks.rans3d.unit import HELD
 from fulmar_benchmarks.results import PairResult
-from fulmar_benchmarks.roboran.document import wilson
 from fulmar_benchmarks.shape import Choice
 from fulmar_core.simulation.metrics import summarise
+from fulmar_evaluation.success_interval import wilson
 
 Key = tuple[str, str, str, str]  # robot, task, controller, scenario
 Cells = dict[str, dict[str, dict[str, Any]]]  # by task and controller

@@ -13,8 +13,8 @@ from fulmar_benchmarks.results import PairResult
 from fulmar_benchmarks.roboran.targets import checks_of, main_figure, thesis_row
 from fulmar_core.simulation.metrics import summarise
 from fulmar_evaluation.evaluation import share_of_mean
+from fulmar_evaluation.success_interval import wilson
 
-Z95 = 1.96
 OF_A_CHECK = ("name", "measured", "limit", "met")
 
 
@@ -56,14 +56,6 @@ def pair_entry(pair: Pair, outcomes: dict[str, PairResult | str]) -> dict[str, A
         "verdicts": [{key: getattr(check, key) for key in OF_A_CHECK} for check in checks],
         "met": None if not met or None in met else all(met),
     }
-
-
-def wilson(share: float, count: int) -> tuple[float, float]:
-    """95 % interval of a share that was counted (E. B. Wilson 1927)."""
-    spread = Z95**2 / count
-    middle = (share + spread / 2.0) / (1.0 + spread)
-    half = Z95 * math.sqrt(share * (1.0 - share) / count + spread / (4.0 * count)) / (1.0 + spread)
-    return max(0.0, middle - half), min(1.0, middle + half)
 
 
 def _way(outcome: PairResult) -> dict[str, Any]:

@@ -100,9 +100,8 @@ RateOption = Annotated[
     float, option("F", "Simulated seconds per second of wall-clock time.", "--rate", min=0.01, max=50.0)
 ]
 ControlHzOption = Annotated[float | None, option("HZ", "Command rate; the robot's own by default.", min=0.01)]
-RecordOption = Annotated[
-    Path | None, option("DIR", "Folder of the bag; runs/<time>... by default.", "--record")
-]
+RecordOption = Annotated[Path | None, option("DIR", "Folder of the bag; else runs/<time>...", "--record")]
+RecordEachOption = Annotated[bool, flag("--record-each", "Of a fleet: DIR/NAME for each, not one of all.")]
 CORES = len(os.sched_getaffinity(0))
 JobsOption = Annotated[
     int, option("N", "Parallel processes; one for each core by default.", min=1, show_default=False)
@@ -131,18 +130,18 @@ def with_node_options(*, standing: bool) -> Callable[[Callable[..., None]], Call
             extras = tuple(name for name in OPTIONS if given.pop(name))
             command(**given, extras=extras)
 
-        signature = inspect.signature(command, eval_str=True)
+        signature, on = inspect.signature(command, eval_str=True), USUALLY_ON if standing else ()
         *own, last = (each for each in signature.parameters.values() if each.name != "extras")
-        on = {name: standing and name in USUALLY_ON for name in OPTIONS}
-        more = [last.replace(name=n, default=default, annotation=_switch(n)) for n, default in on.items()]
-        vars(switched)["__signature__"] = signature.replace(parameters=[*own, *more, last])
+        own += [last.replace(name=n, default=n in on, annotation=_switch(n)) for n in OPTIONS]
+        vars(switched)["__signature__"] = signature.replace(parameters=[*own, last])
         return switched
 
     return made
 
 
 def _switch(name: str) -> Any:
-    return Annotated[bool, flag(f"--{name}" + f"/--no-{name}" * (name in USUALLY_ON), OPTIONS[name])]
+    flags = ("--{0}", "--{0}/--no-{0}")[name in USUALLY_ON].format(name.replace("_", "-"))
+    return Annotated[bool, flag(flags, OPTIONS[name])]
 
 
 def invoked_command() -> str:

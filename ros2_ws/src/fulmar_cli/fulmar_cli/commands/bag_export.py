@@ -15,7 +15,8 @@ from fulmar_core.config.errors import BagError, ConfigError, UnknownNameError
 if TYPE_CHECKING:
     from fulmar_bags.contents import Bag
 
-FORMATS = ("csv", "npz", "lerobot", "frames")
+FORMATS = ("csv", "npz", "lerobot", "frames", "rerun", "foxglove")
+VIEWED = {"rerun": ".rrd", "foxglove": ".foxglove.mcap"}  # ending of what a viewer opens
 
 
 @with_bag_options()
@@ -24,10 +25,11 @@ def export(
     to: Annotated[
         str,
         option(
-            "csv|npz|lerobot|frames",
+            "csv|npz|lerobot|frames|rerun|foxglove",
             "csv: a table for each topic. npz: NumPy arrays, one for each field. lerobot: a dataset, one episode "
             "for each bag, one frame for each control step. frames: the images of cameras as JPEG and PNG, with a "
-            "table of when and where each was taken.",
+            "table of when and where each was taken. rerun, foxglove: a file that the viewer opens, with robots, "
+            "trails, goals, curves, images and what happened.",
             "--to",
         ),
     ] = "csv",
@@ -38,11 +40,12 @@ def export(
     *,
     reading: BagReading,
 ) -> None:
-    """Write what is in a bag as CSV, as NumPy arrays, as images, or as a dataset to learn from.
+    """Write what is in a bag as CSV, as NumPy arrays, as images, for other viewers, or as a dataset to learn from.
 
     The dataset follows version 3.0 of LeRobot's format: `meta/info.json`, `meta/stats.json`, tasks, episodes and frames
     as parquet, with `observation.state` and `action` as the controller received and sent them. Images of cameras go
-    along: colours as video, depth and segmentation as 16-bit PNG. It needs the extra 'datasets'.
+    along: colours as video, depth and segmentation as 16-bit PNG. It needs the extra 'datasets'; rerun and foxglove
+    need those of their names.
     """
     from fulmar_bags.tables import write_csv, write_npz
 
@@ -50,6 +53,9 @@ def export(
         raise UnknownNameError("--to", to, FORMATS)
     if len(bags) > 1 and to != "lerobot":
         raise ConfigError(f"--to {to} takes one bag, {len(bags)} were given. Export them one by one.")
+    if to in VIEWED:
+        _write_viewed(bags[0], to, out, as_json=as_json)
+        return
     opened = [open_and_warn(bag, reading) for bag in bags]
     beside = bags[0] if bags[0].is_dir() else bags[0].parent
     if to == "csv":
@@ -75,6 +81,27 @@ def export(
         for file in files:
             write_line(str(file))
     raise finish(*opened)
+
+
+def _write_viewed(bag: Path, to: str, out: Path | None, *, as_json: bool) -> None:
+    """Write and name the file of a viewer, for one bag or the bags of one system."""
+    if to == "rerun":
+        from fulmar_console.exports.rerun_file import write_rerun as write
+    else:
+        from fulmar_console.exports.foxglove_file import write_foxglove as write
+    from fulmar_console.bags.paths import bags_of
+    from fulmar_console.bags.recording import read_recording
+
+    paths = bags_of(bag)
+    folder = bag if bag.is_dir() else bag.parent
+    path = out or folder.resolve().with_name(f"{folder.resolve().name}{VIEWED[to]}")
+    recording = read_recording(paths, folder.resolve().name, lambda _share, _words: None)
+    warn(recording.document["notes"])
+    file = write(recording, path)
+    if as_json:
+        print_json({"bags": [str(each) for each in paths], "to": to, "files": [str(file)], "left_out": []})
+    else:
+        write_line(str(file))
 
 
 def _write_dataset(opened: list[Bag], out: Path) -> tuple[Path, list[str]]:

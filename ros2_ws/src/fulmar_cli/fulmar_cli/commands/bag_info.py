@@ -72,6 +72,13 @@ def _show(found: dict[str, Any]) -> None:
         left = "" if fuel["left_share"] is None else f", {100 * fuel['left_share']:.0f} % of the tank left"
         write_line(f"fuel: {1e3 * fuel['used_kg']:.1f} g used, impulse {fuel['impulse_N_s']:.1f} N·s{left}")
     _show_origin(found["provenance"])
+    for name, origin in found["robots"].items():
+        known = (
+            f"{key} {origin[key]}"
+            for key in ORIGIN[2:]
+            if origin.get(key) not in (None, "") and key != "command"
+        )
+        write_line(f"{name}: {origin['robot']}, " + ", ".join(known))
     for line in found["damage"]:
         write_line(f"damage: {line}")
 

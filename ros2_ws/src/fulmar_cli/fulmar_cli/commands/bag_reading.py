@@ -9,12 +9,24 @@ from typing import Annotated, Any
 
 from fulmar_cli.commands.arguments import option
 
-ROBOT = option("R", "Whose bag it is, where it does not say; from `fulmar list robots`.")
+ROBOT = option(
+    "R",
+    "Whose bag it is, where it does not say, from `fulmar list robots`; of a fleet's bag, a robot's name.",
+)
 TASK = option("T", "What was to be done, where the bag does not say; from `fulmar list tasks`.")
 TOPICS = option(
     "OURS=THEIRS",
     "How topics are called in a bag of another program, such as odom=/base/odometry,cmd_vel=/vel; may be repeated.",
 )
+
+# Of commands that identify a robot from bags.
+KnownOption = Annotated[
+    list[str] | None,
+    option("NAME=VALUE+-ERROR", "A quantity that was measured, such as mass=5.32+-0.02."),
+]
+BallastOption = Annotated[
+    list[str] | None, option("BAG=KG+-KG", "A weight that was aboard during one of the runs, anywhere.")
+]
 
 
 def with_bag_options(*, robot: bool = True) -> Callable[[Callable[..., None]], Callable[..., None]]:
@@ -28,13 +40,10 @@ def with_bag_options(*, robot: bool = True) -> Callable[[Callable[..., None]], C
         @functools.wraps(command)
         def reading_bags(**given: Any) -> None:
             from fulmar_bags.bag_reading import BagReading, read_topics
-            from fulmar_core.robots.robot_file import load_robot
             from fulmar_core.tasks import load_task
 
             topics = read_topics(given.pop("topics") or [])
             names = {name: given.pop(name) for name in ("robot", "task") if robot}
-            if names.get("robot"):
-                load_robot(names["robot"])
             if names.get("task"):
                 load_task(names["task"])
             command(**given, reading=BagReading(**names, topics=topics))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -66,6 +67,7 @@ def rerun(
     """
     from fulmar_bags.comparison import read_tolerances
     from fulmar_bags.contents import open_bag
+    from fulmar_bags.run_record import check_one_robot
     from fulmar_evaluation.rerun.rerun_bag import RerunRequest, rerun_bag
     from fulmar_evaluation.rerun.rerun_result import FIELDS
 
@@ -75,6 +77,8 @@ def rerun(
     )  # fmt: skip
     tolerances = read_tolerances(tolerance or [], FIELDS)
     opened = open_bag(bag, reading)
+    check_one_robot(opened)
+    request = replace(request, robot=opened.reading.robot)
     request.check(foreign=opened.info is None)
     result: dict[str, Any] = {"bag": str(bag), **rerun_bag(opened, request, tolerances, warn)}
     sums = result.pop("sums")
@@ -100,6 +104,10 @@ def _show(result: dict[str, Any], sums: list[dict[str, Any]]) -> None:
     if not result["compared"]:
         write_line("the bag holds no answers to compare with")
         return
+    if result["trips"] is not None:
+        its = result["trips"]
+        same = "the same" if its["same"] else "not the same"
+        write_line(f"trips and returns of the guard: {its['recorded']} recorded, {its['found']} now, {same}")
     for each in sums:
         count = "the same" if not each["differing"] else f"{each['differing']} numbers differ"
         write_line(

@@ -7,8 +7,9 @@ from typing import Annotated
 
 import typer
 
-from fulmar_bringup.console import print_json, write_line
+from fulmar_bringup.console import print_json, warn, write_line
 from fulmar_cli.commands.arguments import JsonOption, argument, option
+from fulmar_cli.commands.envelope import RequireEnvelopeOption
 
 bundle = typer.Typer(help="Show, sign and check policy bundles.", no_args_is_help=True, rich_markup_mode=None)
 FolderArgument = Annotated[Path, argument("DIR", "A policy bundle.")]
@@ -23,7 +24,7 @@ def show(folder: FolderArgument, as_json: JsonOption = False) -> None:
     if as_json:
         print_json(passport)
         return
-    training = passport.pop("training")
+    training, certified = passport.pop("training"), passport.pop("envelope", None)
     lines = {
         key: ", ".join(map(str, value)) if isinstance(value, tuple) else value
         for key, value in passport.items()
@@ -31,6 +32,11 @@ def show(folder: FolderArgument, as_json: JsonOption = False) -> None:
     lines |= {
         f"trained: {key}": value for key, value in training.items() if not isinstance(value, dict | list)
     }
+    if certified:
+        tested = f"{certified['successes']} of {certified['episodes']} episodes"
+        lines["certified"] = (
+            f"at least {certified['lower_bound']:.3f} ({tested}); `fulmar bundle check` compares"
+        )
     curve = [f"{check['success_rate']:.3f}" for check in training.get("curve", ())]
     if curve:
         lines["trained: success"] = f"{curve[0]} to {curve[-1]} in {len(curve)} checks"
@@ -91,8 +97,11 @@ def verify(
 
 
 @bundle.command()
-def check(folder: FolderArgument, as_json: JsonOption = False) -> None:
-    """Load a bundle as the robot would: hashes, robot, task, rate, names, shapes, golden vectors."""
+def check(
+    folder: FolderArgument, require_envelope: RequireEnvelopeOption = False, as_json: JsonOption = False
+) -> None:
+    """Load a bundle as the robot would: hashes, robot, task, rate, names, shapes, golden vectors, certified set."""
+    from fulmar_bringup.envelope_check import beyond_box, envelope_note, other_core
     from fulmar_bringup.plan_checks import checked_rate
     from fulmar_core.loop.policy_bundle import read_passport
     from fulmar_core.robots.robot_file import load_robot
@@ -103,7 +112,17 @@ def check(folder: FolderArgument, as_json: JsonOption = False) -> None:
     robot, task = load_robot(passport.robot), load_task(passport.task)
     checked_rate(robot, passport.control_hz)
     Policy(folder, robot, task, control_hz=passport.control_hz)
+    note = envelope_note(str(folder), robot, task.name, required=require_envelope)
+    older, certified = other_core(folder), passport.envelope is not None
+    state = "none" if not certified else "outside" if note else "inside"
+    beyond = beyond_box(folder, robot, task.name) if certified and not note else ()
+    warn([line for line in (note, older and f"policy '{folder}': of its certified set: {older}") if line])
     if as_json:
-        print_json({"bundle": str(folder), "accepted": True, "sha256": passport.sha256})
+        document = {"bundle": str(folder), "accepted": True, "sha256": passport.sha256}
+        print_json({**document, "envelope": state, "beyond_box": list(beyond)})
     else:
         write_line(f"{folder}: accepted ({passport.robot}, {passport.task}, {passport.control_hz:g} Hz)")
+        if certified:
+            write_line(
+                f"certified set: {robot.name} is {state}{''.join(f'; {part} of its box' for part in beyond)}"
+            )

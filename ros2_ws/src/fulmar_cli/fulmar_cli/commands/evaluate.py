@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 from fulmar_bringup.console import output, print_result
 from fulmar_cli.commands.arguments import (
+    TASK_HELP,
     CalibrationOption,
     ControlHzOption,
     ControllerOption,
     JsonOption,
     PolicyOption,
-    RobotArgument,
     ScenarioOption,
     SeedOption,
-    TaskArgument,
+    argument,
+    flag,
     option,
 )
+from fulmar_cli.commands.fleet import OptionalRobot
+from fulmar_cli.commands.fleet_evaluation import FLEET_HELP, RESULTS_HELP, FleetSeeds, both_given
 from fulmar_cli.commands.inspection import PathOption, ThingOption
+from fulmar_cli.commands.run_help import NO_GUARD_HELP
 from fulmar_core.config.seeds import EVALUATION_SEED
 from fulmar_evaluation.figures import meanings
 
@@ -28,8 +33,9 @@ What the figures mean. Of all but the first: mean, median and 95th percentile ov
 
 
 def evaluate(
-    robot: RobotArgument,
-    task: TaskArgument,
+    robot: OptionalRobot = None,
+    task: Annotated[str | None, argument("[TASK]", TASK_HELP)] = None,
+    system: Annotated[str | None, option("FLEET", FLEET_HELP)] = None,
     controller: ControllerOption = "policy",
     policy: PolicyOption = None,
     through: Annotated[
@@ -37,7 +43,8 @@ def evaluate(
         option(
             "WAY",
             "batch: the core's own dynamics. mujoco: an independent simulator. ros: the deployed nodes over DDS. "
-            "jsbsim[:MODEL]: an aircraft in JSBSim, from its own file or a model that comes with JSBSim.",
+            "jsbsim[:MODEL]: an aircraft in JSBSim, from its own file or a model that comes with JSBSim. "
+            "basilisk: a spacecraft or satellite in Basilisk (`make peers`).",
         ),
     ] = "mujoco",
     episodes: Annotated[
@@ -64,12 +71,16 @@ def evaluate(
     ] = None,
     thing: ThingOption = None,
     path: PathOption = None,
+    real_time: Annotated[bool, flag("--real-time", "A fleet by the clock; in lock step by default.")] = False,
+    no_guard: Annotated[bool, flag("--no-keep-apart", NO_GUARD_HELP)] = False,
+    results: Annotated[Path | None, option("DIR", RESULTS_HELP)] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Evaluate a controller over many episodes and print every figure.
 
     Episode i of a seed is the same in every way of running it. Success means staying inside the task's tolerance
-    for its whole closing window.
+    for its whole closing window. With --system, a fleet is run once for each seed, from --seed on, and the exit code
+    is 1 if a robot did not arrive, hulls touched, or a run failed.
 
     Try:
 
@@ -78,11 +89,18 @@ def evaluate(
     fulmar evaluate cubesat_8 inspect --controller pd --thing iss --path spiral --episodes 20
 
     fulmar evaluate turtlebot2 go_through_positions --through batch --steps 1000
+
+    fulmar evaluate --system swap_places --through ros --episodes 20 --seed 0
     """
     from fulmar_cli.installation.extras import check_plan
     from fulmar_core.robots.robot_file import use_calibration
     from fulmar_evaluation.trial_plan import plan_trial, print_figures, trial_figures
 
+    if system is not None:
+        asked = FleetSeeds(system, through, episodes or 20, seed, real_time, not no_guard, results)
+        asked.evaluate(robot, as_json=as_json)
+        return
+    robot, task = both_given(robot, task)
     use_calibration(calibration, robot)
     trial = plan_trial(
         robot=robot, task=task, controller=controller, policy=policy, through=through, episodes=episodes,

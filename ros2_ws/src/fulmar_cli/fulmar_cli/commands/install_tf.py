@@ -18,9 +18,9 @@ def install_tf(as_json: JsonOption = False) -> None:
 
     fulmar up mujoco_lqr
     """
-    from fulmar_bringup.message_build import install_tf2_msgs
+    from fulmar_bringup.message_build import TF2_MSGS, install_messages
 
-    built = install_tf2_msgs(log_line)
+    built = install_messages(TF2_MSGS, log_line)
     if as_json:
         print_json({"package": "tf2_msgs", "built": built})
     else:

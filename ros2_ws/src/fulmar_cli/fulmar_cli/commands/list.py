@@ -67,7 +67,7 @@ def _show(found: dict[str, dict[str, str]]) -> None:
 
 def _family(family: str) -> tuple[list[str], Callable[[str], str]]:
     """Names of one family, and what loads one of them and gives its title."""
-    from fulmar_bringup.system import load_system
+    from fulmar_bringup.fleet_file import load_any_system
     from fulmar_core.estimators.kinds import load_estimator
     from fulmar_core.loop.policy_bundle import read_passport
     from fulmar_core.robots.robot_file import load_robot
@@ -93,7 +93,7 @@ def _family(family: str) -> tuple[list[str], Callable[[str], str]]:
         "hardware": load_hardware,
         "scenarios": load_scenario,
         "estimators": load_estimator,
-        "systems": load_system,
+        "systems": load_any_system,
         "things": load_structure,
     }
     load = loaders[family]

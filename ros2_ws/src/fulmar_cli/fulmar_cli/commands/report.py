@@ -9,7 +9,7 @@ from fulmar_bags.bag_reading import BagReading
 from fulmar_bringup.console import log_line, write_line
 from fulmar_cli.commands.arguments import argument, flag, option
 from fulmar_cli.commands.bag_reading import with_bag_options
-from fulmar_core.config.errors import BagError
+from fulmar_core.config.errors import BagError, ConfigError
 
 
 @with_bag_options()
@@ -24,14 +24,35 @@ def report(
     force: Annotated[
         bool, flag("--force", "Replace FILE even if it is not a report of the same bags.")
     ] = False,
+    video: Annotated[
+        Path | None,
+        option(
+            "FILE", "Make a film instead: .mp4, .webp or .gif; several bags side by side. It needs OpenGL."
+        ),
+    ] = None,
+    size: Annotated[str, option("WIDTHxHEIGHT", "Of the film [px].")] = "960x540",
+    fps: Annotated[
+        float | None, option("HZ", "Frames a second of the film; by default 25, of .webp and .gif 12.5.")
+    ] = None,
+    speed: Annotated[float, option("X", "Seconds of the run a second of the film.")] = 1.0,
+    span: Annotated[str, option("BEGIN,END", "Only this part of the runs [s].")] = "",
     *,
     reading: BagReading,
 ) -> None:
-    """Make a report with plots from recorded runs.
+    """Make a report with plots from recorded runs, or with --video a film.
 
     Bags of controllers and recorders that are not Fulmar's need --task. Without it, or where a bag holds no goal, the
     report has the path, the speed, the actuators and the rates, and says what is missing.
     """
+    if video is not None:
+        from fulmar_cli.commands.film_options import film
+
+        if out is not None:
+            raise ConfigError("--out names a report and --video a film: make one at a time.")
+        film(bags, video, size=size, fps=fps, speed=speed, span=span, force=force)
+        return write_line(str(video))
+    if fps is not None or span or speed != 1.0 or size != "960x540":
+        raise ConfigError("--size, --fps, --speed and --span are of a film: give --video FILE as well.")
     from fulmar_bags.contents import open_bag
     from fulmar_bags.run_record import read_any_run
     from fulmar_evaluation.report.bag_report import write_bag_report
@@ -52,4 +73,4 @@ def report(
                 raise
             log_line(f"warning: no result: {missing}")
             write_bag_report(open_bag(bags[0], reading), path, note=f"No result: {missing}", force=force)
-    write_line(str(path))
+    return write_line(str(path))

@@ -32,7 +32,7 @@ def install(
     name: cli.NameOption = None,
     task: Annotated[str | None, option("T", "Another task.")] = None,
     controller: Annotated[str | None, option("C", "Another controller.")] = None,
-    backend: Annotated[str | None, option("B", "mujoco, mock, jsbsim (aircraft) or hardware.")] = None,
+    backend: Annotated[str | None, option("B", "mujoco, mock, jsbsim, basilisk or hardware.")] = None,
     hardware: cli.HardwareOption = None,
     policy: cli.PolicyOption = None,
     recording: Annotated[

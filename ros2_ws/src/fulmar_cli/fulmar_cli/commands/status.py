@@ -39,7 +39,10 @@ def status(
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """List the robots and nodes of this ROS domain: level, mode, reason, e-stop, and the age of their diagnostics.
+    """List the robots and nodes of this ROS domain: level, mode, reason, and the age of their diagnostics.
+
+    Beside each robot: its e-stop and who pressed it, its controller and the last request to change that, and who gave
+    the goal that counts.
 
     A health check for containers and services: it ends as soon as every node has reported. Exit code: 0 all well; 1 a
     node does not report or is in error, or no robot is found. A pressed e-stop is no error. With --node plant missing
@@ -89,7 +92,13 @@ def status(
 
 
 def _show(robot: RobotStatus, looked_s: float) -> None:
-    write_line(f"{robot.name}  e-stop: {robot.estop}")
+    parts = (
+        f"e-stop: {robot.estop}" + (f" by {robot.estop_by}" if robot.estop_by else ""),
+        robot.controller and f"controller: {robot.controller}",
+        robot.goal_by and f"goal by {robot.goal_by}",
+        robot.swap and f"swap: {robot.swap}",
+    )
+    write_line("  ".join((robot.name, *filter(None, parts))))
     width = max([11, *(len(node.node) + 1 for node in robot.nodes)])
     for node in robot.nodes:
         level = "?" if node.level in NO_REPORT else node.level

@@ -58,13 +58,16 @@ def read_guards(**given: Any) -> Guards:
     """Guards as options give them; None: not given.
 
     Raises:
-        ConfigError: Unknown fallback.
+        ConfigError: Unknown fallback or guard.
     """
     from fulmar_bringup.system import Guards
+    from fulmar_core.loop.controller_settings import ENVELOPE
     from policy_server.controllers import FALLBACKS
 
     if given["fallback"] not in (None, *FALLBACKS):
         raise UnknownNameError("fallback", given["fallback"], FALLBACKS)
+    if given.get("guard") not in (None, ENVELOPE):
+        raise UnknownNameError("guard", given["guard"], (ENVELOPE,))
     return Guards(**{name: value for name, value in given.items() if value is not None})
 
 

@@ -11,6 +11,7 @@ from fulmar_cli.diagnosis.check_result import Finding
 from fulmar_cli.diagnosis.devices import check_permissions, devices_of, diagnose_hardware
 from fulmar_cli.diagnosis.installation import (
     check_configuration,
+    check_envelopes,
     check_extra,
     check_policies,
     check_python,
@@ -65,6 +66,7 @@ def diagnose(purpose: str | None = None, name: str | None = None) -> list[Findin
         *(() if hardware else (check_renderer,)),
         check_configuration,
         check_policies,
+        check_envelopes,
         *(() if domain_problem(environment) else (partial(check_discovery, environment, hardware=hardware),)),
         partial(check_multicast, environment),
         partial(check_profile, environment),

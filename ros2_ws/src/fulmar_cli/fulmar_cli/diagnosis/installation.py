@@ -108,3 +108,27 @@ def check_policies() -> Finding:
     except (FulmarError, ImportError) as error:
         return Finding("shipped policies", "wrong", str(error), repair_command("policy_server"))
     return Finding("shipped policies", "ok", ", ".join(folder.name for folder in folders) or "none")
+
+
+def check_envelopes() -> Finding:
+    """Whether each robot lies inside the certified set of its shipped policy, where there is one."""
+    what = "certified sets"
+    try:
+        from fulmar_bringup.envelope_check import envelope_problems, other_core
+        from fulmar_core.loop.policy_bundle import read_passport
+        from policy_server.controllers import shipped_policies
+
+        certified, outside = [], []
+        for folder in shipped_policies():
+            passport = read_passport(folder)
+            if passport.envelope is None:
+                continue
+            certified.append(folder.name)
+            older = "measured with another version of the core" if other_core(folder) else ""
+            problems = envelope_problems(folder, load_robot(passport.robot), passport.task)
+            outside += [f"{folder.name}: {problem}" for problem in (*problems, older) if problem]
+    except (FulmarError, ImportError) as error:
+        return Finding(what, "wrong", str(error), "fulmar certify BUNDLE --write")
+    if outside:
+        return Finding(what, "advice", "; ".join(outside), "fulmar certify BUNDLE --again --write")
+    return Finding(what, "ok", ", ".join(certified) or "none")

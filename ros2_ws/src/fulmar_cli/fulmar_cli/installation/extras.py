@@ -32,11 +32,15 @@ EXTRAS: dict[str, tuple[str, ...]] = {
     "bags": ("mcap", "rosbags", "mcap_ros2", "zstandard", "PIL"),
     "hardware": ("filterpy", "serial", "gpiod", "pymavlink"),
     "view": ("matplotlib",),
+    "console": ("websockets",),
     "events": ("h5py", "hdf5plugin", "aedat"),
     "jsbsim": ("jsbsim",),
     "datasets": ("pyarrow", "av"),
+    "foxglove": ("foxglove",),
+    "rerun": ("rerun",),
     "train": ("torch", "stable_baselines3", "sb3_contrib", "gymnasium", "onnx", "tensorboard"),
     "gym": ("gymnasium",),  # which `train` brings, too
+    "pettingzoo": ("pettingzoo",),
     "cluster": ("ray",),
     "wandb": ("wandb",),
 }

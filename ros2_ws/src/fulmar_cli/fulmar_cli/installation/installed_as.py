@@ -21,6 +21,7 @@ EXTRAS_OF_SETUP = (
     "bags",
     "hardware",
     "view",
+    "console",
 )  # the extra `run`, as `make setup` installs it
 # Distributions that are not called as the module they bring.
 DISTRIBUTIONS = {

@@ -317,6 +317,9 @@ SCENARIO: tuple[Plausible, ...] = (
     Plausible("sensing.noise", "times", (0.0, 100.0), (0.0, 10.0), "factor on the robot's own noise"),
     Plausible("sensing.bias", "times", (0.0, 100.0), (0.0, 10.0), "factor on the robot's own bias"),
     Plausible("sensing.delay_s", "s", (0.0, 5.0), (0.0, 0.5), "a control loop with more lag is unstable"),
+    Plausible("link.delay_s", "s", (0.0, 10.0), (0.0, 1.0), "radio to a satellite in geostationary orbit: 0.3 s"),
+    Plausible("link.jitter_s", "s", (0.0, 10.0), (0.0, 0.5), "at most the delay itself"),
+    Plausible("link.bandwidth", "bit/s", (100.0, 1e11), (4800.0, 1e10), "a slow telemetry radio to a wire"),
     Plausible("sensing.velocity_noise.*", "m/s", (0.0, 5.0), (0.0, 0.5), "differences of poor positions: 0.5 m/s"),
     Plausible("sensing.yaw_rate_noise.*", "rad/s", (0.0, 2.0), (0.0, 0.3), "differences of headings: 0.3 rad/s"),
 )  # fmt: skip

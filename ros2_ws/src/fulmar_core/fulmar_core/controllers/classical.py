@@ -28,7 +28,20 @@ def entry_of(robot: Robot, law: str | None) -> Entry:
 
 
 def check_pair(robot: Robot, task: Task, *, law: str | None = None) -> None:
-    """Reject a robot and a task that no classical law, or not the named one, is for.
+    """Reject a robot and a task that no classical law, or not the named one, is for, or that it has no gains for.
+
+    Raises:
+        ConfigError: With what would be allowed.
+    """
+    if check_law(robot, task, law=law) is None:
+        gains_of(robot, law)
+
+
+def check_law(robot: Robot, task: Task, *, law: str | None = None) -> Path | None:
+    """The part of `check_pair` that computes no default gains.
+
+    Returns:
+        The file with the law's gains; None where default gains are to be computed.
 
     Raises:
         ConfigError: With what would be allowed.
@@ -49,8 +62,7 @@ def check_pair(robot: Robot, task: Task, *, law: str | None = None) -> None:
         entry.check(robot)
     except ValueError as error:
         raise ConfigError(f"no classical law is for '{robot.name}': {error}") from error
-    if _find_gains(robot, entry) is None:
-        gains_of(robot, law)
+    return _find_gains(robot, entry)
 
 
 def has_law(robot: Robot, task: Task) -> bool:

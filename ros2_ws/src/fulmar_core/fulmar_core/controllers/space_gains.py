@@ -105,7 +105,7 @@ def _ability(robot: Robot) -> _Ability:
     """
     actuators, step = robot.actuated_by(Pushing), robot.timing.control_s
     full = actuators.full_thrust[:, None] * actuators.wrench_per_newton
-    force, torque = (_weakest(part, shared=actuators.shared_pressure) for part in (full[:, :3], full[:, 3:]))
+    force, torque = (weakest(part, shared=actuators.shared_pressure) for part in (full[:, :3], full[:, 3:]))
     strongest = float(actuators.full_thrust.max())
     if force < 1e-3 * strongest or torque < 1e-3 * strongest * robot.body.radius:
         raise ValueError(
@@ -125,7 +125,7 @@ def _ability(robot: Robot) -> _Ability:
     )
 
 
-def _weakest(full: np.ndarray, *, shared: bool) -> float:
+def weakest(full: np.ndarray, *, shared: bool) -> float:
     """Largest force or torque that is there in every direction.
 
     Args:

@@ -9,6 +9,9 @@ for a force that does not turn.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
 
 from fulmar_core.states.attitude import (
     Tensor,
@@ -51,6 +54,12 @@ def inertia_of(tensor: Tensor) -> Inertia:
     d, e, f = xz * yz - xy * zz, xy * yz - xz * yy, xy * xz - xx * yz
     share = 1.0 / (xx * a + xy * d + xz * e)
     return Inertia(tensor, tuple(share * entry for entry in (a, b, c, d, e, f)))
+
+
+def matrix_of(tensor: Any) -> np.ndarray:
+    """Inertia tensor of its entries xx, yy, zz, xy, xz, yz as a matrix, shape (3, 3) [kg·m²]."""
+    xx, yy, zz, xy, xz, yz = np.asarray(tensor, dtype=float)
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
 def turn_acceleration(rate: Vector, torque: Vector, inertia: Inertia) -> Vector:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,9 +12,12 @@ from fulmar_core.controllers.controller import Controller, Inputs, Readings
 from fulmar_core.dynamics.by_kind import begin_of
 from fulmar_core.estimators.actuator_health.actuator_estimator import ActuatorEstimate, ActuatorEstimator
 from fulmar_core.estimators.actuator_health.applied import Applied, AppliedHistory
+from fulmar_core.loop.formation import FormationGoal, ShapePlace
 from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.sensors.fuel import NAME as FUEL
 from fulmar_core.safety.command_gate import command_problem
+from fulmar_core.safety.envelope.guard import EnvelopeGuard
+from fulmar_core.safety.keep_apart import KeepApartGuard, Other
 from fulmar_core.safety.keep_out import KeepOutGuard
 from fulmar_core.states.state import State
 from fulmar_core.tasks import Task
@@ -41,6 +45,9 @@ class ControlLoop:
         previous: Command of the step before, after every limit, shape (n, m); where no controller chose one, the safe
             command, and from the next measurement on what actuators do by themselves.
         keep_out: Takes over from a controller that would enter a keep-out volume; None where the task has none.
+        envelope: Takes over from a controller that would leave the robot's bounds; None without one.
+        keep_apart: Bounds the speed towards other robots of a fleet; None where there are none to keep apart from.
+        formation: Keeps the goal at a place about a leader; None without one.
         answered_ns: Stamp of the measurement that this was the answer to; -1 before the first [ns].
         estimate: Of the controller's actuator estimator at the newest step; None without one.
     """
@@ -54,6 +61,9 @@ class ControlLoop:
         robots: int = 1,
         pause_ns: int = NEVER_NS,
         applied: AppliedHistory | None = None,
+        envelope: EnvelopeGuard | None = None,
+        others: Sequence[Other] = (),
+        formation: ShapePlace | None = None,
     ) -> None:
         """Begin without a goal.
 
@@ -65,13 +75,20 @@ class ControlLoop:
             pause_ns: After a longer time without a command the past is forgotten [ns].
             applied: What the actuators of one robot did, as far as that is known; without it the loop takes commands
                 for what was applied.
+            envelope: Guard of the robot's bounds; none by default.
+            others: Robots of a fleet that a guard keeps apart from this one.
+            formation: Place about a leader, which is one of these, that takes the place of the targets of each goal.
         """
+        self.envelope = envelope
         self.robot, self.task = robot, task.fitted(robot)
         self.observer = Observer(robot, self.task)
         self.dt = robot.timing.substeps(controller.control_hz) * robot.timing.physics_dt
         self._pause_ns, self._applied = pause_ns, applied
         volumes = self.task.keep_outs
         self.keep_out = KeepOutGuard(robot, volumes, self.dt) if volumes else None
+        self.keep_apart = KeepApartGuard(robot, others, self.dt) if others else None
+        names = [other.name for other in others]
+        self.formation = None if formation is None else FormationGoal(formation, names, controller)
         self._safe = np.tile(np.asarray(robot.actuators.safe_command, dtype=float), (robots, 1))
         self.goal: Goal | None = None
         self._began_ns: int | None = None
@@ -79,6 +96,7 @@ class ControlLoop:
         self._chosen = False  # whether the controller chose the previous command
         self._estimator = self._estimator_for(controller)
         self.estimate: ActuatorEstimate | None = None
+        self._guard_estimate: ActuatorEstimate | None = None  # for the law of the envelope guard
         self._estimated_ns = -1
         self._controller = controller
         self._fuel: np.ndarray | None = None  # share of the tank by the newest reading, shape (n,)
@@ -88,11 +106,18 @@ class ControlLoop:
         """The controller that chooses the commands."""
         return self._controller
 
+    @property
+    def estimates(self) -> bool:
+        """Whether actuators are estimated, for the controller or for the backup of the envelope guard."""
+        return self._estimator is not None
+
     def use(self, controller: Controller) -> None:
         """Let another controller go on; what is estimated begins anew."""
         if controller.estimator != self._controller.estimator:
             self._estimator = self._estimator_for(controller)
         self._controller = controller
+        if self.formation is not None:
+            self.formation.use(controller)
         self._forget_estimates()
 
     def begin(self, goal: Goal | None) -> None:
@@ -105,8 +130,9 @@ class ControlLoop:
         if self._controller.observer is not None:
             self._controller.observer.reset()
         self._forget_estimates()
-        if self.keep_out is not None:
-            self.keep_out.reset()
+        for guard in (self.keep_out, self.keep_apart, self.formation):
+            if guard is not None:
+                guard.reset()
 
     def step(self, measured: State, readings: Readings, stamp_ns: int) -> Step:
         """Do one control step; see `inputs` and `act`."""
@@ -132,6 +158,10 @@ class ControlLoop:
         if not self._chosen:
             self.previous = begin_of(self.robot).command(self.robot, state)
         goal = self._advanced(state, stamp_ns)
+        if self.formation is not None:
+            any_state: Any = state
+            own = np.column_stack((any_state.x, any_state.y, any_state.yaw))
+            self.goal, goal = self.formation.follow(goal, own, readings, stamp_ns)
         self._estimate(state, stamp_ns)
         if self.observer.sees_fuel and FUEL in readings:
             self._fuel = readings[FUEL][:, 1]
@@ -165,8 +195,16 @@ class ControlLoop:
         wanted = command = self._safe if refusal else action
         if self.keep_out is not None:
             wanted = self.keep_out.guarded(command, inputs)
+        if self.keep_apart is not None:
+            wanted = self.keep_apart.guarded(wanted, inputs)
         if not refusal or wanted is not command:
             command = slewed(self.robot.actuators.limited(wanted), inputs.previous, self.robot, self.dt)
+        if self.envelope is not None and self.envelope.watches:
+            sent = self.envelope.guarded(command, inputs, self._guard_estimate, self._fence_at(inputs.goal))
+            if sent is not command:
+                if self.keep_out is not None:  # the backup, too, stays out of these
+                    sent = self.keep_out.guarded(sent, inputs)
+                command = slewed(self.robot.actuators.limited(sent), inputs.previous, self.robot, self.dt)
         self.previous, self.answered_ns, self._chosen = command, inputs.stamp_ns, not refusal
         return Step(inputs.observation, action, command, refusal)
 
@@ -175,6 +213,31 @@ class ControlLoop:
         self.previous, self.answered_ns, self._chosen = self._safe, stamp_ns, command is not None
         if command is not None:
             self.previous = slewed(self.robot.actuators.limited(command), self.previous, self.robot, self.dt)
+
+    def brake(self, measured: State, stamp_ns: int) -> None:
+        """Answer a measurement by the backup of the envelope guard, which stops the robots and holds them.
+
+        Args:
+            measured: State of each robot, shapes (n,).
+            stamp_ns: When it was measured, on the plant's clock [ns].
+        """
+        assert self.envelope is not None, "no envelope guard has a backup"
+        state: Any = measured.in_float64()
+        self._estimate(state, stamp_ns)
+        unknown = unknown_inputs(self, stamp_ns)
+        inputs = replace(unknown, state=state, previous=self.previous)
+        wanted = self.envelope.stopped(inputs, self._guard_estimate)
+        self.previous = slewed(self.robot.actuators.limited(wanted), self.previous, self.robot, self.dt)
+        self.answered_ns, self._chosen = stamp_ns, True
+
+    def _fence_at(self, goal: Goal) -> np.ndarray | None:
+        """Where the goal is that a geofence surrounds, shape (n, 3); None where velocities are the goal [m]."""
+        if self.task.goal_topic == "goal_velocity":
+            return None
+        place = np.zeros((len(goal.current), 3))
+        axes = self.task.state_type.AXES
+        place[:, :axes] = goal.current[:, :axes]
+        return place
 
     def _advanced(self, state: State, stamp_ns: int) -> Goal:
         """The goal with those targets done that a measurement reaches."""
@@ -194,14 +257,16 @@ class ControlLoop:
         return None if observer is None else observer.update(state, self.previous)
 
     def _estimator_for(self, controller: Controller) -> ActuatorEstimator | None:
-        return (
-            ActuatorEstimator(self.robot, controller.estimator) if controller.estimator is not None else None
-        )
+        settings = controller.estimator
+        if settings is None and self.envelope is not None and self.envelope.watches:
+            settings = self.envelope.backup.law.estimator
+        return ActuatorEstimator(self.robot, settings) if settings is not None else None
 
     def _forget_estimates(self) -> None:
         if self._estimator is not None:
             self._estimator.reset()
-        self.estimate, self._estimated_ns = None, -1
+        self.estimate = self._guard_estimate = None
+        self._estimated_ns = -1
 
     def _estimate(self, state: Any, stamp_ns: int) -> None:
         """Update the estimate of a robot in the plane by what moved it since the last one."""
@@ -214,7 +279,8 @@ class ControlLoop:
             applied, passed_s = self.previous, 1e-9 * passed_ns
             if self._applied is not None:
                 applied = self._applied.between(self._estimated_ns, stamp_ns)
-        self.estimate = self._estimator.update(state, applied, passed_s)
+        self._guard_estimate = self._estimator.update(state, applied, passed_s)
+        self.estimate = self._guard_estimate if self._controller.estimator is not None else None
         self._estimated_ns = stamp_ns
 
 

@@ -5,15 +5,19 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from fulmar_core.loop.formation import ShapePlace
 from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.sensors.repetition import FROZEN_AFTER, is_noisy
 from fulmar_core.safety.arbiter import Flags
 from fulmar_core.safety.geofence import NO_AREA, check_area
 from fulmar_core.safety.input_gate import JUMP_M, InputGate
-from fulmar_core.safety.watchdog import default_timeout
+from fulmar_core.safety.keep_apart import Other
 from fulmar_core.states.spatial import SpatialState
+from fulmar_core.wires.silence import default_timeout
 
 MOST_COPIES = 3
+ENVELOPE = "envelope"  # the guard that stops a body that floats within its bounds
+GUARDS = ("", ENVELOPE)
 POLICY = "policy"  # the controller that runs a bundle, which another one may follow while the node runs
 # Of a plant whose states of the actuators may come late or get lost, before nothing is learned
 MISSED_TICKS = 5
@@ -46,10 +50,17 @@ class ControllerSettings:
     max_run_time_s: float = 0.0  # of acting, in the robot's own time; 0: for ever [s]
     # x_min, x_max, y_min, y_max that the robot must not leave, in space also z_min, z_max [m].
     area: tuple[float, ...] = NO_AREA
+    guard: str = ""  # `envelope`: a backup law takes over before the robot leaves its bounds
     overruns_to_stop: int = 25  # beats in a row, each late by a whole period, before it is a fault; 0: never
     odometry_may_repeat: bool = False  # to the last bit, while the robot stands: that of encoders does
     air_bearing: bool = False  # wait for `air_bearing/state`, as with a bearing in the robot's YAML
     copies: int = 1  # of each command, within its period; in real time only
+    fleet: bool = False  # listen to the e-stop of a fleet, too
+    # Robots of the fleet that the guard keeps apart from this one, each as `NAME TYPE`, or `NAME TYPE guarded`
+    neighbours: tuple[str, ...] = ("",)
+    formation: str = (
+        ""  # place in a formation: `LEADER X Y HEADING` [m, m, deg], of which LEADER is a neighbour
+    )
     autostart: bool = True
 
     def __post_init__(self) -> None:
@@ -63,8 +74,23 @@ class ControllerSettings:
                 raise ValueError(f"{name} = {getattr(self, name)} must not be negative.")
         if not 1 <= self.copies <= MOST_COPIES:
             raise ValueError(f"copies = {self.copies} must be from 1 to {MOST_COPIES}.")
+        if self.guard not in GUARDS:
+            raise ValueError(f"guard = '{self.guard}' must be '{ENVELOPE}' or empty.")
         if self.area != NO_AREA:
             check_area(self.area)
+        _ = self.others, self.place  # an entry that is none is refused now
+        if self.place is not None and self.place.leader not in [other.name for other in self.others]:
+            raise ValueError(f"formation = '{self.formation}' follows a robot that is not in 'neighbours'.")
+
+    @property
+    def others(self) -> tuple[Other, ...]:
+        """Robots of the fleet that a guard keeps apart from this one."""
+        return tuple(Other.of(text) for text in self.neighbours if text)
+
+    @property
+    def place(self) -> ShapePlace | None:
+        """Place in a formation, whose leader is one of `others`; None without one."""
+        return ShapePlace.of(self.formation) if self.formation else None
 
     def control_rate(self, robot: Robot) -> float:
         """Command rate in the robot's own time [Hz]."""

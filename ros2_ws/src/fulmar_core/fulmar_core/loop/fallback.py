@@ -106,6 +106,11 @@ class ControllerSwitch(Generic[T]):
         self.proposed: T | None = None
 
     @property
+    def fallback(self) -> T | None:
+        """What takes over when the primary controller fails."""
+        return self._fallback
+
+    @property
     def known(self) -> tuple[T, ...]:
         """Those that act or may take over by themselves."""
         return (self.current, *((self._fallback,) if self._fallback is not None else ()))

@@ -11,14 +11,17 @@ import numpy as np
 from fulmar_core.controllers.controller import Controller, Inputs, Readings
 from fulmar_core.controllers.excite import Excite
 from fulmar_core.controllers.excite_wheels import ExciteWheels
+from fulmar_core.controllers.rest import Rest
 from fulmar_core.estimators.actuator_health.applied import AppliedHistory
 from fulmar_core.loop.control_loop import ControlLoop, Step
 from fulmar_core.loop.controller_settings import ControllerSettings
+from fulmar_core.loop.envelope import envelope_of
 from fulmar_core.loop.fallback import ControllerSwitch, Standby
 from fulmar_core.loop.mission import STREAM_NS, Mission
 from fulmar_core.robots.robot import Robot
 from fulmar_core.safety.arbiter import BEYOND_GEOFENCE, Decision, Flags, arbitrate
 from fulmar_core.safety.convergence import ConvergenceWatch
+from fulmar_core.safety.envelope.guard import EnvelopeGuard
 from fulmar_core.safety.geofence import (
     NO_AREA,
     OUT_OF_BOUNDS,
@@ -85,6 +88,7 @@ class GuardedLoop:
         *,
         gate: InputGate | None = None,
         applied: AppliedHistory | None = None,
+        envelope: EnvelopeGuard | None = None,
     ) -> None:
         """Begin without a goal.
 
@@ -96,6 +100,7 @@ class GuardedLoop:
             estop: Is asked before every step.
             gate: Of the measurements; that of the settings by default.
             applied: Commands that the actuators applied, as far as known.
+            envelope: Guard of the robot's bounds; that of the settings by default.
 
         Raises:
             ConfigError: The area of the settings is none of such a robot.
@@ -104,7 +109,14 @@ class GuardedLoop:
         self._lock = threading.Lock()
         self.switch = switch
         self.loop = ControlLoop(
-            robot, task, switch.current.controller, pause_ns=settings.pause_ns(robot), applied=applied
+            robot,
+            task,
+            switch.current.controller,
+            pause_ns=settings.pause_ns(robot),
+            applied=applied,
+            envelope=envelope_of(robot, settings) if envelope is None else envelope,
+            others=settings.others,
+            formation=settings.place,
         )
         self.mission = Mission(self.loop, streamed=settings.goals_streamed)
         self.newest: Measurement | None = None
@@ -141,7 +153,7 @@ class GuardedLoop:
 
     @property
     def strives(self) -> bool:
-        """Whether the controller means to meet the goal; those that excite a robot do not."""
+        """Whether the controller means to meet the goal; those that excite a robot, or rest, do not."""
         return _strives(self.loop.controller)
 
     @property
@@ -151,6 +163,16 @@ class GuardedLoop:
         if guard is None or self.newest is None:
             return ""
         return guard.words(self._newest_state, [each.name for each in self.loop.task.structures])
+
+    @property
+    def kept_apart(self) -> str:
+        """Why the guard holds the robot back from another one; empty where it does not."""
+        return "" if self.loop.keep_apart is None else self.loop.keep_apart.words
+
+    @property
+    def lost_leader(self) -> str:
+        """Why the robot holds its place in the stead of that in its formation; empty where it does not."""
+        return "" if self.loop.formation is None else self.loop.formation.words
 
     @property
     def bearing_known(self) -> bool:
@@ -212,6 +234,8 @@ class GuardedLoop:
                 if not (self._settings.goals_streamed or self.mission.moved):
                     # A new goal after a look at the robot: one that was outside its area may go on, if it is back.
                     self._change(outside=self._outside(), unconverged="")
+                    if self.loop.envelope is not None:
+                        self.loop.envelope.reset()
             elif self.loop.task.goal_topic == "goal_velocity" and not 0 <= since_ns <= STREAM_NS:
                 self._change(unconverged="")
             self._follow_mission(rests=False)
@@ -281,10 +305,19 @@ class GuardedLoop:
             self._begin_anew()
             if decision.may_act and measurement is not None:
                 return decision, self._inputs(measurement)
-            brake = self._brake() if decision.may_brake and measurement is not None else None
+            may_brake = decision.may_brake and measurement is not None
+            brake = self._brake() if may_brake else None
         self._convergence.reset()
+        if may_brake and brake is None and self._stops and measurement is not None:
+            self.brake(measurement)
+            return decision, None
         self.loop.rest(measurement.stamp_ns if measurement is not None else 0, brake)
         return decision, None
+
+    def brake(self, measurement: Measurement) -> None:
+        """Answer a measurement by the backup of the envelope guard, which has one; see `ControlLoop.brake`."""
+        state = self._newest_state if measurement is self.newest else self._state_of(measurement)
+        self.loop.brake(state, measurement.stamp_ns)
 
     def observe(self, measurement: Measurement) -> Inputs:
         """Observe for a controller that acts whatever the guards say, as one did in a record."""
@@ -304,7 +337,9 @@ class GuardedLoop:
         Raises:
             TaskError: The task cannot say how far it is.
         """
-        if self.strives:
+        if self.kept_apart:  # another robot is in the way: that it comes no nearer is no sign of a failure
+            self._convergence.reset()
+        elif self.strives:
             self._convergence.see(inputs, step.command)
 
     def note(self, refusal: str) -> bool:
@@ -366,6 +401,12 @@ class GuardedLoop:
         )
         return self.loop.task.state_type.from_rigid(rigid)
 
+    @property
+    def _stops(self) -> bool:
+        """Whether a robot that may not act is stopped by the backup of its envelope guard: it was under way."""
+        flags, guard = self._flags, self.loop.envelope
+        return guard is not None and guard.stops and flags.has_goal and not flags.bearing_off
+
     def _brake(self) -> np.ndarray | None:
         """The guard's command for a robot that may not act and would enter a volume within a minute, shape (1, m)."""
         guard, state = self.loop.keep_out, self._newest_state
@@ -416,7 +457,10 @@ class GuardedLoop:
         """How the robot is outside its area right now; empty if it is not, or if its place is unknown."""
         if self.newest is None or not self._bounded:
             return ""
-        return outside(self.newest.state.position_in_world.tolist(), self._settings.area)
+        guard = self.loop.envelope
+        guarded = guard is not None and guard.stops and self._flags.has_goal
+        place = self.newest.state.position_in_world.tolist()
+        return outside(place, self._settings.area, guarded=guarded)
 
     def _beyond(self, goal: Goal) -> str:
         """How a goal lies outside the area or within a keep-out volume; empty if it does not, or is no place."""
@@ -433,5 +477,5 @@ class GuardedLoop:
 
 
 def _strives(controller: Controller) -> bool:
-    """Whether a controller means to meet the goal; those that excite a robot do not."""
-    return not isinstance(controller, Excite | ExciteWheels)
+    """Whether a controller means to meet the goal; those that excite a robot, or rest, do not."""
+    return not isinstance(controller, Excite | ExciteWheels | Rest)

@@ -43,7 +43,7 @@ MAX_BYTES = WEIGHTS_BYTES  # a file beyond this is no policy of ours, and is not
 
 Action = Literal["on_off", "continuous"]
 # Keys that came after format 2, and what is without them.
-LATER: dict[str, Any] = {"remembers_command": False, "image": None}
+LATER: dict[str, Any] = {"remembers_command": False, "image": None, "envelope": None}
 
 
 @dataclass(frozen=True)
@@ -67,6 +67,7 @@ class Passport:
     # otherwise, that takes its place.
     remembers_command: bool = False
     image: ImageInput | None = None  # what it sees; None: nothing
+    envelope: dict[str, Any] | None = None  # as `safety.certified_set` reads it; None: not certified
 
     def sealed(self) -> Passport:
         """The same passport with its own hash filled in."""
@@ -167,6 +168,16 @@ def write_bundle(folder: Path, network: bytes, golden: Golden, passport: Passpor
     )
     (folder / SIGNATURE).unlink(missing_ok=True)  # it was for what was here before
     return sealed
+
+
+def reseal(bundle: Bundle, passport: Passport) -> bool:
+    """Replace the passport of a bundle whose other files stay; returns whether that undid a signature."""
+    folder = bundle.folder
+    text = json.dumps(passport.sealed().plain(), indent=2) + "\n"
+    signed = (folder / SIGNATURE).is_file()
+    write_whole({folder / PASSPORT: text.encode()})
+    (folder / SIGNATURE).unlink(missing_ok=True)  # it was for the passport before
+    return signed
 
 
 def read_bundle(folder: Path) -> Bundle:
@@ -326,6 +337,8 @@ def _passport_of(values: Any, path: Path) -> Passport:
         raise BundleError(f"{path}: 'action' or 'memory' has no meaning. Export the policy again.")
     if not all(isinstance(value, int | float) for value in values["command_scale"]):
         raise BundleError(f"{path}: 'command_scale' must hold numbers. Export the policy again.")
+    if not isinstance(values["envelope"], dict | None):
+        raise BundleError(f"{path}: 'envelope' has no meaning. Certify the policy again: fulmar certify")
     for name in ("observation_names", "actuator_names"):
         values[name] = tuple(map(str, values[name]))
     values["command_scale"] = tuple(map(float, values["command_scale"]))

@@ -10,7 +10,7 @@ import numpy as np
 
 from fulmar_core.config.errors import ConfigError
 from fulmar_core.controllers.allocation import allocation_of
-from fulmar_core.robots.actuators.pushing import PLANAR, Pushing
+from fulmar_core.robots.actuators.pushing import PLANAR, WRENCH, Pushing
 from fulmar_core.robots.actuators.thrusters import Thrusters
 from fulmar_core.robots.robot import Robot
 from fulmar_core.states.spatial import SpatialState
@@ -40,14 +40,19 @@ class Wish:
 NOTHING = Wish()
 
 
+def resting_words(robot: Robot) -> str:
+    """What its actuators do at the safe command, in words."""
+    return (
+        "the valves close" if isinstance(robot.actuators, Thrusters) else f"the {robot.actuators.kind} stop"
+    )
+
+
 def letting_go(robot: Robot) -> str:
     """What a robot does when the dead-man switch is released, and how a person gives it back, for the person."""
     if not robot.drifts:
         return "let go and it stands still; g gives it back to the controller"
-    rest = (
-        "the valves close" if isinstance(robot.actuators, Thrusters) else f"the {robot.actuators.kind} stop"
-    )
-    return f"let go and {rest}: it drifts on; press the opposite key to brake, or g to give it back to the controller"
+    drifts = "it drifts on; press the opposite key to brake, or g to give it back to the controller"
+    return f"let go and {resting_words(robot)}: {drifts}"
 
 
 def keys_help(robot: Robot) -> str:
@@ -73,6 +78,21 @@ def hand_mapping(robot: Robot) -> Callable[[Wish], np.ndarray]:
         return _allocated(robot)
     except ValueError as error:
         raise ConfigError(f"'{robot.name}' cannot be teleoperated: {error}") from error
+
+
+def can_be_driven(robot: Robot) -> bool:
+    """Whether a person can drive a robot: whether `hand_mapping` has one for it, without the time to make it."""
+    actuators = robot.actuators
+    try:
+        if (
+            actuators.by_hand(*NOTHING.parts) is None
+            and robot.state_type.AXES == 3
+            and _in_plane(robot) is None
+        ):
+            _check_in_space(robot.actuated_by(Pushing))
+    except ValueError:
+        return False
+    return True
 
 
 def _allocated(robot: Robot) -> Callable[[Wish], np.ndarray]:
@@ -107,11 +127,7 @@ def _allocated_in_space(actuators: Pushing, full: np.ndarray) -> Callable[[Wish]
     Raises:
         ValueError: They only open and close, or do not push and turn about every axis.
     """
-    if actuators.binary or np.linalg.matrix_rank(actuators.wrench_per_newton) < len(full):
-        raise ValueError(
-            "keys and sticks drive in the plane of its x and y axes, and its actuators push out of it. Send it goals: "
-            "fulmar goals."
-        )
+    _check_in_space(actuators)
     asked = np.isin(np.arange(len(full)), PLANAR)
     weight = np.diag(np.where(asked, 1.0, STAYS_IN_PLANE) / full**2)
     allocation = allocation_of(actuators, weight=weight, cost=VALVE_COST)
@@ -122,6 +138,15 @@ def _allocated_in_space(actuators: Pushing, full: np.ndarray) -> Callable[[Wish]
         return np.asarray(allocation.best(wrench))
 
     return command
+
+
+def _check_in_space(actuators: Pushing) -> None:
+    """Refuse actuators that only open and close, or do not push and turn about every axis; raises ValueError."""
+    if actuators.binary or np.linalg.matrix_rank(actuators.wrench_per_newton) < WRENCH:
+        raise ValueError(
+            "keys and sticks drive in the plane of its x and y axes, and its actuators push out of it. Send it goals: "
+            "fulmar goals."
+        )
 
 
 class Keyboard:

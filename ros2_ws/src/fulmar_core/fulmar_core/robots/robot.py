@@ -19,6 +19,7 @@ from fulmar_core.robots.airframe.airframe import Airframe
 from fulmar_core.robots.hydrodynamics import Hydrodynamics
 from fulmar_core.robots.kinds import kind_of
 from fulmar_core.robots.kinds.kind import Kind
+from fulmar_core.robots.look import Part, check_look
 from fulmar_core.robots.morphology import Morphology
 from fulmar_core.robots.sensors.camera import PROFILES, CameraConfig
 from fulmar_core.robots.sensors.event_camera import EventCamera
@@ -209,6 +210,10 @@ class Sensors:
         """
         return {name: sensor_kind(name, spec) for name, spec in self.specs.items()}
 
+    def __getstate__(self) -> dict[str, Any]:
+        """What another process gets: not the rows, whose functions have no name to be found by."""
+        return {key: value for key, value in vars(self).items() if key != "kinds"}
+
     def __post_init__(self) -> None:
         for name in self.own:
             if name in (*SENSORS, "camera") or not name.isidentifier():
@@ -250,9 +255,9 @@ class Robot:
     event_cameras: tuple[EventCamera, ...] = ()  # that look at the stars, at most two
     usual_controller: str = ""  # that drives it where none is asked for; empty: a shipped policy, else a law
     air_bearing: bool = False  # it floats on air that `air_bearing/enable` switches
-    morphology: Morphology | None = (
-        None  # how far bodies of its kind differ, of thrusters that open by degrees
-    )
+    # How far bodies of its kind differ, of thrusters that open by degrees.
+    morphology: Morphology | None = None
+    look: tuple[Part, ...] = ()  # what people see; empty: its hull and its nozzles
 
     @functools.cached_property
     def kind(self) -> Kind:
@@ -332,6 +337,7 @@ class Robot:
     def __post_init__(self) -> None:
         check_robot_name(self.name)
         check_part_names(self.actuators.names)
+        check_look(self.look, self.actuators.names)
         _CHECKS.get(self.kind.name, _check_pushed)(self)
         axes = self.state_type.AXES
         if len(self.body.inertia) > 3 * (axes - 1) or len(self.body.center_of_mass) > axes:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 
 from fulmar_core.config.errors import ConfigError, ImplausibleError
@@ -11,6 +12,7 @@ from fulmar_core.config.plausibility import check_plausible
 from fulmar_core.config.plausible_ranges import RELATIONS, ROBOT
 from fulmar_core.config.strict_yaml import load_config
 from fulmar_core.robots.calibration import VARIABLE, calibrated, calibration_in_use, load_calibration
+from fulmar_core.robots.look_files import with_mesh_files
 from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.sensors.camera import RANGES as CAMERA_RANGES
 from fulmar_core.robots.sensors.table import RANGES
@@ -46,6 +48,8 @@ def load_robot_file(path: Path) -> Robot:
         ImplausibleError: It can, and has values that no robot has.
     """
     robot = load_config(Robot, path)
+    if any(part.file for part in robot.look):
+        robot = replace(robot, look=with_mesh_files(robot.look, path))
     own = robot.actuators.ranges(robot)
     replaced = {row.key for row in own}
     rows = (*own, *(row for row in ROBOT if row.key not in replaced), *RANGES, *CAMERA_RANGES)

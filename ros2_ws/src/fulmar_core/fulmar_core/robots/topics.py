@@ -14,6 +14,8 @@ from fulmar_core.wires.wire import Wire as Wire
 
 # Services, all of std_srvs/Trigger.
 ESTOP_TRIGGER, ESTOP_RESET, GIVE_BACK = "estop/trigger", "estop/reset", "teleop/give_back"
+SIMULATION_STEP = "simulation/step"
+SIMULATION_PAUSE = "simulation/pause"  # the service that takes a value: std_srvs/SetBool
 
 # Where the clock of a simulation begins [ns]; ROS takes 0 for "not set".
 SIMULATION_START_NS = 1_000_000_000
@@ -32,7 +34,7 @@ MOCAP = Wire(
 TRUTH = Wire(
     "ground_truth/odom", "nav_msgs/msg/Odometry", "plant", "stream", "every plant tick",
     "true state of the simulator; never read by a deployed controller", unit="m, m/s, rad/s",
-    frame="`map`; twist in `base_link`",
+    frame="`map`, with an origin `odom`; twist in `base_link`",
 )  # fmt: skip
 ACTUATORS_STATE = Wire(
     "actuators/state", "sensor_msgs/msg/JointState", "plant", "stream", "every plant tick",
@@ -136,6 +138,12 @@ STATUS = Wire(
     "on change and at least 2 Hz",
     "mode, reason, ages, latencies, overruns, rejections", unit="in the name of each value",
 )  # fmt: skip
+ENVELOPE_STATE = Wire(
+    "envelope/state", "diagnostic_msgs/msg/DiagnosticArray", "controller", "latched",
+    "once each time the envelope guard takes over from a controller or gives back, stamped as the observation",
+    "margin, side, intervention and cause; the command that was refused and the one that was sent", latest=100,
+    unit="m; commands as in `actuators/command`",
+)  # fmt: skip
 DIAGNOSTICS = Wire(
     "/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", "every node", "stream",
     "on change and at least 1 Hz",
@@ -172,6 +180,16 @@ MARKERS = Wire(
     unit="m", frame="`odom`, `base_link`",
 )  # fmt: skip
 
+BROADCAST_NAMES = Wire(
+    "broadcast/names", "control_msgs/msg/Keys", "display", "latched", "on change, with `--broadcast`",
+    "names of `broadcast/values`: `observation/TERM` and `action/ACTUATOR`, as of the controller", recorded=False,
+)  # fmt: skip
+BROADCAST_VALUES = Wire(
+    "broadcast/values", "control_msgs/msg/Float64Values", "display", "stream", "control rate, with `--broadcast`",
+    "input and output vector of one control step of the controller, stamped as the observation", recorded=False,
+    unit="of each name, see `controller/observation` and `controller/action`",
+)  # fmt: skip
+
 
 def thing_wire(name: str) -> Wire:
     """Where the pose of a thing of a task's world is published; see `fulmar_core.dynamics.things`."""
@@ -203,9 +221,29 @@ ESTOP = Wire(
     "estop", "std_msgs/msg/Bool", "operator", "latched", "10 Hz, where there is one",
     "true, once and from any publisher, stops the robot until a reset; so does the silence of an e-stop node",
 )  # fmt: skip
+FLEET_ESTOP = Wire(
+    "/fleet/estop", "std_msgs/msg/Bool", "operator", "latched", "on demand, where robots are a fleet",
+    "true, once and from any publisher, stops every robot of the fleet until each is reset",
+)  # fmt: skip
+FLEET_STATUS = Wire(
+    "/fleet/status", "std_msgs/msg/String", "plant", "stream", "2 Hz, where robots are a fleet",
+    "JSON: `time_s`, and `robots` by name with `mode`, `message`, `controller`, `goal_distance_m` and `estop`",
+    unit="m, s",
+)  # fmt: skip
+NEIGHBOURS = Wire(
+    "neighbours", "sensor_msgs/msg/JointState", "plant", "stream",
+    "with each `odom`, for robots of a fleet that keep apart",
+    "where the other robots are: `name` is `ROBOT/x`, `ROBOT/y`, with `position` and `velocity` of each; `effort` 1 "
+    "where its controller drives it, else 0",
+    unit="m, m/s", frame="`map`",
+)  # fmt: skip
 ESTOP_RELEASED = Wire(
     "estop/released", "std_msgs/msg/String", "operator", "stream", "once per reset",
     "name of the node that reset the e-stop",
+)  # fmt: skip
+OPERATOR_ACTION = Wire(
+    "operator/action", "std_msgs/msg/String", "operator", "latched", "before each press of the e-stop and each goal",
+    "JSON: `by`, `does` (`estop` or `goal`) and `stamp_ns` of the goal, from programs that say who they are", latest=10,
 )  # fmt: skip
 TELEOP = Wire(
     "teleop/command", "sensor_msgs/msg/JointState", "operator", "stream", "20 Hz while a person drives",
@@ -218,7 +256,33 @@ JOY = Wire(
 )  # fmt: skip
 SWAP = Wire(
     "controller/swap", "std_msgs/msg/String", "operator", "stream", "on demand",
-    "folder of the policy bundle to load; `controller/status` reports the result",
+    "JSON: `id`, `controller` (a name of `robot_info`) or `bundle` (a folder), `by`; or the folder of a policy bundle",
+)  # fmt: skip
+SWAP_RESULT = Wire(
+    "controller/swap/result", "std_msgs/msg/String", "controller", "latched", "for each request",
+    "JSON: `id`, `accepted`, `reason`, `stamp_ns` of the first measurement that the new controller answers, `sha256`",
+)  # fmt: skip
+SIMULATION_RATE = Wire(
+    "simulation/rate", "std_msgs/msg/String", "operator", "stream", "on demand, of simulated plants",
+    "JSON: `id`, `by`, `rate` in simulated seconds a wall-clock second",
+)  # fmt: skip
+SIMULATION_DISTURB = Wire(
+    "simulation/disturb", "std_msgs/msg/String", "operator", "stream", "on demand, of simulated plants",
+    "JSON: `id`, `by`, `what` of `robot_info`'s disturbances, and its fields",
+)  # fmt: skip
+SIMULATION_STATE = Wire(
+    "simulation/state", "std_msgs/msg/String", "operator", "stream", "on demand, of simulated plants",
+    "JSON: `id`, `by`, `what`: `pause`, `resume`, `step` with `steps`, `reset`, or `place` with `position_m`, "
+    "`quat_xyzw`, `velocity_m_s` and `rate_rad_s`",
+    unit="in the names of keys", frame="`odom`; the rate in `base_link`",
+)  # fmt: skip
+SIMULATION_RESULT = Wire(
+    "simulation/result", "std_msgs/msg/String", "plant", "stream", "once per request",
+    "JSON: `id` of the request, `accepted`, `reason`; of `simulation/state` also `stamp_ns` and the state",
+)  # fmt: skip
+SIMULATION_EVENT = Wire(
+    "simulation/event", "std_msgs/msg/String", "plant", "latched", "once per change of a simulation while it runs",
+    "JSON: `stamp_ns` of the first step that it acts on, `what`, its fields, `by`", latest=100,
 )  # fmt: skip
 RELAY = Wire(
     "relay", "std_msgs/msg/UInt8MultiArray", "every node", "stream", "with the first messages of a publisher",
@@ -248,7 +312,7 @@ TRANSFORMS = Wire(
 )  # fmt: skip
 STATIC_TRANSFORMS = Wire(
     "/tf_static", "tf2_msgs/msg/TFMessage", "plant", "latched", "at load, where tf2_msgs is installed",
-    "`base_link` → frames of its parts; of a simulation also `map` → `odom`, which are one", latest=100, unit="m",
+    "`base_link` → frames of its parts; `map` → `odom` in a simulation, or with an origin", latest=100, unit="m",
     frame="each its own",
 )  # fmt: skip
 DESCRIPTION = Wire(
@@ -256,12 +320,26 @@ DESCRIPTION = Wire(
     "URDF of the robot, made from its YAML; its links are called as the frames",
 )  # fmt: skip
 
+ORIGIN = Wire(
+    "origin", "geometry_msgs/msg/TransformStamped", "plant", "latched", "at load",
+    "`map` → `odom`: where the robot's odometry begins in the frame that all robots share; as given, not measured",
+    unit="m", frame="`map`",
+)  # fmt: skip
+ROBOT_INFO = Wire(
+    "robot_info", "std_msgs/msg/String", "plant", "latched", "at load, and when a person takes or gives it back",
+    "JSON: what the robot is and does, see [robot_info.md](robot_info.md)", unit="m; other units in the names of keys",
+    frame="`base_link` for its parts",
+)  # fmt: skip
+
 WIRES: tuple[Wire, ...] = (
     *SENSOR_WIRES.values(), MOCAP, TRUTH, ACTUATORS_STATE, ACTUATORS_HEALTH, CLOCK, COMMAND, VELOCITY_COMMAND,
-    OBSERVATION, ACTION, BELIEVED, METADATA, STATUS, DIAGNOSTICS, GOAL_POSE, GOAL_POINT, GOAL_PATH, GOAL_POSES,
-    GOAL_VELOCITY, OBSTACLES, MARKERS, BLOCK, AIR_BEARING, DEVICE_STATE, ESTOP, ESTOP_RELEASED, TELEOP, JOY, SWAP,
-    RELAY, TRANSFORMS, STATIC_TRANSFORMS, DESCRIPTION, INERTIA, INERTIA_COVARIANCE, INERTIA_STATUS, EVENTS, EVENTS_2,
-    *CAMERA_IMAGES, *CAMERA_COMPRESSED, CAMERA_INFO, RATE, RATE_STATUS, PERIOD, ANSWER,
+    OBSERVATION, ACTION, BELIEVED, METADATA, STATUS, ENVELOPE_STATE, DIAGNOSTICS, GOAL_POSE, GOAL_POINT, GOAL_PATH,
+    GOAL_POSES, GOAL_VELOCITY, OBSTACLES, MARKERS, BROADCAST_NAMES, BROADCAST_VALUES,
+    BLOCK, AIR_BEARING, DEVICE_STATE, ESTOP, ESTOP_RELEASED, OPERATOR_ACTION, TELEOP, JOY, SWAP, SWAP_RESULT,
+    SIMULATION_RATE, SIMULATION_DISTURB, SIMULATION_STATE, SIMULATION_RESULT, SIMULATION_EVENT, RELAY,
+    TRANSFORMS, STATIC_TRANSFORMS, DESCRIPTION, ORIGIN, ROBOT_INFO,
+    INERTIA, INERTIA_COVARIANCE, INERTIA_STATUS, EVENTS, EVENTS_2, *CAMERA_IMAGES, *CAMERA_COMPRESSED, CAMERA_INFO,
+    RATE, RATE_STATUS, PERIOD, ANSWER, FLEET_ESTOP, FLEET_STATUS, NEIGHBOURS,
 )  # fmt: skip
 
 

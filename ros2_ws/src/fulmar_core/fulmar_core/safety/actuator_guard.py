@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from fulmar_core.robots.actuators.family import Actuators
 from fulmar_core.robots.actuators.refuge import Refuge
+from fulmar_core.safety.command_end import CommandEnd
 from fulmar_core.safety.command_gate import OneWriter, command_problem, name_problem
 from fulmar_core.safety.estop import EstopMonitor
 from fulmar_core.safety.watchdog import Watchdog
@@ -48,6 +49,7 @@ class ActuatorGuard:
         period_s: float | None = None,
         lockstep: bool = False,
         refuge: Refuge | None = None,
+        wall_ns: Callable[[], int] | None = None,
     ) -> None:
         """Begin with the safe command.
 
@@ -59,11 +61,13 @@ class ActuatorGuard:
             period_s: The same by the steady clock, which silences are measured by; `control_dt` by default [s].
             lockstep: Time stands still between commands, so nothing slows down while one is waited for.
             refuge: Safe controller; that of the actuators by default.
+            wall_ns: Steady clock of the e-stop and of `publishers`, where commands go by another one, as where a
+                link loses some in lock step [ns].
         """
         self._actuators, self.watchdog = actuators, watchdog
         self.estop = estop or EstopMonitor(required=False)
         self.publishers = OneWriter()
-        self._control_dt, self._lockstep = control_dt, lockstep
+        self._control_dt, self._lockstep, self._wall_ns = control_dt, lockstep, wall_ns
         self.refuge = refuge or actuators.refuge
         self._steers = math.isinf(self.refuge.longest_s)
         period_s = control_dt if period_s is None else period_s
@@ -101,6 +105,11 @@ class ActuatorGuard:
     def doing(self) -> str:
         """See the class."""
         return self.refuge.doing if self._steering_ns is not None else ""
+
+    @property
+    def is_safe(self) -> bool:
+        """Whether the safe state is applied in the place of what the controller commands, whatever the reason."""
+        return self._safe_since_ns is not None or self._stopped_ns is not None or self.handed_over
 
     @property
     def handed_over(self) -> bool:
@@ -261,6 +270,14 @@ class ActuatorGuard:
             since_s = (plant_ns - self._steering_ns) / 1e9
         return self.refuge.command(since_s, self._applied_last, state)
 
+    def end(self, now_ns: int) -> CommandEnd:
+        """Why the controller's commands are not applied at this time of the steady clock [ns]."""
+        if self._ended_by_decision(now_ns) is not None:
+            return CommandEnd.STOPPED
+        if self._taken_ns is None:
+            return CommandEnd.WAITING
+        return CommandEnd.NONE if self._ended_ns(now_ns) is None else CommandEnd.SILENT
+
     def _ended_by_decision(self, now_ns: int) -> int | None:
         """Since when the plant's end, the e-stop, a second publisher or the controller has ended the command [ns]."""
         ends = [self._handed_over_ns, self._stopped(now_ns), self._asked_ns]
@@ -279,8 +296,9 @@ class ActuatorGuard:
 
     def _stopped(self, now_ns: int) -> int | None:
         """Since when the e-stop, a second publisher or the device's refusal holds the robot; None if none does."""
-        contested = not self.person and self.publishers.reason(now_ns)
-        if not self.estop.reason(now_ns) and not contested and not self.held:
+        seen_ns = now_ns if self._wall_ns is None else self._wall_ns()
+        contested = not self.person and self.publishers.reason(seen_ns)
+        if not self.estop.reason(seen_ns) and not contested and not self.held:
             if self._stopped_ns is not None and not self._steers:
                 self.command = self._slowed(
                     self._stopped_ns, now_ns

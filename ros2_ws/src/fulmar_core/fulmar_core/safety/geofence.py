@@ -48,14 +48,22 @@ def check_area_of(robot: Robot, area: Sequence[float]) -> None:
         )
 
 
-def outside(place: Sequence[float], area: Sequence[float]) -> str:
-    """Message that a place (x, y or x, y, z) lies outside an area; empty if it does not [m]."""
+def outside(place: Sequence[float], area: Sequence[float], *, guarded: bool = False) -> str:
+    """Message that a place lies outside an area; empty if it does not.
+
+    Args:
+        place: x, y or x, y, z [m].
+        area: Sides in the form of `check_area`.
+        guarded: Whether a guard brings the robot back.
+    """
     if is_inside(place, area):
         return ""
-    return (
-        f"the robot was at {_words(place, '.2f')}, outside its area of {_sides(area)}. "
-        "Bring it back by hand, then give a goal."
+    then = (
+        "The guard brings it back; then give a goal."
+        if guarded
+        else "Bring it back by hand, then give a goal."
     )
+    return f"the robot was at {_words(place, '.2f')}, outside its area of {_sides(area)}. {then}"
 
 
 def is_inside(place: Sequence[float], area: Sequence[float]) -> bool:

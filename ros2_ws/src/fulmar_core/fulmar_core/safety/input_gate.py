@@ -7,10 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fulmar_core.robots.robot import Limits
+from fulmar_core.robots.robot import Limits, Robot
 from fulmar_core.robots.sensors.odometer import OdometrySpec
 from fulmar_core.robots.sensors.repetition import FROZEN_AFTER, RepetitionCheck
 from fulmar_core.safety.motion_agreement import MotionAgreement
+from fulmar_core.states.spatial import SpatialState
 from fulmar_core.states.state import RigidBodyState
 from fulmar_core.wires.reading import BACK_NS, FORWARD_NS
 
@@ -179,3 +180,13 @@ class InputGate:
     def _is_frozen(self, measurement: Measurement) -> bool:
         pose = np.concatenate((measurement.state.position_in_world, measurement.state.quat_xyzw))
         return self._repetition.see(pose, measurement.stamp_ns)
+
+
+def helper_gate(robot: Robot) -> InputGate:
+    """The gate of a node that gives goals by odometry; controllers check for stuck sensors."""
+    return InputGate(
+        robot.limits,
+        frozen_after=0,
+        turns_freely=robot.state_type is SpatialState,
+        turns_only=robot.actuators.turns_only,
+    )

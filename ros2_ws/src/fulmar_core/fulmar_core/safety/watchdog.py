@@ -3,15 +3,9 @@
 from __future__ import annotations
 
 from fulmar_core.config.errors import SafetyError
+from fulmar_core.wires.silence import LONGEST_S
 
-SHORTEST_S = 0.2
-LONGEST_S = 0.5
 NO_COMMAND = "no command for"  # how the report of a trip begins
-
-
-def default_timeout(control_dt: float) -> float:
-    """Silence that makes actuators safe: two command periods, at least 0.2 s and at most 0.5 s [s]."""
-    return min(max(SHORTEST_S, 2.0 * control_dt), LONGEST_S)
 
 
 def checked_timeout(seconds: float) -> float:
@@ -41,6 +35,7 @@ class Watchdog:
         self.timeout_ns = timeout_ns
         self.trips = 0
         self._last_ns: int | None = None
+        self._held_ns: int | None = None
         self._tripped = False
 
     def reset(self) -> None:
@@ -53,6 +48,16 @@ class Watchdog:
         self._last_ns = now_ns
         self._tripped = False
 
+    def hold(self, now_ns: int) -> None:
+        """Time of a simulation stands still from now on, and no command is due until `go_on` [ns]."""
+        self._held_ns = now_ns
+
+    def go_on(self, now_ns: int) -> None:
+        """Time goes on; the silence has lasted as long as when it was held [ns]."""
+        if self._last_ns is not None and self._held_ns is not None:
+            self._last_ns = min(self._last_ns + now_ns - self._held_ns, now_ns)
+        self._held_ns = None
+
     def expired(self, now_ns: int) -> bool:
         """Whether actuators must be in their safe state at this time [ns].
 
@@ -60,7 +65,7 @@ class Watchdog:
         """
         if self._last_ns is None:
             return True
-        late = now_ns - self._last_ns > self.timeout_ns
+        late = self.silent_ns(now_ns) > self.timeout_ns
         if late and not self._tripped:
             self._tripped = True
             self.trips += 1
@@ -73,4 +78,7 @@ class Watchdog:
 
     def silent_ns(self, now_ns: int) -> int:
         """Time since the last command, 0 before the first [ns]."""
-        return 0 if self._last_ns is None else now_ns - self._last_ns
+        if self._last_ns is None:
+            return 0
+        until_ns = now_ns if self._held_ns is None else max(self._held_ns, self._last_ns)
+        return until_ns - self._last_ns

@@ -5,8 +5,9 @@ Episode i of a seed is the same in the core's batch, in MuJoCo and through ROS, 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Generic
+from typing import Any, Generic
 
 import numpy as np
 
@@ -19,6 +20,9 @@ from fulmar_core.tasks import Task
 from fulmar_core.tasks.goal import Goal
 from fulmar_core.worlds.scenario import Scenario
 from fulmar_core.worlds.world import World
+
+# Numbers of episodes, shape (n,), their starts, goals and worlds: the same, changed. Starts are as the task draws them.
+Alter = Callable[[np.ndarray, Any, Goal, Any], tuple[Any, Goal, Any]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +66,7 @@ def draw_episodes(
     numbers: np.ndarray,
     repeats: np.ndarray | None = None,
     training: bool = False,
+    alter: Alter | None = None,
 ) -> Episode:
     """Draw episodes.
 
@@ -73,6 +78,7 @@ def draw_episodes(
         numbers: Numbers of the episodes, or of the worlds they run in, shape (n,), >= 0.
         repeats: How many episodes each of these worlds has had before, shape (n,); none by default.
         training: Start where learning starts instead of where evaluation does.
+        alter: Changes what was drawn, before actuators begin; the scenario's largest values still bound it.
 
     Returns:
         As many episodes.
@@ -89,6 +95,8 @@ def draw_episodes(
     repeats = np.zeros_like(numbers) if repeats is None else repeats
     start, goal = task.draw(Draws(seed, numbers, repeats, START), robot, training=training)
     world = dynamics_of(robot).draw_world(scenario, Draws(seed, numbers, repeats, WORLD))
+    if alter is not None:
+        start, goal, world = alter(numbers, start, goal, world)
     start, command = begin_of(robot).in_world(robot, start, world)
     return Episode(start, goal, world, command)
 

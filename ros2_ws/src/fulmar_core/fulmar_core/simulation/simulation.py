@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, Generic
 
 import numpy as np
@@ -14,7 +15,8 @@ from fulmar_core.dynamics.by_kind import actuation_of, dynamics_of
 from fulmar_core.dynamics.motion import may_be_off_centre, may_open_late, tank_empties
 from fulmar_core.dynamics.things import Poses
 from fulmar_core.robots.robot import Robot
-from fulmar_core.simulation.episode import draw_episodes
+from fulmar_core.simulation.batch_link import BatchLink, longest_way
+from fulmar_core.simulation.episode import Alter, draw_episodes
 from fulmar_core.simulation.episode_prefetch import Beginning, UpcomingEpisodes
 from fulmar_core.states.arrays import array_namespace
 from fulmar_core.states.counter_rng import Keys, keys_at, uniform_from, words, world_keys, write_keys
@@ -64,6 +66,7 @@ class BatchSimulation(MutableState, Generic[S]):
         xp: Any = np,
         device: Any = None,
         dtype: Any = None,
+        alter: Alter | None = None,
     ) -> None:
         """Build the worlds and reset them all.
 
@@ -79,10 +82,11 @@ class BatchSimulation(MutableState, Generic[S]):
             xp: Array library: NumPy, or torch.
             device: Where its arrays live, for torch.
             dtype: Floating type; the library's float32 by default.
+            alter: Changes the episodes, as in `draw_episodes`.
         """
         self.robot, self.task, self.scenario, self.seed = robot, task.fitted(robot), scenario, seed
         self.worlds, self.training = worlds, training
-        self._first = first
+        self._first, self._alter = first, alter
         self.substeps = robot.timing.substeps(control_hz or robot.timing.control_hz)
         self.observer = Observer(robot, self.task)
         self._xp = array_namespace(xp.empty(0))  # the library itself may lack parts of the array standard
@@ -92,7 +96,7 @@ class BatchSimulation(MutableState, Generic[S]):
         self._steps = self._whole(np.zeros(worlds))
         self._noise_keys = self._actuator_keys(self._numbers, self._repeats)
         self._dynamics: Dynamics[Any, S] = dynamics_of(robot, scenario)
-        self._latest_s = longest_delay(robot, scenario)
+        self._latest_s = longest_delay(robot, scenario) + longest_way(scenario.link)
         self._off_centre = may_be_off_centre(robot, scenario)
         self._noisy = scenario.actuation.noise > 0.0
         self._odometer = self._dynamics.odometer(
@@ -115,6 +119,9 @@ class BatchSimulation(MutableState, Generic[S]):
             changes=scenario.actuation.changes,
             world=self.world if tank_empties(robot, scenario) else None,
         )
+        self._link: BatchLink | None = None
+        if scenario.link.acts:
+            self._link = BatchLink(scenario.link, robot, self.command, seed=seed, control_dt=self.control_dt)
         self._measure()
 
     @property
@@ -147,6 +154,8 @@ class BatchSimulation(MutableState, Generic[S]):
         self.command = self._xp.asarray(self.command, copy=True)
         self.command[index] = coming.command[index]
         self._actuation.reset(index, self._applied_at_start(self.command)[:, index])
+        if self._link is not None:
+            self._link.reset(index, self.command)
         self.measured = self._odometer.restart(self.truth, index, coming.reading)
 
     def put(self, state: S, goal: Goal, command: Array) -> None:
@@ -203,7 +212,11 @@ class BatchSimulation(MutableState, Generic[S]):
         if self._noisy:
             bits = words(self._noise_keys, self._steps, self.command.shape[1])
             noise = 2.0 * uniform_from(bits, self._dtype) - 1.0
-        self._actuation.begin(self.command.T, self.world, noise)
+        received, world = command, self.world
+        if self._link is not None:
+            received, late = self._link.carry(command, self._numbers, self._repeats, self._steps)
+            world = replace(world, action_delay=world.action_delay + late)
+        self._actuation.begin(received.T, world, noise)
         time_s = xp.astype(self._steps, self._dtype) * self.control_dt
         before = self.truth
         self.truth = self._dynamics.move(
@@ -222,6 +235,8 @@ class BatchSimulation(MutableState, Generic[S]):
     def mutable_state(self) -> dict[str, Any]:
         """As `MutableState.mutable_state`, with that of actuators and odometer as dictionaries of their own."""
         parts = {"_actuation": self._actuation.mutable_state(), "_odometer": self._odometer.mutable_state()}
+        if self._link is not None:
+            parts["_link"] = self._link.mutable_state()
         return super().mutable_state() | parts
 
     def take(self, state: dict[str, Any]) -> None:
@@ -229,6 +244,8 @@ class BatchSimulation(MutableState, Generic[S]):
         super().take(state)
         self._actuation.take(state["_actuation"])
         self._odometer.take(state["_odometer"])
+        if self._link is not None:
+            self._link.take(state["_link"])
 
     def snapshot(self) -> dict[str, Any]:
         """Everything that moves, as a copy of its own that pickles."""
@@ -262,6 +279,7 @@ class BatchSimulation(MutableState, Generic[S]):
             numbers=self._first + worlds,
             repeats=repeats,
             training=self.training,
+            alter=self._alter,
         )
         return (
             drawn.start.mapped(self._real),

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from fulmar_core.config.errors import ConfigError, shortened
 
+FLEET = "fleet"  # namespace of the nodes that the robots of a fleet share, and so the name of no such robot
 LONGEST = 64  # of a name [characters]; topics below it have 255 in all
 _NAME = re.compile(rf"[a-z][a-z0-9_]{{0,{LONGEST - 1}}}")
 

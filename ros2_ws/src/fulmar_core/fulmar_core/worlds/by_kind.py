@@ -52,6 +52,7 @@ _OWN: dict[str, Callable[[Scenario], bool]] = {
     "valves": lambda its: its.actuation.opening_delay_s[1] > 0.0,
     "tank": lambda its: its.actuation.supply.tank < 1.0,
     "stuck": lambda its: bool(its.actuation.stuck.actuators),
+    "link": lambda its: its.link.acts,
 }
 
 
@@ -64,7 +65,7 @@ def without_effect(robot: Robot, scenario: Scenario, *, estimated: bool = False)
         estimated: Whether an estimator reads its gyroscope.
     """
     acts = {
-        *ACTING.get(robot.kind.name, ACTING["free_flyer"]), "body", "actuation",
+        *ACTING.get(robot.kind.name, ACTING["free_flyer"]), "body", "actuation", "link",
         *(("gyroscope",) if estimated else ()),
         *(() if robot.kind.always_estimated else ("odometry",)),
         *(("bearing",) if robot.air_bearing else ()),

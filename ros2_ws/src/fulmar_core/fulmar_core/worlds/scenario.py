@@ -21,6 +21,7 @@ from fulmar_core.states.counter_rng import Draws
 from fulmar_core.states.gravity import GRAVITY
 from fulmar_core.states.rotation import Array
 from fulmar_core.worlds.holdability import uncontrollable_losses
+from fulmar_core.worlds.link import Link
 from fulmar_core.worlds.parts import (
     Actuation,
     Air,
@@ -64,6 +65,7 @@ class Scenario:
     inertia: InertiaChange = InertiaChange()
     actuation: Actuation = Actuation()
     sensing: Sensing = Sensing()
+    link: Link = Link()  # between plant and controller, where they are nodes
     # Of robots with an air bearing, in simulated plants and emulated devices; batches know neither.
     bearing_late_s: Range = (0.0, 0.0)  # it carries the robot so long after it opens, drawn from the seed [s]
     held_s: Range = (0.0, 0.0)  # from when to when, on air, a hand holds the robot where it is [s]
@@ -130,6 +132,23 @@ def check_delays(robot: Robot, scenario: Scenario) -> None:
             f"scenario '{scenario.title}': valves would open up to {late_s:g} s late ('delay_s' and 'opening_delay_s' "
             f"of 'actuation', with the robot's own); at most one control step, {robot.timing.control_s:g} s of "
             f"'{robot.name}', where 'opening_delay_s' is not 0."
+        )
+
+
+def check_no_link(scenario: Scenario, where: str) -> None:
+    """Reject a scenario with a link where one is not simulated.
+
+    Args:
+        scenario: The scenario.
+        where: What runs it, such as `--through mujoco`.
+
+    Raises:
+        ConfigError: It has one.
+    """
+    if scenario.link.acts:
+        raise ConfigError(
+            f"scenario '{scenario.title}' has a 'link', which {where} does not simulate. Use fulmar run, fulmar up, "
+            "or fulmar evaluate --through ros or batch."
         )
 
 

@@ -88,6 +88,19 @@ def stopped(live: LiveSystem, since_s: float, limit_s: float) -> Outcome:
     return Outcome(status.who if status else "", words, passed, time_s, limit_s)
 
 
+def braked(live: LiveSystem, since_s: float, limit_s: float) -> Outcome:
+    """Whether the controller of a robot that floats said in time why it acts no more: its backup brakes from then on.
+
+    Arguments as in `stopped`. Valves that brake move, so the applied commands do not show whether the robot is safe.
+    """
+    observer = live.observer
+    wait_for(lambda: observer.problem_since(since_s) is not None, limit_s + WORDS_S)
+    status = observer.problem_since(since_s)
+    time_s = None if status is None else status.received_s - since_s
+    passed = time_s is not None and time_s <= limit_s
+    return Outcome(status.who if status else "", status.text if status else "", passed, time_s, limit_s)
+
+
 def went_on(
     live: LiveSystem,
     since_s: float,

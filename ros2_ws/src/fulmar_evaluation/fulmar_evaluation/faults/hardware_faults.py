@@ -86,6 +86,8 @@ def _without_watchdog(robot: Robot) -> str:
     files = hardware_of(robot.name)
     if not files:
         return f"there is no driver for '{robot.name}'"
+    if load_hardware(files[0]).arms:
+        return "its driver arms an autopilot, which only a person does"
     if type(load_hardware(files[0]).driver) not in OWN_TIMEOUT_S:
         return "its device has no watchdog of its own: only hardware can close the valves then"
     return ""

@@ -16,11 +16,13 @@ from fulmar_bags.message_reader import stamp_ns
 from fulmar_core.config.errors import RunFailed
 from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.topics import GOAL_POSE, GOAL_WIRES, SIMULATION_START_NS
+from fulmar_core.safety.envelope.braking import floats
 from fulmar_core.safety.geofence import is_inside
 from fulmar_core.states.rotation import rotate, rotate_inverse
+from fulmar_core.tasks import load_task
 from fulmar_core.tasks.goal import goal_at
 from fulmar_evaluation.faults.by_kind import FAULTS, TOO_MUCH
-from fulmar_evaluation.faults.fault import STAYS_S, WORDS_S, Fault, Outcome, stopped, went_on
+from fulmar_evaluation.faults.fault import STAYS_S, WORDS_S, Fault, Outcome, braked, stopped, went_on
 from fulmar_evaluation.faults.fault_environment import (
     RELAYED,
     ROOM_M,
@@ -96,7 +98,8 @@ def _carried_off(live: LiveSystem, is_beyond: Callable[[list[float]], bool]) -> 
     live.injector.change = changing(change)
     if not wait_for(lambda: bool(beyond_s), CARRIED_S):
         raise RunFailed(f"the robot was not carried beyond its limit within {CARRIED_S:g} s")
-    return stopped(live, beyond_s[0], live.tick_s + live.corrected_s)
+    outcome = braked if floats(live.robot) else stopped
+    return outcome(live, beyond_s[0], live.tick_s + live.corrected_s)
 
 
 def _with_drift(robot: Robot, velocity: np.ndarray, axis: int) -> np.ndarray:
@@ -147,7 +150,8 @@ def goal_outside_the_area(live: LiveSystem) -> Outcome:
 
 def _offer_goal(live: LiveSystem, numbers: list[float], change: Callable[[Any], None], words: str) -> Outcome:
     """Another node publishes a goal: it is rejected with the reason, and the robot goes on to the one before."""
-    wire, form = GOAL_WIRES[task_of(live.robot).goal_topic], live.robot.state_type
+    task = load_task(live.plan.task, live.plan.thing)
+    wire, form = GOAL_WIRES[task.goal_topic], live.robot.state_type
     goal = goal_at(form.target_at(numbers).tolist())
     message = goal_message(goal, wire.name, SIMULATION_START_NS + 1, live.plan.frames, form=form)
     change(message)

@@ -7,7 +7,7 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -32,8 +32,8 @@ from fulmar_core.robots.topics import (
     command_wire,
 )
 from fulmar_core.safety.estop import TIMEOUT_NS
-from fulmar_core.safety.watchdog import default_timeout
 from fulmar_core.tasks import load_task
+from fulmar_core.wires.silence import default_timeout
 from fulmar_evaluation.faults.fault_environment import (
     FROM_PLANT,
     USUAL,
@@ -82,8 +82,9 @@ class LiveSystem:
         hosts: TwoHosts | None = None,
         launcher: str = RUN,
         clock: SteppedClock | None = None,
+        names: Collection[str] = (),
     ) -> None:
-        """Hold the parts together."""
+        """Hold the parts together; `names` as in `RunObserver`."""
         self.plan, self.record, self.launched, self.launcher = plan, Path(plan.record), launched, launcher
         self.bystander, self._hosts, self._clock = bystander, hosts, clock
         self.others = ProcessGroup()
@@ -93,7 +94,7 @@ class LiveSystem:
         self.flight = flight = FlightWatch(bystander, self.plan.frames) if not robot.kind.rests else None
         applied = DEVICE_STATE if about.emulated else ACTUATORS_STATE
         downs = {} if flight is None else {"is_down": flight.is_down}
-        self.observer = RunObserver(bystander, robot, applied, **downs)
+        self.observer = RunObserver(bystander, robot, applied, **downs, names=names)
         wire = command_wire(robot)
         self._answers = FaultInjector(bystander, wire) if about.answers_pass else None
         self._injector = (
@@ -282,7 +283,7 @@ def live_system(
         RunFailed: Its observer failed.
     """
     length_s = MOST_S if launcher == RUN else 0.0
-    plan = replace(plan, intercepted=_intercepted(plan, about), duration_s=length_s)
+    plan = replace(plan, intercepted=interceptions(plan, about), duration_s=length_s)
     if hosts is not None:
         plan = replace(plan, controller_network=hosts.other, copies=MOST_COPIES)
     errors: list[Exception] = []
@@ -310,7 +311,7 @@ def live_system(
         raise RunFailed(f"the bystander failed: {errors[0]!r}") from errors[0]
 
 
-def _intercepted(plan: RunPlan, about: FaultEnvironment) -> tuple[tuple[str, str, str], ...]:
+def interceptions(plan: RunPlan, about: FaultEnvironment) -> tuple[tuple[str, str, str], ...]:
     """Outputs of nodes that the injectors pass on, as in `RunPlan.intercepted`."""
     commands = command_wire(load_robot(plan.robot))
     wires = [about.intercepted] if about.intercepted is not None else []

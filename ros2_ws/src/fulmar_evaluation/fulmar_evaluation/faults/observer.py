@@ -6,7 +6,7 @@ import math
 import re
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,7 +18,7 @@ from sensor_msgs.msg import JointState
 from fulmar_bags.contents import open_bag
 from fulmar_bags.decode import stamps_ns
 from fulmar_bags.message_reader import stamp_ns
-from fulmar_core.config.errors import BagError
+from fulmar_core.config.errors import FulmarError
 from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.topics import ACTUATORS_STATE, DIAGNOSTICS, STATUS, Wire, command_wire
 from fulmar_ros.qos import subscriber_qos
@@ -52,6 +52,7 @@ class RunObserver:
         robot: Robot,
         wire: Wire = ACTUATORS_STATE,
         is_down: Callable[[], bool] = lambda: False,
+        names: Collection[str] = (),
     ) -> None:
         """Subscribe to the applied command, and to the health of every node.
 
@@ -60,8 +61,9 @@ class RunObserver:
             robot: Which.
             wire: Has the applied command.
             is_down: Whether an aircraft has come down: from then on nothing moves it.
+            names: Names in the health that count, of a fleet that of the robot and of the fleet itself; empty: all.
         """
-        self.wire, self._is_down = wire, is_down
+        self.wire, self._is_down, self._names = wire, is_down, tuple(names)
         self._safe = robot.actuators.safe_command
         self._lock = threading.Lock()
         # Received [s], stamp [ns], command; None of what has come down.
@@ -103,7 +105,9 @@ class RunObserver:
         with self._lock:
             for status in message.status:
                 values = {pair.key: pair.value for pair in status.values}
-                who = status.name.partition(": ")[2]
+                name, _, who = status.name.partition(": ")
+                if self._names and name not in self._names:
+                    continue
                 self._statuses.append(
                     HealthStatus(now_s, who, levels.get(status.level, "error"), status.message, values)
                 )
@@ -169,7 +173,12 @@ class BagEvidence:
 
 
 def bag_evidence(
-    record: Path, observer: RunObserver, away: tuple[float, float] | None, *, again: bool = False
+    record: Path,
+    observer: RunObserver,
+    away: tuple[float, float] | None,
+    *,
+    again: bool = False,
+    robot: str = "",
 ) -> BagEvidence:
     """Compare a bag with what an observer received.
 
@@ -178,6 +187,7 @@ def bag_evidence(
         observer: Received what actuators did.
         away: From when to when a fault kept the recorder from its work; for ever, where it ended it [s].
         again: Whether that recorder died, and another one goes on in its bag.
+        robot: Name of the robot in the bag of a fleet; empty: the bag is of one robot.
     """
     received_s, received_ns = observer.received()
     from_s, to_s = away or (math.inf, math.inf)
@@ -186,8 +196,8 @@ def bag_evidence(
         received_s, received_ns = received_s[received_s < from_s], received_ns[received_s < from_s]
     from_s, to_s = from_s - (TORN_S if dead or again else IN_FLIGHT_S), to_s + IN_FLIGHT_S
     try:
-        bag = open_bag(record)
-    except BagError as error:
+        bag = open_bag(record).of_robot(robot) if robot else open_bag(record)
+    except FulmarError as error:
         return BagEvidence(len(received_ns), False, str(error))
     found = stamps_ns(bag.of(observer.wire))
     if found is None or not len(found):

@@ -139,7 +139,7 @@ def run_faults(
     launcher: str | None = None,
     times: int = 1,
 ) -> list[FaultResult]:
-    """Do each of them to a system of its own, one after another, in a ROS domain that nobody else uses.
+    """Do each of them to a system of its own, one after another, in a ROS domain of their own.
 
     Args:
         robot: Its name.
@@ -179,7 +179,8 @@ def _result_of(robot: str, fault: Fault, launcher: str) -> FaultResult:
     return FaultResult(fault.name, "", problem, None, None, None, None, passed=False, launcher=launcher)
 
 
-def _result(fault: Fault, live: LiveSystem, outcome: Outcome, evidence: BagEvidence) -> FaultResult:
+def result_of(fault: Fault, live: LiveSystem, outcome: Outcome, evidence: BagEvidence) -> FaultResult:
+    """One line of the report, of a fault that was done."""
     said = outcome.reaction, evidence.words and f"bag: {evidence.words}"
     left = live.left_over and f"left over: {', '.join(live.left_over)}"
     words = "; ".join(text for text in (*said, left) if text)
@@ -222,4 +223,4 @@ def _do(robot: str, fault: Fault, launcher: str, folder: Path, hosts: TwoHosts |
             wait_for(lambda: live.has_ended, ENDS_S)
     away, again = outcome.recorder_away, outcome.recorder_again
     evidence = bag_evidence(Path(plan.record), live.observer, away, again=again)
-    return _result(fault, live, outcome, evidence)
+    return result_of(fault, live, outcome, evidence)

@@ -11,6 +11,7 @@ and Pereyra, "Separable nonlinear least squares", 2003).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -47,11 +48,22 @@ class Fit:
         estimates: By name, in the order of the model's unknowns.
         noise: Standard deviations of what is left, one for each of the model's channels [m or rad].
         windows: How many there were.
+        measurements: Poses in all of them.
     """
 
     estimates: dict[str, Estimate]
     noise: tuple[float, ...]
     windows: int
+    measurements: int
+
+    def noise_interval(self, channel: int) -> tuple[float, float]:
+        """95 % interval of the noise of a channel, of white noise [m or rad].
+
+        The median of absolute deviations, from which `noise` follows, has 0.37 of the efficiency of the standard
+        deviation: Var = sigma² / (2 · 0.37 n) (Rousseeuw and Croux, 1993).
+        """
+        half = 1.96 / math.sqrt(2.0 * 0.37 * self.measurements)
+        return self.noise[channel] * max(0.0, 1.0 - half), self.noise[channel] * (1.0 + half)
 
 
 def fit(
@@ -93,7 +105,7 @@ def fit(
     estimates = {
         u.name: Estimate(u.name, values[i], lows[i], highs[i], u.unit) for i, u in enumerate(model.unknowns)
     }
-    return Fit(estimates, tuple(map(float, sigma)), len(search.windows))
+    return Fit(estimates, tuple(map(float, sigma)), len(search.windows), int(search.windows.valid.sum()))
 
 
 class _Search:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 
@@ -38,6 +38,7 @@ class Identified:
     trusted: bool  # whether that was measured; False: it is the robot's YAML
     channels: tuple[str, ...]  # names of `fit.noise`
     undetermined: tuple[str, ...] = ()  # quantities whose intervals are wider than their values
+    nominal: Mapping[str, float] = field(default_factory=dict)  # what the robot's YAML has for each quantity
 
 
 def identify(
@@ -84,7 +85,8 @@ def identify(
         for unknown in model.unknowns
         if not _is_determined(unknown, found.estimates[unknown.name])
     )
-    return Identified(found, scale, trusted, model.channels, undetermined)
+    nominal = {unknown.name: unknown.start for unknown in model.unknowns}
+    return Identified(found, scale, trusted, model.channels, undetermined, nominal)
 
 
 def _is_determined(unknown: Unknown, found: Estimate) -> bool:
@@ -98,7 +100,7 @@ def calibration_of(robot: Robot, identified: Identified, runs: Sequence[str] = (
     Raises:
         ConfigError: Nothing is determined.
     """
-    allowed = {field.name for field in fields(Calibration)} - set(identified.undetermined)
+    allowed = {each.name for each in fields(Calibration)} - set(identified.undetermined)
     measured = {
         name: Measured(found.value, found.low, found.high)
         for name, found in identified.fit.estimates.items()

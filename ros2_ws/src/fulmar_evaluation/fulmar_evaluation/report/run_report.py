@@ -80,6 +80,7 @@ def _parts(runs: Sequence[View]) -> list[Part]:
         *(_unread(run) for run in runs if run.record.warnings),
         *(_warnings(run) for run in runs if run.summary["warnings"]),
         *(_beliefs(run) for run in runs if run.summary["beliefs"]),
+        *(_guarded(run) for run in runs if run.summary["guard"]),
         "<h2>In figures</h2>",
         _table(runs),
         *([frame_plot(seen)] if seen else []),
@@ -126,6 +127,20 @@ def _unread(run: View) -> str:
 
 def _beliefs(run: View) -> str:
     return f"<p>{_name(run)}: at the end of the run, {escape(run.summary['beliefs'])}.</p>"
+
+
+def _guarded(run: View) -> str:
+    """Trips of the envelope guard: when, why, how long, and how much room was left."""
+    guard = run.summary["guard"]
+    if not guard["trips"]:
+        return f"<p>{_name(run)}: the envelope guard left its controller alone.</p>"
+    lines = "".join(
+        f"<li>after {trip['t_s']:.1f} s, for {trip['held_s']:.1f} s: {escape(trip['cause'])}</li>"
+        for trip in guard["trips"]
+    )
+    count, share = len(guard["trips"]), guard["backup_share"]
+    often = f"{count} time{'s' if count > 1 else ''}, {share:.1%} of the time"
+    return f"<p>{_name(run)}: the envelope guard took over {often}</p><ul>{lines}</ul>"
 
 
 def _table(runs: Sequence[View]) -> str:

@@ -16,6 +16,7 @@ from fulmar_core.config.paths import OWN_FOLDERS, config_names
 from fulmar_core.config.process import environment
 from fulmar_core.controllers.classical import entry_of
 from fulmar_core.robots.calibration import VARIABLE
+from fulmar_core.robots.look_files import without_mesh_files
 from fulmar_core.robots.robot_file import load_robot
 from policy_server.controllers import FALLBACKS
 
@@ -37,7 +38,7 @@ def knowing_what_it_carries(*bags: Bag) -> Iterator[None]:
             if carried is not None:
                 path = Path(scratch) / family / f"{name}.yaml"
                 path.parent.mkdir(exist_ok=True)
-                path.write_bytes(carried)
+                path.write_bytes(without_mesh_files(carried) if family == "robots" else carried)
         folders = [os.environ.get(OWN_FOLDERS, ""), *([scratch] if os.listdir(scratch) else [])]
         with environment({OWN_FOLDERS: os.pathsep.join(filter(None, folders))}):
             for bag, family, name in missing:

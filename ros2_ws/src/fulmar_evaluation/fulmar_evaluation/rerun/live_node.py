@@ -104,7 +104,7 @@ def rerun_through_node(
     if len(bag.of(GOAL_POSES)):
         raise BagError(f"{bag.path}: has goals on {GOAL_POSES.name}. Use --through direct.")
     if record.changes:
-        raise BagError(f"{bag.path}: its policy was changed on the way. Use --through direct.")
+        raise BagError(f"{bag.path}: its controller was changed on the way. Use --through direct.")
     settings = record.settings
     plan = RunPlan(
         robot=record.robot.name,
@@ -117,7 +117,10 @@ def rerun_through_node(
         lockstep=True,
         goals="streamed" if settings.goals_streamed else "",
         guards=Guards(
-            fallback=settings.fallback or None, max_run_time_s=settings.max_run_time_s, area=settings.area
+            fallback=settings.fallback or None,
+            max_run_time_s=settings.max_run_time_s,
+            area=settings.area,
+            guard=settings.guard,
         ),
     )
     with own_domain() as environment:

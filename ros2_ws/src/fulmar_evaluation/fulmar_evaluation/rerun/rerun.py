@@ -13,8 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fulmar_bags.control_steps import ControlSteps
+from fulmar_bags.controller_changes import ControllerChange
 from fulmar_bags.recorded_estop import RecordedEstop
-from fulmar_bags.wire_reader import ABSENT
+from fulmar_bags.wire_reader import ABSENT, Received
 from fulmar_core.config.errors import BagError, ConfigError, FulmarError, RunFailed, TaskError
 from fulmar_core.controllers.controller import Controller, Inputs
 from fulmar_core.controllers.law import Law
@@ -23,7 +24,10 @@ from fulmar_core.loop.control_loop import unknown_inputs
 from fulmar_core.loop.fallback import ControllerSwitch, Standby, warm_up
 from fulmar_core.loop.guarded_loop import GuardedLoop
 from fulmar_core.loop.newest_readings import NewestReadings
+from fulmar_core.safety.envelope.event import Event
+from fulmar_core.safety.envelope.guard import EnvelopeGuard
 from fulmar_core.safety.input_gate import InputGate, Measurement
+from fulmar_core.safety.keep_apart import OLD_NS
 from fulmar_core.states.rotation import rotate
 from fulmar_core.states.state import RigidBodyState
 from fulmar_core.tasks.observation import Observer
@@ -42,6 +46,7 @@ class Answers:
     commands: np.ndarray  # (n, m) after limits; the safe one where it was not asked
     acted: np.ndarray  # (n,)
     reasons: tuple[str, ...]  # why it was not asked, by step; empty where it was
+    trips: tuple[Event, ...] | None = None  # and returns of the envelope guard; None: not known
 
 
 def rerun(
@@ -50,7 +55,8 @@ def rerun(
     *,
     source: str = "observations",
     fallback: Controller | None = None,
-    load: Callable[[str], Controller] | None = None,
+    load: Callable[[ControllerChange], Controller] | None = None,
+    envelope: EnvelopeGuard | None = None,
 ) -> Answers:
     """Let a controller answer a recorded run, under the guards that the run had.
 
@@ -60,14 +66,16 @@ def rerun(
         source: `observations` shows what was recorded; `odometry` makes observations anew, with the node's gates. Laws
             read the measured state, which is that of the odometry either way.
         fallback: Takes over where the node would have let it; warmed up here.
-        load: Loads the bundle of a folder, to follow the recorded changes of policy; None follows none.
+        load: Loads what took over, to follow the recorded changes of controller; None follows none.
+        envelope: Guards in the place of the run's own such guard; then the controller is asked where it was in the
+            record, whatever the other guards would say now.
 
     Returns:
         Its answers.
 
     Raises:
         BagError: The bag lacks what the source or a guard needs, its observations are another controller's, or a
-            policy that took over is another one by now.
+            controller that took over is another one by now.
         RunFailed: The controller raises and nobody takes over; with the step.
     """
     if source == "observations":
@@ -76,7 +84,7 @@ def rerun(
             raise BagError(f"the bag holds no odometry, which '{controller.name}' reads.")
     elif not len(record.odometry):
         raise BagError("the bag holds no odometry to make observations from. Use --from observations.")
-    return _Rerun(record, controller, source, fallback, load).run()
+    return _Rerun(record, controller, source, fallback, load, envelope).run()
 
 
 def _check_observations(record: ControlSteps, controller: Controller) -> None:
@@ -107,12 +115,14 @@ class _Rerun:
         controller: Controller,
         source: str,
         fallback: Controller | None,
-        load: Callable[[str], Controller] | None,
+        load: Callable[[ControllerChange], Controller] | None,
+        envelope: EnvelopeGuard | None,
     ) -> None:
         self._record, self._source, self._load = record, source, load
         self._robot, self._states = record.robot, _States(record)
         # Which steps were gated is known of lock step alone: in real time it hangs on when messages came.
-        self._gated = source == "odometry" and (record.settings.lockstep or not record.own)
+        own = envelope is None
+        self._gated = own and source == "odometry" and (record.settings.lockstep or not record.own)
         self._estop = RecordedEstop(record.presses, required=self._gated and record.settings.estop)
         self._history = AppliedHistory(record.settings.hold_ns(record.robot))
         self._states_fed = 0  # states of the actuators that the history has taken
@@ -128,6 +138,7 @@ class _Rerun:
             self._estop,
             gate=InputGate(record.robot.limits, frozen_after=0),
             applied=self._history if len(record.applied) else None,
+            envelope=envelope,
         )
         names = [name for each in self._guard.switch.known for name in each.controller.readings]
         self._readings = NewestReadings(record.robot, names, in_step=record.settings.lockstep)
@@ -137,10 +148,15 @@ class _Rerun:
                 "something else. Fly it anew: fulmar run or fulmar evaluate --through mujoco."
             )
         self._to_read = {name: deque(record.readings(kind)) for name, kind in self._readings.kinds.items()}
+        self._apart = deque(record.neighbours())
+        self._others: Received | None = None  # the newest of them that had come
         # Of a robot without a bearing, and in a bag that says nothing of it, there is none to wait for.
         self._guard.take_bearing(not record.bearing or bool(record.bearing[0].value))
         self._guard.activate()
         self._fed = 0
+        self._brakes = (
+            False  # whether the backup of the envelope guard has answered since the controller was asked
+        )
 
     def run(self) -> Answers:
         record, count, guard = self._record, len(self._record), self._guard
@@ -154,7 +170,7 @@ class _Rerun:
         bearing = record.before(record.bearing)
         obstacles = record.before(record.obstacles)
         things = {name: record.before(poses) for name, poses in record.things.items()}
-        changes = record.before(record.changes) if self._load else {}
+        changes = record.changes_by_step() if self._load else {}
         guard.loop.controller.reset()
         for step in range(count):
             for message in obstacles.get(step, ()):
@@ -167,7 +183,7 @@ class _Rerun:
             for message in goals.get(step, ()):
                 guard.take_goal(message.value, message.stamp_ns, message.log_ns)
             for message in changes.get(step, ()):
-                guard.switch.propose(self._successor(*message.value))
+                guard.switch.propose(self._successor(message.value))
             guard.switch_controller()
             reasons[step], inputs = self._inputs(step)
             if inputs is None:
@@ -188,7 +204,8 @@ class _Rerun:
                 guard.loop.previous = recorded[None]
         if not record.own and guard.mission.lacking:  # in a bag of our own, it belongs to the run
             raise self._goalless()
-        return Answers(shown, names, actions, commands, acted, tuple(reasons))
+        trips = () if guard.loop.envelope is None else tuple(guard.loop.envelope.events)
+        return Answers(shown, names, actions, commands, acted, tuple(reasons), trips)
 
     def _inputs(self, step: int) -> tuple[str, Inputs | None]:
         """Why the controller is not asked at a step, and else what it acts on."""
@@ -213,10 +230,20 @@ class _Rerun:
             return decision.reason, inputs
         if self._estop.received and not recorded:
             guard.mission.drop()
+        self._brakes = not recorded and (self._brakes or self._moved(step))
+        if measurement is not None and self._brakes:
+            guard.brake(measurement)
+            return "the guard braked in the record", None
         if not recorded or (self._source == "odometry" and measurement is None):
             guard.loop.rest(stamp)
             return "not asked in the record", None
         return "", self._inputs_as_recorded(step, measurement)
+
+    def _moved(self, step: int) -> bool:
+        """Whether the backup of the envelope guard moved a robot that was not driven; nothing else does."""
+        loop, recorded = self._guard.loop, self._record.commands[step]
+        moved = not np.isnan(recorded).any() and bool((recorded != self._robot.actuators.safe_command).any())
+        return moved and loop.envelope is not None and loop.keep_out is None
 
     def _inputs_as_recorded(self, step: int, measurement: Measurement | None) -> Inputs:
         """What a controller acts on that was asked in the record, whatever its guards would say now."""
@@ -263,7 +290,14 @@ class _Rerun:
             while waiting and (waiting[0].stamp_ns <= stamp_ns if lockstep else waiting[0].log_ns <= log_ns):
                 received = waiting.popleft()
                 self._readings.take(name, received.value, received.stamp_ns)
-        self._guard.readings = self._readings.at(stamp_ns)
+        while self._apart and (
+            self._apart[0].stamp_ns <= stamp_ns if lockstep else self._apart[0].log_ns <= log_ns
+        ):
+            self._others = self._apart.popleft()
+        others = self._others
+        known = others is not None and stamp_ns - others.stamp_ns <= OLD_NS
+        seen = others.value if others is not None and known else {}
+        self._guard.readings = {**self._readings.at(stamp_ns), **seen}
 
     def _goalless(self) -> BagError:
         what, task = self._guard.mission.lacking, self._record.task.name
@@ -279,16 +313,18 @@ class _Rerun:
             raise RunFailed(reason) from error
         return reason
 
-    def _successor(self, folder: str, sha256: str) -> Standby:
-        """The policy that took over in the record."""
+    def _successor(self, change: ControllerChange) -> Standby:
+        """The controller that took over in the record."""
         assert self._load is not None
-        where = f"the run went on with the policy of {folder}"
+        where = f"the run went on with {change.what}"
         try:
-            found = warm_up(self._load(folder), self._robot, self._record.task)
+            found = warm_up(self._load(change), self._robot, self._record.task)
         except FulmarError as error:
             raise BagError(f"{where}, which cannot be loaded: {error}") from error
-        if found.sha256 != sha256:
-            raise BagError(f"{where}, which is another one by now. Ask one policy: --policy DIR.")
+        if found.sha256 != change.sha256:
+            raise BagError(
+                f"{where}, which is another one by now. Ask one controller: --controller or --policy."
+            )
         return found
 
 

@@ -11,6 +11,7 @@ from typing import Any
 from fulmar_bags.comparison import as_json, first_difference
 from fulmar_bags.contents import Bag
 from fulmar_bags.control_steps import ControlSteps, control_steps_of, policy_folder
+from fulmar_bags.envelope_events import envelope_events
 from fulmar_bags.figures import controllers_of
 from fulmar_core.config.errors import ConfigError, UnknownNameError
 from fulmar_core.config.own_class import is_own
@@ -21,6 +22,7 @@ from fulmar_evaluation.rerun.rerun import FROM
 from fulmar_evaluation.rerun.rerun_result import (
     check_answers_file,
     compare_answers,
+    compare_trips,
     pauses,
     sums,
     write_answers,
@@ -108,7 +110,7 @@ def rerun_bag(
         else:
             follow = request.policy is None and name == (bag.info or {}).get("controller")
             if record.changes and not follow:
-                warn(["the run changed its policy on the way; here one policy re-runs all of it"])
+                warn(["the run changed its controller on the way; here one controller re-runs all of it"])
             answers, sha256 = answers_of(record, name, folder, source, follow=follow)
     fields = compare_answers(record, answers, tolerances)
     first = first_difference(fields)
@@ -116,6 +118,7 @@ def rerun_bag(
     if request.out is not None:
         write_answers(record, answers, request.out)
     compared = bool(fields) and record.answered
+    trips = compare_trips(envelope_events(bag), answers)
     return {
         "robot": record.robot.name,
         "task": record.task.name,
@@ -131,7 +134,8 @@ def rerun_bag(
         "not_asked": [vars(each) for each in pauses(answers)],
         "answers": None if request.out is None else str(request.out),
         "compared": compared,
-        "same": compared and first is None,
+        "same": compared and first is None and (trips is None or trips["same"]),
+        "trips": trips,
         "first_difference": None if first is None else as_json([first])[0],
         "fields": as_json(fields),
         "sums": [vars(each) for each in sums(fields)],

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,7 @@ import numpy as np
 from fulmar_bags.comparison import Field, compare
 from fulmar_bags.control_steps import ControlSteps
 from fulmar_core.config.errors import ConfigError
+from fulmar_core.safety.envelope.event import Event
 from fulmar_evaluation.rerun.rerun import Answers
 
 FIELDS = ("decision", "observation", "action", "command")
@@ -51,6 +52,27 @@ def compare_answers(record: ControlSteps, answers: Answers, tolerances: Mapping[
             tolerances[field],
         )
     ]
+
+
+def compare_trips(recorded: Sequence[Event], answers: Answers) -> dict[str, Any] | None:
+    """Compare trips and returns of the envelope guard, to the bit.
+
+    Returns:
+        How many there are in both, and whether they are the same; None where neither had any.
+    """
+    if answers.trips is None or not (recorded or answers.trips):
+        return None
+    return {
+        "recorded": len(recorded),
+        "found": len(answers.trips),
+        "same": tuple(recorded) == _as_recorded(recorded, answers.trips),
+    }
+
+
+def _as_recorded(recorded: Sequence[Event], found: Sequence[Event]) -> tuple[Event, ...]:
+    """Events without their sides where the bag is older than these."""
+    known = any(event.side for event in recorded)
+    return tuple(found) if known else tuple(replace(event, side="") for event in found)
 
 
 def _lost(record: ControlSteps) -> np.ndarray:

@@ -77,6 +77,18 @@ class ActuatorEstimate:
     health: Health  # what it follows from; `push` in there lies in the odometry's frame
 
 
+def sure_of(alive: np.ndarray, state: PlanarState) -> ActuatorEstimate:
+    """What is known where nothing is estimated but which actuators work.
+
+    Args:
+        alive: 1, or 0 for a dead one, shape (n, m).
+        state: As measured, shapes (n,).
+    """
+    still, push = np.column_stack(state.columns()), np.zeros((len(alive), 3))
+    health = Health(alive, alive, still, push, np.zeros(len(alive), dtype=bool))
+    return ActuatorEstimate(state, push, alive, health)
+
+
 class ActuatorEstimator:
     """Bank of filters over lost valves, with trials of those that are believed dead; see `ThrusterHealth`."""
 

@@ -19,11 +19,11 @@ from fulmar_core.estimators.motion.estimator import LACKS_NOTHING, Estimate
 from fulmar_core.estimators.motion.filter import ATTITUDE, IMU, POSE, Filter, Placed
 from fulmar_core.estimators.motion.frozen import EXACT, FrozenSources, Noise
 from fulmar_core.estimators.motion.inertial_prediction import InertialPredictions
+from fulmar_core.estimators.motion.reading_problems import inertial_problem, pose_problem, saturation
 from fulmar_core.estimators.motion.reading_times import ReadingTimes
 from fulmar_core.estimators.motion.settings import MotionSettings
 from fulmar_core.estimators.motion.strangers import CONTRADICT_NS, TO_BEGIN_ANEW_NS, Stranger, Strangers
 from fulmar_core.robots.robot import Limits
-from fulmar_core.states.rotation import size_of
 from fulmar_core.wires.reading import Reading
 
 S = TypeVar("S", bound=MotionSettings)
@@ -31,12 +31,10 @@ S = TypeVar("S", bound=MotionSettings)
 KEPT_NS = 1_000_000_000  # how far back an estimate can be corrected
 READING_LASTS_NS = 60_000_000  # how long after it an inertial reading still stands for what happens
 WHAT = {IMU: "inertial reading", POSE: "pose", ATTITUDE: "attitude"}  # for people
-LATELY_NS = (
-    10_000_000_000  # how long after it began anew an estimator asks more of poses that it does not expect
-)
+LATELY_NS = 10_000_000_000  # how long after it began anew unexpected poses are asked more of
 LATE_STD_S = 0.05  # by how much the latency of poses may differ from that of the settings [s]
 SEPARATION = (
-    100.0  # squared distance of estimate and inertial readings that is none of noise: 10 standard deviations
+    100.0  # squared distance of estimate and inertial readings that no noise makes: 10 standard deviations
 )
 CONTRADICTION = (
     "motion capture and inertial readings contradict each other: neither is trusted until they agree on a motion. "
@@ -67,9 +65,7 @@ class HistoryEstimator(ABC, Generic[S]):
         what: Names of the readings that it takes.
     """
 
-    KNOWN_SPEED_STD: ClassVar[float] = (
-        0.15  # velocity must be known so well before an estimate is published [m/s]
-    )
+    KNOWN_SPEED_STD: ClassVar[float] = 0.15  # of the velocity, before an estimate is published [m/s]
 
     def __init__(
         self,
@@ -153,8 +149,11 @@ class HistoryEstimator(ABC, Generic[S]):
             return f"reading of '{name}' has no stamp"
         kind, value_of = self._kinds[name]
         stamp_ns = reading.stamp_ns - (self._latency_ns if kind == POSE else 0)
-        problem = self._problem_of(kind, reading)
-        saturated = self._saturation(reading) if kind == IMU else ""
+        if kind == IMU:
+            problem = inertial_problem(reading, self._turn_rate, self._limits.yaw_rate)
+        else:
+            problem = pose_problem(WHAT[kind], reading)
+        saturated = saturation(reading, self._gyroscope_range) if kind == IMU else ""
         if problem and not saturated:
             return problem
         if time_problem := self._times.problem(f"the {WHAT[kind]}", stamp_ns):
@@ -197,37 +196,6 @@ class HistoryEstimator(ABC, Generic[S]):
     def _trust(self, event: Event, reading: Reading) -> None:
         self._believed_ns = event.stamp_ns
         self._believed(reading)
-
-    def _problem_of(self, kind: int, reading: Reading) -> str:
-        value = reading.value
-        if kind == IMU:
-            if not value.is_finite:
-                return "inertial reading holds a value that is not finite"
-            if not (value.has_force or value.has_rate):
-                return "inertial reading has neither a specific force nor a turn rate"
-            rate = self._turn_rate(reading) if value.has_rate else 0.0
-            if abs(rate) > 2.0 * self._limits.yaw_rate:
-                return f"turn rate {rate:.1f} rad/s is beyond the possible {self._limits.yaw_rate:g} rad/s"
-            return ""
-        if not np.isfinite(value).all():
-            return f"{WHAT[kind]} holds a value that is not finite"
-        norm = size_of(value[-4:])
-        return (
-            ""
-            if abs(norm - 1.0) <= 0.01
-            else f"quaternion of the {WHAT[kind]} has norm {norm:.3f}, must be 1"
-        )
-
-    def _saturation(self, reading: Reading) -> str:
-        """Why the turn rate of an inertial reading is saturated; empty if it is not, or there is none."""
-        if not reading.value.is_finite or not reading.value.has_rate:
-            return ""
-        largest = max(map(abs, reading.value.angular_velocity.tolist()))
-        if largest < self._gyroscope_range:
-            return ""
-        return (
-            f"the gyroscope reads {largest:.2f} rad/s, the end of its range: the body tumbles too fast for it"
-        )
 
     def warnings(self) -> tuple[str, ...]:
         """Sources that are not trusted; see `Estimator.warnings`."""

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+from fulmar_core.robots.kinds.envelope_axis import MASS, THRUST_LOSS, VELOCITY_NOISE, EnvelopeAxis
 from fulmar_core.robots.kinds.kind import Kind
 from fulmar_core.states.spatial import SpatialState
 
@@ -33,4 +36,19 @@ AIRCRAFT = Kind(
     rests=False,
     obstacle="the water or the ground",
     outdoors=True,
+    room="flight",
+    pose_form="attitude",
+    envelope=(
+        EnvelopeAxis("height", "m", 2.0),
+        EnvelopeAxis("tilt", "deg", 5.0),
+        EnvelopeAxis("turn_rate", "rad/s", 1.0, of="yaw_rate"),
+        EnvelopeAxis("wind", "m/s", 1.5),
+        EnvelopeAxis("turbulence", "m/s", 4.0),
+        replace(MASS, high=1.15),
+        EnvelopeAxis("inertia", "x", 1.5, 1.0),
+        replace(THRUST_LOSS, high=0.2),
+        EnvelopeAxis("delay", "s", 0.03),
+        replace(VELOCITY_NOISE, high=0.1),
+    ),
+    stops="the safe controller flies level and descends; it does not stand still",
 )

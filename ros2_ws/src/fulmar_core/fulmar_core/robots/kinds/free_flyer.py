@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fulmar_core.robots.kinds.envelope_axis import PUSHED
 from fulmar_core.robots.kinds.kind import Kind
 from fulmar_core.robots.kinds.planar import PLANAR
 from fulmar_core.states.spatial import SpatialState
@@ -28,4 +29,7 @@ FREE_FLYER = Kind(
     weighs=False,
     drifts=True,
     calibrated=(*PLANAR.calibrated, "roll_inertia", "pitch_inertia", "center_of_mass_z"),
+    room="space",
+    pose_form="pose3",
+    envelope=PUSHED,
 )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from fulmar_core.robots.kinds.envelope_axis import EnvelopeAxis
 from fulmar_core.states.state import State
 
 FAR_M = 6.0  # robots in the plane are under way for seconds [m]
@@ -48,6 +49,13 @@ class Kind:
     tilt_deg: float = 180.0  # largest of the attitudes that it can hold, which tasks draw and ask for [deg]
     obstacle: str = "an obstacle"  # what it runs into, in words
     outdoors: bool = False  # satellite navigation is in its loop
+    room: str = (
+        "plane"  # where it moves, as pages draw it: plane (water for what swims), space, attitude or flight
+    )
+    pose_form: str = "pose"  # what of a pose is its goal: pose, pose3 or attitude
+    stops: str = ""  # what a stop does beyond its actuators, in words; empty: as it drifts
+    # What a certified set of its controllers spans; see `fulmar certify`.
+    envelope: tuple[EnvelopeAxis, ...] = ()
     # Of a wrench's six, those along and about which its actuators move it.
     axes: tuple[int, ...] = (0, 1, 2, 3, 4, 5)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fulmar_core.robots.kinds.envelope_axis import PUSHED, EnvelopeAxis
 from fulmar_core.robots.kinds.kind import FAR_M, Kind
 from fulmar_core.states.planar import PlanarState
 
@@ -21,4 +22,10 @@ PLANAR = Kind(
     drifts=True,
     calibrated=("mass", "yaw_inertia", "center_of_mass_x", "center_of_mass_y", "delay"),
     axes=(0, 1, 5),
+    envelope=(
+        *PUSHED,
+        EnvelopeAxis("force", "N", 0.1, of="force", water=True),
+        EnvelopeAxis("torque", "N·m", 0.2, of="torque", water=True),
+        EnvelopeAxis("drag", "x", 1.5, 1.0, water=True),
+    ),
 )

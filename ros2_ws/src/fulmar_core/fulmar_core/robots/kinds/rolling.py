@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fulmar_core.robots.kinds.envelope_axis import DELAY, DISTANCE, THRUST_LOSS, VELOCITY_NOISE
 from fulmar_core.robots.kinds.kind import FAR_M, Kind
 from fulmar_core.states.planar import PlanarState
 
@@ -19,4 +20,6 @@ ROLLING = Kind(
     velocity_form=("ahead", "left", "turning"),
     velocity_task="track_velocities",
     axes=(0, 1, 5),
+    envelope=(DISTANCE, THRUST_LOSS, DELAY, VELOCITY_NOISE),
+    stops="the wheels slow down and stop; it stands still",
 )

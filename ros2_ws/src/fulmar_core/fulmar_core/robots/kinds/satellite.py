@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fulmar_core.robots.kinds.envelope_axis import DELAY, INERTIA, THRUST_LOSS, EnvelopeAxis
 from fulmar_core.robots.kinds.kind import Kind
 from fulmar_core.states.spatial import SpatialState
 
@@ -23,4 +24,15 @@ SATELLITE = Kind(
     weighs=False,
     drifts=True,
     axes=(3, 4, 5),
+    envelope=(
+        EnvelopeAxis("angle", "deg", 180.0),
+        EnvelopeAxis("turn_rate", "rad/s", 2.0, of="yaw_rate"),
+        EnvelopeAxis("torque", "N·m", 0.05, of="torque"),
+        INERTIA,
+        THRUST_LOSS,
+        DELAY,
+    ),
+    room="attitude",
+    pose_form="attitude",
+    stops="the wheels' motors go to zero torque; it keeps its turn rate, and the wheels keep their speeds",
 )

@@ -103,15 +103,15 @@ class MovingTarget:
         x = ways / far
         ups = [_across(self.path.up, x[0])]
         for before, after in itertools.pairwise(x):
-            axis, cosine = np.cross(before, after), float(before @ after)
-            carried = cosine * ups[-1] + np.cross(axis, ups[-1]) + axis * (axis @ ups[-1]) / (1.0 + cosine)
+            axis, cosine = _cross(before, after), float(before @ after)
+            carried = cosine * ups[-1] + _cross(axis, ups[-1]) + axis * (axis @ ups[-1]) / (1.0 + cosine)
             ups.append(_across(carried, after))
         z = np.array(ups)
         if self.path.closed:
             left = np.arctan2(np.cross(z[-1], z[0]) @ x[0], z[-1] @ z[0])
             roll = np.linspace(0.0, left, len(z))[:, None]
             z = np.cos(roll) * z + np.sin(roll) * np.cross(x, z)
-        quats = [_quaternion(np.column_stack((a, np.cross(b, a), b))) for a, b in zip(x, z, strict=True)]
+        quats = [_quaternion(axes) for axes in np.stack((x, np.cross(z, x), z), axis=-1)]
         for before, after in itertools.pairwise(quats):
             after *= 1.0 if before @ after >= 0.0 else -1.0
         return np.array(quats)
@@ -133,6 +133,13 @@ class MovingTarget:
         if self.path.closed:
             return np.asarray(points[(index + 1) % last] - points[(index - 1) % last])
         return np.asarray(points[min(index + 1, last)] - points[max(index - 1, 0)])
+
+
+def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Cross product of two vectors, to the last bit that of `np.cross`, which takes far longer for a single pair."""
+    return np.array(
+        (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]), dtype=float
+    )
 
 
 def _across(way: np.ndarray, x: np.ndarray) -> np.ndarray:
