@@ -171,7 +171,7 @@ def test_in_silence_set_points_and_heartbeats_stop_and_its_failsafe_flies_home(b
 
 def test_a_dead_driver_leaves_the_plane_to_its_failsafe(bench, driver):
     taken(bench, driver)
-    driver._driver._over.set()  # no heartbeat any more, and no farewell
+    driver._driver._session.over.set()  # no heartbeat any more, and no farewell
     until(lambda: bench.device.mode == RTL, timeout_s=3.0)
 
 

@@ -18,9 +18,9 @@ from fulmar_core.config.errors import FAILED, FulmarError, TaskError
 from fulmar_core.controllers.controller import Controller, Inputs
 from fulmar_core.estimators.actuator_health.applied import AppliedHistory
 from fulmar_core.estimators.actuator_health.beliefs import DEAD, Beliefs
+from fulmar_core.loop.control_loop import readings_for
 from fulmar_core.loop.controller_settings import ControllerSettings
 from fulmar_core.loop.fallback import Standby
-from fulmar_core.loop.control_loop import readings_for
 from fulmar_core.loop.guarded_loop import GuardedLoop
 from fulmar_core.loop.swap_request import SwapRequest
 from fulmar_core.robots.robot_file import load_robot

@@ -44,7 +44,9 @@ class GasReserve:
         spent: Which of them these are since the last `reset`, shape (n,).
     """
 
-    def __init__(self, robot: Robot, allocation: Allocation, force: float, torque: float, late_s: float) -> None:
+    def __init__(
+        self, robot: Robot, allocation: Allocation, force: float, torque: float, late_s: float
+    ) -> None:
         """Find out what stopping costs.
 
         Args:

@@ -32,7 +32,9 @@ DIRECTIONS = 200  # of forces that are tried for the weakest
 DRIFTS_S = 60.0  # for which the way of a robot with closed valves is looked at
 STEP_S = 0.25  # of that look
 ENTERED = "in the keep-out volume"  # a part of the words of a robot that is
-OUT_OF_GAS = "the gas left is what stopping takes: the guard stops the robot, and no controller pushes any more"
+OUT_OF_GAS = (
+    "the gas left is what stopping takes: the guard stops the robot, and no controller pushes any more"
+)
 HAD_HELD, HAD_ENTERED = (
     "the keep-out guard held the robot",
     "the robot was in a keep-out volume",
