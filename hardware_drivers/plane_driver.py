@@ -54,7 +54,7 @@ class PlaneDriver(DeviceDriver):
         self._feedback = Feedback(f"autopilot at {settings.port}", settings.silent_s)
         self._telemetry = Telemetry()
         self._plane, self._air = PlaneAutopilot(), PlaneAir(robot)
-        self._reports = PlacedReports(self._feedback, robot.limits, turns_freely=True)
+        self._reports = PlacedReports(self._feedback, robot.limits, turns_freely=True, flies=True)
         self._set_points = FlightSetPoints(robot, settings.lead_s)
         self._takeover = Takeover("the autopilot", "GUIDED", proof_s=0.0)
         self._end, self._begun, self._asked_s, self._began_s = (
