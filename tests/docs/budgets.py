@@ -96,10 +96,11 @@ PARTS = [
     (r" \[--parts \S+\] \[--json\]$", ""),
     (r" --platforms \d+", " --platforms 1"),
     (r" --seeds 5", " --seeds 2"),
-    (r" --episodes \d+", " --episodes 4"),
+    (r" --episodes \d{2,}", " --episodes 4"),
     (r"^(fulmar train (?!.*--(?:time-limit|updates)).*)$", r"\1 --updates 1"),
     (r"^(fulmar (?:train|evaluate) (?!.*--episodes).*)$", r"\1 --episodes 4"),
-    (r"^(fulmar run cubesat_wheels (?!.*--duration).*)$", r"\1 --duration 90"),
+    (r"^(fulmar run cubesat_wheels (?!.*--duration).*)$", r"\1 --duration 75"),
+    (r"^(fulmar run cubesat_wheels --scenario gyro_dies --duration) 120", r"\1 75"),  # it dies after 60 s
     (r"^(fulmar run (?!.*--(?:lockstep|duration)).*)$", r"\1 --duration 5"),
     (r"^(fulmar run (?!.*--lockstep).* --duration) 120", r"\1 15"),
     (r"^(fulmar run (?!.*--lockstep).* --duration) 30", r"\1 5"),
