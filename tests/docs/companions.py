@@ -114,6 +114,10 @@ CODES: dict[str, tuple[int, ...]] = {
     "fulmar run sentry --task go_to_position --controller my_control:KeepOff --lockstep --record bag": (1,),
     # The board measures no position.
     "fulmar run floating_platform --backend hardware --hardware relay_board.yaml --goal 0.5,0": (1,),
+    # Gusts carry it further than it may go.
+    "fulmar run airship_v7 --task fly_hold --controller lqi --scenario light_turbulence --lockstep --seed 3": (
+        1,
+    ),
     # The recorded commands are those of another controller.
     "fulmar bag rerun BAG --controller my_control:Steer": (1,),
     "fulmar bag rerun BAG --controller classical --from odometry": (1,),
