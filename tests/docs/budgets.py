@@ -104,6 +104,10 @@ PARTS = [
     (r"^(fulmar (?:train|evaluate) (?!.*--episodes).*)$", r"\1 --episodes 4"),
     (r"^(fulmar run cubesat_wheels (?!.*--duration).*)$", r"\1 --duration 75"),
     (r"^(fulmar run cubesat_wheels --scenario gyro_dies --duration) 120", r"\1 75"),  # it dies after 60 s
+    (  # thousands of steps; they begin in trim
+        r"^(.*fulmar run (?:airship_v7|navion|cessna_182) (?!.*--(?:duration|scenario))(?=.*--lockstep).*)$",
+        r"\1 --duration 15",
+    ),
     (r"^(fulmar run (?!.*--(?:lockstep|duration)).*)$", r"\1 --duration 5"),
     (r"^(fulmar run (?!.*--lockstep).* --duration) 120", r"\1 15"),
     (r"^(fulmar run (?!.*--lockstep).* --duration) 30", r"\1 5"),
