@@ -80,6 +80,9 @@ INSTEAD = {
     "fulmar goals circle --robot turtlebot2 --name alpha": (
         f"{CTRL_C} fulmar goals circle --robot turtlebot2 --name alpha"
     ),
+    "fulmar goals fleet_alpha --robot floating_platform --name alpha": (
+        f"{CTRL_C} fulmar goals fleet_alpha --robot floating_platform --name alpha"
+    ),
     "fulmar goals upright_circle --robot spacecraft_16": (
         f"{CTRL_C} fulmar goals upright_circle --robot spacecraft_16"
     ),
@@ -96,10 +99,15 @@ PARTS = [
     (r" \[--parts \S+\] \[--json\]$", ""),
     (r" --platforms \d+", " --platforms 1"),
     (r" --seeds 5", " --seeds 2"),
-    (r" --episodes \d+", " --episodes 4"),
+    (r" --episodes \d{2,}", " --episodes 4"),
     (r"^(fulmar train (?!.*--(?:time-limit|updates)).*)$", r"\1 --updates 1"),
     (r"^(fulmar (?:train|evaluate) (?!.*--episodes).*)$", r"\1 --episodes 4"),
-    (r"^(fulmar run cubesat_wheels (?!.*--duration).*)$", r"\1 --duration 90"),
+    (r"^(fulmar run cubesat_wheels (?!.*--duration).*)$", r"\1 --duration 75"),
+    (r"^(fulmar run cubesat_wheels --scenario gyro_dies --duration) 120", r"\1 75"),  # it dies after 60 s
+    (  # thousands of steps; they begin in trim
+        r"^(.*fulmar run (?:airship_v7|navion|cessna_182) (?!.*--(?:duration|scenario))(?=.*--lockstep).*)$",
+        r"\1 --duration 15",
+    ),
     (r"^(fulmar run (?!.*--(?:lockstep|duration)).*)$", r"\1 --duration 5"),
     (r"^(fulmar run (?!.*--lockstep).* --duration) 120", r"\1 15"),
     (r"^(fulmar run (?!.*--lockstep).* --duration) 30", r"\1 5"),

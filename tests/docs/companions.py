@@ -114,13 +114,21 @@ CODES: dict[str, tuple[int, ...]] = {
     "fulmar run sentry --task go_to_position --controller my_control:KeepOff --lockstep --record bag": (1,),
     # The board measures no position.
     "fulmar run floating_platform --backend hardware --hardware relay_board.yaml --goal 0.5,0": (1,),
+    # Gusts carry it further than it may go.
+    "fulmar run airship_v7 --task fly_hold --controller lqi --scenario light_turbulence --lockstep --seed 3": (
+        1,
+    ),
     # The recorded commands are those of another controller.
     "fulmar bag rerun BAG --controller my_control:Steer": (1,),
     "fulmar bag rerun BAG --controller classical --from odometry": (1,),
-    # Its policy has learned for three seconds.
-    "fulmar run mybot --task go_to_position --policy runs/bundles/mybot --lockstep": (0, 1),
     # The clock of a computer that tests may follow no other one, as that of a robot has to.
     "fulmar doctor --for hardware relay_board.yaml": (0, 1),
+}
+# Whole runs of policies that have learned for three seconds: they may miss their goals.
+LEARNED_BRIEFLY = {
+    "fulmar run mybot --task go_to_position --policy runs/bundles/mybot --lockstep",
+    "fulmar run floating_platform --policy runs/bundles/first --lockstep --seed 7",
+    "fulmar run hexbot --task go_to_pose --policy runs/bundles/hexbot --lockstep --seed 3",
 }
 CLUSTER = "needs a Ray cluster; tests/training has one of two nodes"
 # Lines that no test of one machine can run, and why.
