@@ -197,6 +197,26 @@ def test_a_known_set_is_tested_and_kept_only_where_its_bounds_hold():
 
 
 @pytest.mark.slow
+def test_a_law_tested_again_keeps_its_set_and_the_hash_of_its_backup(fulmar, tmp_path):
+    robot, file = load_robot("floating_platform"), tmp_path / "envelope.json"
+    axes = plain_axes(axes_of(robot, load_task("go_to_pose")))
+    weights = {"linear": [1.0] * len(axes), "quadratic": [[0.0] * len(axes)] * len(axes)}
+    known = a_set() | {"controller": "lqr", "axes": axes, "score": {"weights": weights, "threshold": 0.3}}
+    known["box"] = {axis["name"]: [axis["low"], axis["low"]] for axis in axes}
+    known["hashes"] = {"robot": "0", "core": "0", "backup": "of another law"}
+    file.write_text(json.dumps(known))
+    words = "lqr --robot floating_platform --task go_to_pose --again --episodes 200 --mujoco 0 --json --out"
+    code, _, _ = fulmar("certify", *words.split(), file)
+    found = json.loads(file.read_text())
+    assert code == 0 and found["score"] == known["score"]
+    assert found["hashes"] == {
+        "robot": robot_sha256(robot.name),
+        "core": core_sha256(),
+        "backup": "of another law",
+    }
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("folder", CERTIFIED, ids=lambda folder: folder.name)
 def test_shipped_sets_still_hold_in_the_batch(folder, fulmar, tmp_path):
     mine = Path(shutil.copytree(folder, tmp_path / "bundle"))

@@ -15,7 +15,6 @@ from fulmar_core.config.errors import BundleError, ConfigError, did_you_mean
 from fulmar_core.robots.robot import Robot
 
 FORMAT = 1
-ENVELOPE_FILE = "envelope.json"
 NEEDED = ("format", "robot", "task", "controller", "axes", "box", "score", "lower_bound", "confidence")
 AGAIN = "Certify it again: fulmar certify"
 

@@ -16,6 +16,7 @@ from fulmar_bringup.core_probe import ends_of
 from fulmar_bringup.progress import work_bar
 from fulmar_core.config.errors import ConfigError, did_you_mean
 from fulmar_core.loop.policy_bundle import PASSPORT, read_passport
+from fulmar_core.safety.certified_set import CertifiedSet
 from fulmar_evaluation.certify.again import known_set, tested_again
 from fulmar_evaluation.certify.conditions import axes_of
 from fulmar_evaluation.certify.document import (
@@ -136,7 +137,8 @@ def run_certification(asked: Certification) -> tuple[dict[str, Any], Result]:
             return add
 
         episodes = Episodes(asked.trial, asked.dead, further(1))
-        result = _result(asked, episodes)
+        known = known_set(episodes, asked.file) if asked.again else None
+        result = _result(asked, episodes, known)
         if result.score is None:
             return _without_set(asked, episodes, result, began), result
         document = document_of(asked.trial, episodes.axes, result, seed=asked.seed)
@@ -148,18 +150,26 @@ def run_certification(asked: Certification) -> tuple[dict[str, Any], Result]:
     document |= {
         "controller": identity(asked.trial),
         "dead": asked.dead,
-        "hashes": hashes_of(asked.trial, asked.backup),
+        "hashes": _hashes(asked, known),
         "probe": ends_of(asked.trial.controller(), asked.trial.robot, asked.trial.task),
         "cpu_s": round(_cpu_s() - began, 2),
     }
     return document, result
 
 
-def _result(asked: Certification, episodes: Episodes) -> Result:
-    """A search for a set, or a test of that in the passport."""
-    if asked.again:
-        return tested_again(known_set(episodes, asked.file), episodes.run, asked.sizes, asked.seed)
+def _result(asked: Certification, episodes: Episodes, known: CertifiedSet | None) -> Result:
+    """A search for a set, or a test of a known one."""
+    if known is not None:
+        return tested_again(known, episodes.run, asked.sizes, asked.seed)
     return certify(episodes.run, len(episodes.axes), asked.sizes, asked.seed)
+
+
+def _hashes(asked: Certification, known: CertifiedSet | None) -> dict[str, str]:
+    """Those of today; of the backup that of the known set, where no other one is given."""
+    found = hashes_of(asked.trial, asked.backup)
+    if known is not None and asked.backup is None:
+        found["backup"] = str(known.plain.get("hashes", {}).get("backup", ""))
+    return found
 
 
 def _without_set(asked: Certification, tried: Episodes, result: Result, began: float) -> dict[str, Any]:
