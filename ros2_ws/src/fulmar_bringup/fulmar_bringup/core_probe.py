@@ -31,7 +31,7 @@ def ends_of(controller: Controller, robot: Robot, task: Task) -> list[list[float
     Raises:
         ConfigError: The controller cannot drive the robot in the task.
     """
-    short = replace(task, episode_s=STEPS / controller.control_hz)
+    short = replace(task, episode_s=STEPS / controller.control_hz)  # type: ignore[type-var]
     nominal = load_scenario("nominal")
     run = next(batches(controller, robot, short, nominal, episodes=EPISODES, seed=SEED))
     columns = (run.x, run.y, run.yaw if run.z is None else run.z)
