@@ -370,6 +370,7 @@ class PlantNode(LifecycleNode):
             self.health.mode = "running"
             episode = first_episode(self.robot, self.settings)
             sample = backend.reset(episode, seed=self.settings.seed)
+            self.clock.advance(sample.more_ticks * self.robot.timing.physics_dt)
             if self._link is not None:
                 self._link.begin(self.settings.seed)
             if self._simulated:
