@@ -66,7 +66,7 @@ class MavlinkSession:
 
         Args:
             settings: Where the autopilot is.
-            feedback: Is told when the link is gone.
+            feedback: Fails once the link is gone.
             take: Called with every message of the autopilot, from the thread.
             patience_s: For the link, and for the autopilot to speak [s].
             beat_s: Between two heartbeats of ours [s].

@@ -17,7 +17,7 @@ from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.sensors.fuel import NAME as FUEL
 from fulmar_core.safety.command_gate import command_problem
 from fulmar_core.safety.envelope.guard import EnvelopeGuard
-from fulmar_core.safety.gas_reserve import gauges_of
+from fulmar_core.safety.fuel_reserve import gauges_of
 from fulmar_core.safety.keep_apart import KeepApartGuard, Other
 from fulmar_core.safety.keep_out import KeepOutGuard
 from fulmar_core.states.state import State

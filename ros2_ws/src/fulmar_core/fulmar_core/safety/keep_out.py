@@ -17,7 +17,7 @@ from fulmar_core.controllers.allocation import allocation_of
 from fulmar_core.controllers.controller import Inputs
 from fulmar_core.robots.actuators.pushing import Pushing
 from fulmar_core.robots.robot import Robot
-from fulmar_core.safety.gas_reserve import GasReserve, gauges_of
+from fulmar_core.safety.fuel_reserve import FuelReserve, gauges_of
 from fulmar_core.states.arrays import side_by_side
 from fulmar_core.states.attitude import even_directions, exponential, product, scaled
 from fulmar_core.states.rotation import cross, rotate_inverse
@@ -32,7 +32,7 @@ DIRECTIONS = 200  # of forces that are tried for the weakest
 DRIFTS_S = 60.0  # for which the way of a robot with closed valves is looked at
 STEP_S = 0.25  # of that look
 ENTERED = "in the keep-out volume"  # a part of the words of a robot that is
-OUT_OF_GAS = (
+OUT_OF_FUEL = (
     "the gas left is what stopping takes: the guard stops the robot, and no controller pushes any more"
 )
 HAD_HELD, HAD_ENTERED = (
@@ -72,9 +72,9 @@ class KeepOutGuard:
         self._late_s = known_s + dt  # of the answer to what is measured next
         self._middle_s = known_s + 0.5 * dt  # from the measurement to the middle of the command's time
         self._safe = np.asarray(robot.actuators.safe_command, dtype=float)
-        self.reserve: GasReserve | None = None
+        self.reserve: FuelReserve | None = None
         if gauges_of(robot):
-            self.reserve = GasReserve(robot, self._allocation, self._weakest, self._turn, self._late_s)
+            self.reserve = FuelReserve(robot, self._allocation, self._weakest, self._turn, self._late_s)
         self._holds = np.zeros(1, dtype=bool)
 
     def _pushes(self, actuators: Pushing, force: float) -> tuple[float, float]:
@@ -172,7 +172,7 @@ class KeepOutGuard:
         if far < 0.0:
             return f"{-far:.2f} m {ENTERED} of '{names[nearest]}': the guard pushes the robot out"
         if self.reserve is not None and self.reserve.spent[0]:
-            return OUT_OF_GAS
+            return OUT_OF_FUEL
         if not self._holds[0]:
             return ""
         nears = -float(velocity[0] @ away)

@@ -37,7 +37,7 @@ def gauges_of(robot: Robot) -> tuple[str, ...]:
     return next(((name,) for name in (FUEL, SUPPLY) if name in robot.sensors.specs), ())
 
 
-class GasReserve:
+class FuelReserve:
     """Knows which robots of one kind have no more gas than stopping takes.
 
     Attributes:
@@ -126,7 +126,7 @@ def _price(actuators: Pushing, allocation: Allocation, com: np.ndarray, sizes: n
 
     Args:
         actuators: Of the robot.
-        allocation: See `GasReserve`.
+        allocation: See `FuelReserve`.
         com: Centre of mass, shape (3,) [m].
         sizes: Force [N] and torque [N·m], of which one is 0, shape (2,).
 

@@ -9,8 +9,8 @@ import pytest
 
 from fulmar_core.loop.control_loop import ControlLoop, readings_for, unknown_inputs
 from fulmar_core.robots.robot_file import load_robot
-from fulmar_core.safety.gas_reserve import SHARE, GasReserve, gauges_of
-from fulmar_core.safety.keep_out import LEAVES_M_S, OUT_OF_GAS, KeepOutGuard
+from fulmar_core.safety.fuel_reserve import SHARE, FuelReserve, gauges_of
+from fulmar_core.safety.keep_out import LEAVES_M_S, OUT_OF_FUEL, KeepOutGuard
 from fulmar_core.states.spatial import SpatialState
 from fulmar_core.tasks import load_task
 from fulmar_core.worlds.structures import load_structure
@@ -32,7 +32,7 @@ def made() -> KeepOutGuard:
     return KeepOutGuard(ROBOT, [VOLUME], 0.1)
 
 
-def reserve() -> GasReserve:
+def reserve() -> FuelReserve:
     found = made().reserve
     assert found is not None
     return found
@@ -100,7 +100,7 @@ def test_once_the_gas_left_is_what_stopping_takes_no_controller_pushes_until_a_n
     stopping = guard.guarded(pushes, inputs_of(moving(1.0), 2, low))
     force, _ = ROBOT.actuators.wrench_in_body(stopping)
     assert force[0, 1] < -0.5 and np.abs(force[0, [0, 2]]).max() < 1e-3, "straight back, far from the thing"
-    assert guard.words(moving(1.0), ["gateway"]) == OUT_OF_GAS
+    assert guard.words(moving(1.0), ["gateway"]) == OUT_OF_FUEL
     at_rest = guard.guarded(pushes, inputs_of(moving(0.5 * LEAVES_M_S), 3, full))
     assert not at_rest.any(), "its valves stay closed, whatever the gauge says"
     guard.reset()
