@@ -38,7 +38,11 @@ INSTEAD = {
         "fulmar evaluate turtlebot2 go_to_pose --controller classical --through batch --episodes 4"
     ),
     "fulmar identify runs/...": "fulmar identify runs/*excite*",
-    "fulmar new airframe GEOMETRY --out FILE": "fulmar new airframe geometry.yaml --out wing.yaml",
+    "fulmar new airframe GEOMETRY --out FILE": (
+        f"fulmar new airframe {ROOT / 'tests/peers/airship_v7_geometry.yaml'} --out wing.yaml"
+    ),
+    "fulmar new robot NAME --like ROBOT --urdf FILE": "fulmar new robot husky --like turtlebot2 --urdf husky.urdf",
+    "fulmar new task NAME": "fulmar new task dock_gate",
     "fulmar export RUN --out DIR": "fulmar export runs/train/mine --out runs/bundles/exported",
     "fulmar export runs/train/... --out bundles/dock": "fulmar export runs/train/*dock* --out bundles/dock",
     "fulmar train --resume RUN --time-limit 3600": "fulmar train --resume runs/train/mine --time-limit 3 --episodes 4",

@@ -47,6 +47,7 @@ BESIDE = {
     "fulmar estop turtlebot2": (f"{TURTLEBOT} --estop",),
     "fulmar status turtlebot2 --wait active --timeout 30 && python my_goals.py": (TURTLEBOT,),
     "fulmar teleop turtlebot2": (TURTLEBOT,),
+    "fulmar doctor --for sim": (),  # no robot takes its processor
     "fulmar up mujoco_lqr --estop --only controller": (PLANT,),
     "fulmar status floating_platform --node plant": (PLANT, f"{PLANT[:-5]}controller"),
     BETA: (ALPHA,),
@@ -149,8 +150,9 @@ def prepare(page: str, lines: list[Line], folder: Path) -> None:
         write_sentry(folder)
     if page in ("own-driver", "new_robot"):
         _relay_board(folder)
-    if page == "new_robot":
+    if page in ("new_robot", "commands"):
         (folder / "husky.urdf").write_text(TURTLE, encoding="utf-8")
+    if page == "new_robot":
         (folder / "four.xml").write_text(FOUR, encoding="utf-8")
     if page == "bags":
         write_foreign(folder / "theirs", StoragePlugin.MCAP, commands=True, velocity="/base/velocity")

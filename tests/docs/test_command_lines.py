@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 
 from tests.docs import budgets, companions
@@ -10,6 +12,7 @@ from tests.docs.page_run import PARTS_OF_TEST, is_fine, left_out, pages_of
 from tests.docs.shell import SERVERS, Outcome
 
 MOST_MARKED = 10
+PLACEHOLDER = re.compile(r"(?<!-s )\b[A-Z]{2,}\b")  # but for the name of a signal
 BRIEFLY = min(companions.LEARNED_BRIEFLY)
 PAGE = """
 <!-- needs hardware: fulmar run a ... -->
@@ -79,6 +82,15 @@ def test_every_page_is_run_by_one_of_the_two_tests(lines):
 )
 def test_every_row_of_a_table_is_a_line_of_the_docs(name, table, lines):
     assert set(table) - {line.text for line in lines} == set(), name
+
+
+def test_no_line_runs_with_a_placeholder(lines):
+    run = [
+        budgets.shortened(line.text)
+        for line in lines
+        if not line.marker and line.text not in companions.EXCLUDED
+    ]
+    assert [text for text in run if PLACEHOLDER.search(text)] == []
 
 
 def test_every_budget_and_every_kind_of_server_is_used(lines):
