@@ -104,6 +104,10 @@ PARTS = [
     (r"( --video .*--span) (\d+),\d+", r"\1 \2,\g<2>.5"),
     (r" \[--parts \S+\] \[--json\]$", ""),
     (r"^(fulmar certify (?!--replay).*)$", r"\1 --episodes 400 --mujoco 8"),
+    (r"( --accept --bundle runs/bundles)/mine", r"\1/accepted"),  # new or empty; `mine` is given
+    (r"^(fulmar twin .*)$", r"\1 --episodes 4 --updates 1"),
+    (r"^(fulmar parity (?!.*--duration).*)$", r"\1 --runs 1 --duration 10"),
+    (r"^(fulmar parity (?!.*--episodes).*)$", r"\1 --episodes 1"),
     (r" --platforms \d+", " --platforms 1"),
     (r" --seeds 5", " --seeds 2"),
     (r" --episodes \d{2,}", " --episodes 4"),
