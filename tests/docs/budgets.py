@@ -103,7 +103,6 @@ PARTS = [
     (r"( --video .*--size) \d+x\d+", r"\1 160x90"),
     (r"( --video .*--span) (\d+),\d+", r"\1 \2,\g<2>.5"),
     (r" \[--parts \S+\] \[--json\]$", ""),
-    (r"^(fulmar certify (?!--replay).*)$", r"\1 --episodes 400 --mujoco 8"),
     (r"( --accept --bundle runs/bundles)/mine", r"\1/accepted"),  # new or empty; `mine` is given
     (r"^(fulmar twin .*)$", r"\1 --episodes 4 --updates 1"),
     (r"^(fulmar parity (?!.*--duration).*)$", r"\1 --runs 1 --duration 10"),
@@ -111,6 +110,7 @@ PARTS = [
     (r" --platforms \d+", " --platforms 1"),
     (r" --seeds 5", " --seeds 2"),
     (r" --episodes \d{2,}", " --episodes 4"),
+    (r"^(fulmar certify (?!--replay).*)$", r"\1 --episodes 400 --mujoco 8"),
     (r"^(fulmar train (?!.*--(?:time-limit|updates)).*)$", r"\1 --updates 1"),
     (r"^(fulmar (?:train|evaluate) (?!.*--episodes).*)$", r"\1 --episodes 4"),
     (r"^(fulmar run cubesat_wheels (?!.*--duration).*)$", r"\1 --duration 75"),
