@@ -43,9 +43,11 @@ INSTEAD = {
     ),
     "fulmar new robot NAME --like ROBOT --urdf FILE": "fulmar new robot husky --like turtlebot2 --urdf husky.urdf",
     "fulmar new task NAME": "fulmar new task dock_gate",
-    "fulmar export RUN --out DIR": "fulmar export runs/train/mine --out runs/bundles/exported",
+    "fulmar export RUN --out DIR": "fulmar export runs/train/*airship_v7* --out runs/bundles/exported",
     "fulmar export runs/train/... --out bundles/dock": "fulmar export runs/train/*dock* --out bundles/dock",
-    "fulmar train --resume RUN --time-limit 3600": "fulmar train --resume runs/train/mine --time-limit 3 --episodes 4",
+    "fulmar train --resume RUN --time-limit 3600": (
+        "fulmar train --resume runs/train/*airship_v7* --time-limit 3 --episodes 4"
+    ),
     "fulmar bundle verify runs/bundles/mine --trusted lab.pem": (
         "fulmar bundle keys private.pem lab.pem && fulmar bundle sign runs/bundles/mine --key private.pem && "
         "fulmar bundle verify runs/bundles/mine --trusted lab.pem"
@@ -61,7 +63,7 @@ INSTEAD = {
     "fulmar simulation step floating_platform --steps 10": (
         "fulmar simulation pause floating_platform && fulmar simulation step floating_platform --steps 10"
     ),
-    "fulmar commission HARDWARE --yes": "fulmar commission relay_board.yaml --yes",
+    "fulmar commission HARDWARE --yes": "fulmar commission turtlebot2 --emulate --yes",
     "fulmar policies": "fulmar policies --out shipped",
     "fulmar service install mujoco_classical --backend hardware": (
         "fulmar service install mujoco_classical --backend hardware --robot turtlebot2 --root image --user nobody"
@@ -101,9 +103,14 @@ PARTS = [
     (r"( --video .*--size) \d+x\d+", r"\1 160x90"),
     (r"( --video .*--span) (\d+),\d+", r"\1 \2,\g<2>.5"),
     (r" \[--parts \S+\] \[--json\]$", ""),
+    (r"( --accept --bundle runs/bundles)/mine", r"\1/accepted"),  # new or empty; `mine` is given
+    (r"^(fulmar twin .*)$", r"\1 --episodes 4 --updates 1"),
+    (r"^(fulmar parity (?!.*--duration).*)$", r"\1 --runs 1 --duration 10"),
+    (r"^(fulmar parity (?!.*--episodes).*)$", r"\1 --episodes 1"),
     (r" --platforms \d+", " --platforms 1"),
     (r" --seeds 5", " --seeds 2"),
     (r" --episodes \d{2,}", " --episodes 4"),
+    (r"^(fulmar certify (?!--replay).*)$", r"\1 --episodes 400 --mujoco 8"),
     (r"^(fulmar train (?!.*--(?:time-limit|updates)).*)$", r"\1 --updates 1"),
     (r"^(fulmar (?:train|evaluate) (?!.*--episodes).*)$", r"\1 --episodes 4"),
     (r"^(fulmar run cubesat_wheels (?!.*--duration).*)$", r"\1 --duration 75"),

@@ -58,7 +58,6 @@ BESIDE = {
     "fulmar bag play runs/flight --to xplane": (XPLANE,),
     "fulmar doctor --for hardware relay_board.yaml": (BOARD,),
     "fulmar commission relay_board.yaml": (BOARD,),
-    "fulmar commission HARDWARE --yes": (BOARD,),
     "fulmar run floating_platform --backend hardware --hardware relay_board.yaml --goal 0.5,0": (BOARD,),
 }
 
@@ -115,6 +114,8 @@ CODES: dict[str, tuple[int, ...]] = {
     "fulmar run sentry --task go_to_position --controller my_control:KeepOff --lockstep --record bag": (1,),
     # The board measures no position.
     "fulmar run floating_platform --backend hardware --hardware relay_board.yaml --goal 0.5,0": (1,),
+    # With a dead valve it has no certified set.
+    "fulmar certify policy --robot floating_platform --task go_to_pose --dead 1": (1,),
     # Gusts carry it further than it may go.
     "fulmar run airship_v7 --task fly_hold --controller lqi --scenario light_turbulence --lockstep --seed 3": (
         1,
@@ -148,7 +149,7 @@ def prepare(page: str, lines: list[Line], folder: Path) -> None:
             shutil.copytree(source, folder / place)
     if page == "own-sensor":
         write_sentry(folder)
-    if page in ("own-driver", "new_robot"):
+    if page == "own-driver":
         _relay_board(folder)
     if page in ("new_robot", "commands"):
         (folder / "husky.urdf").write_text(TURTLE, encoding="utf-8")

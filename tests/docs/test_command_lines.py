@@ -110,6 +110,8 @@ def test_every_budget_and_every_kind_of_server_is_used(lines):
         ("fulmar train a b", "fulmar train a b --updates 1 --episodes 4"),
         ("fulmar run a --lockstep --seed 3", "fulmar run a --lockstep --seed 3"),
         ("fulmar run a", "fulmar run a --duration 5"),
+        ("fulmar certify a", "fulmar certify a --episodes 400 --mujoco 8"),
+        ("fulmar parity a --episodes 0", "fulmar parity a --episodes 0 --runs 1 --duration 10"),
         (
             "fulmar benchmark estimator --plot x.png",
             "fulmar benchmark estimator --plot x.png --drives 1 --seconds 10",
