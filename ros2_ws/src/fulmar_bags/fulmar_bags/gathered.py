@@ -19,8 +19,10 @@ from fulmar_bags.ring import FAULTS
 from fulmar_bags.ros1_records import Ros1File, converter
 from fulmar_bags.selection import Selection
 from fulmar_bags.sqlite_records import SqliteFile
+from fulmar_bags.statuses import unreadable_statuses
 from fulmar_bags.stored_bytes import PIECE, Payloads, Room, Source, picked
 from fulmar_bags.writer import RUN_KEY, RUN_RECORD
+from fulmar_core.robots.topics import DIAGNOSTICS
 
 MOST_ATTACHED = 100_000_000  # bytes of all attachments together
 
@@ -169,7 +171,9 @@ class Gathered:
         """Find those of the newest messages that do not fit the type of their topic."""
         for topic, newest in self._unchecked.values():
             first = len(topic) - len(newest)
-            topic.unreadable += [first + index for index in unreadable(topic.type, newest)]
+            known = topic.type == DIAGNOSTICS.type  # most of a bag's texts, which take long to walk through
+            bad = unreadable_statuses(newest) if known else unreadable(topic.type, newest)
+            topic.unreadable += [first + index for index in bad]
         self._unchecked.clear()
         self._waiting = 0
 

@@ -347,11 +347,10 @@ def _health(reader: WireReader, name: str) -> tuple[HealthSample, ...]:
     """Diagnostics of a robot's nodes; of all robots, which share one topic, where no name is known."""
     own = f"{name}: " if name else ""
     samples = [
-        HealthSample(
-            log_ns / NS, s.name, int(s.level), s.message, {pair.key: pair.value for pair in s.values}
-        )
-        for log_ns, message in reader.messages(STATUS) + reader.messages(DIAGNOSTICS)
-        for s in message.status
-        if s.name.startswith(own)
+        HealthSample(log_ns / NS, report.name, report.level, report.message, report.values)
+        for wire in (STATUS, DIAGNOSTICS)
+        for log_ns, reports in reader.statuses(wire, own)
+        for report in reports
+        if report.name.startswith(own)
     ]
     return tuple(sorted(samples, key=lambda sample: sample.log_s))

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from fulmar_bags.gathered import Topic
-from fulmar_bags.message_types import ENCAPSULATION, LITTLE_ENDIAN, type_store
+from fulmar_bags.message_types import ENCAPSULATION, LITTLE_ENDIAN, PADDING, type_store
+
+if TYPE_CHECKING:  # which checks messages by this module
+    from fulmar_bags.gathered import Topic
 
 _LENGTH = struct.Struct("<I")
 _STAMP_BYTES = 8
@@ -24,31 +26,55 @@ class StatusReport:
     values: dict[str, str]
 
 
-def statuses(topic: Topic) -> Iterator[tuple[int, list[StatusReport]]]:
-    """Time of recording [ns] and statuses of each message of type DiagnosticArray that can be read."""
+def statuses(topic: Topic, of: str = "") -> Iterator[tuple[int, list[StatusReport]]]:
+    """Time of recording [ns] and statuses of each message of type DiagnosticArray that can be read.
+
+    Args:
+        topic: Of this type.
+        of: Text without which a message is left out.
+    """
+    text = of.encode()
     for log_ns, data in zip(topic.log_ns, topic.data, strict=True):
+        if text not in data:
+            continue
         try:
             yield log_ns, _read(data)
         except Exception:  # noqa: BLE001 - foreign bytes raise whatever they please
             continue
 
 
+def unreadable_statuses(data: Sequence[bytes]) -> list[int]:
+    """Indices of messages that are no DiagnosticArray; see `message_types.unreadable`."""
+    found = []
+    for index, each in enumerate(data):
+        try:
+            _read(each)
+        except Exception:  # noqa: BLE001 - foreign bytes raise whatever they please
+            found.append(index)
+    return found
+
+
 def _read(data: bytes) -> list[StatusReport]:
     if data[1] != LITTLE_ENDIAN:
         return [_of(status) for status in _deserialized(data).status]
-    at = _after(data, ENCAPSULATION + _STAMP_BYTES)  # behind the frame of the header
+    if data[0]:
+        raise ValueError("another encapsulation")
+    _, at = _text(data, ENCAPSULATION + _STAMP_BYTES)  # of the header's frame
     count, at = _count(data, at)
     found = []
     for _ in range(count):
         level = data[at]
         name, at = _text(data, at + 1)
         message, at = _text(data, at)
-        pairs, at = _count(data, _after(data, at))
+        _, at = _text(data, at)  # of the hardware
+        pairs, at = _count(data, at)
         values = {}
         for _ in range(pairs):
             key, at = _text(data, at)
             values[key], at = _text(data, at)
         found.append(StatusReport(name, level, message, values))
+    if len(data) - at > PADDING:
+        raise ValueError("more follows")
     return found
 
 
@@ -63,11 +89,6 @@ def _text(data: bytes, at: int) -> tuple[str, int]:
     if at + length > len(data):
         raise ValueError("torn off")
     return data[at : at + length].rstrip(b"\0").decode(), at + length
-
-
-def _after(data: bytes, at: int) -> int:
-    length, at = _count(data, at)
-    return at + length
 
 
 def _deserialized(data: bytes) -> Any:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +22,7 @@ from fulmar_bags.decode import (
 )
 from fulmar_bags.gathered import Topic
 from fulmar_bags.message_reader import goal_of, obstacles_of, thing_of
+from fulmar_bags.statuses import StatusReport, statuses
 from fulmar_core.robots.topics import GOAL_WIRES, OBSTACLES, VELOCITY_COMMAND, Wire, goal_wires
 from fulmar_core.wires.robot_name import Frames
 
@@ -55,6 +56,10 @@ class WireReader:
     def messages(self, wire: Wire) -> list[tuple[int, Any]]:
         """Time of recording [ns] and message, of those that can be read."""
         return messages(self._topic(wire))
+
+    def statuses(self, wire: Wire, of: str = "") -> Iterator[tuple[int, list[StatusReport]]]:
+        """Time of recording [ns] and statuses of each message of diagnostics; see `statuses.statuses`."""
+        return statuses(self._topic(wire), of)
 
     def odometry(self, wire: Wire) -> Odometries:
         """Odometry of a wire."""
