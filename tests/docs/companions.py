@@ -28,7 +28,6 @@ XPLANE, BOARD = "python xplane.py", "python board.py"
 BESIDE = {
     "fulmar goals --robot floating_platform --pose 1,-0.5,90": (PLATFORM,),
     "fulmar goals lab_pose --robot floating_platform": (PLATFORM,),
-    "fulmar run floating_platform --task go_to_pose --goal 0,0,0 --console": (),
     "fulmar simulation pause floating_platform": (PLATFORM,),
     "fulmar simulation step floating_platform --steps 10": (PLATFORM,),
     "fulmar status": (PLATFORM,),
@@ -47,7 +46,6 @@ BESIDE = {
     "fulmar estop turtlebot2": (f"{TURTLEBOT} --estop",),
     "fulmar status turtlebot2 --wait active --timeout 30 && python my_goals.py": (TURTLEBOT,),
     "fulmar teleop turtlebot2": (TURTLEBOT,),
-    "fulmar doctor --for sim": (),  # no robot takes its processor
     "fulmar up mujoco_lqr --estop --only controller": (PLANT,),
     "fulmar status floating_platform --node plant": (PLANT, f"{PLANT[:-5]}controller"),
     BETA: (ALPHA,),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -14,6 +15,8 @@ LONGEST_S = 180.0  # of one line
 # Pages of the first of two processes; all others belong to the second.
 FIRST_PART = ("README", "commands", "flight", "installation", "training")
 PARTS_OF_TEST = (0, 1)
+# Commands that speak to what runs; others would only share the processor with it.
+CLIENT = re.compile(r"\bfulmar (?:console|estop|goals|simulation|status|swap|teleop|view)\b")
 PRINTED = 1500  # characters of a failed command's output
 MISSED = "goal missed"  # how a run says so that was cut before it could arrive
 
@@ -58,7 +61,7 @@ def outcomes(page: str, lines: list[Line], folder: Path, domain: int) -> Iterato
     """Prepare the folder of a page, run its lines in order, and give what each did.
 
     Modules are written first: some pages show a command before the class that it loads.
-    Servers run until the block ends, another server starts, or a line needs others beside it.
+    Servers run until the block ends, another server starts, or a line needs others beside it or is no client of any.
     """
     prepare(page, lines, folder)
     lines = sorted(lines, key=lambda line: not line.is_module)
@@ -81,7 +84,7 @@ def _run(shell: PageShell, line: Line) -> Iterator[Outcome]:
         return
     text = line.text if line.shell else shortened(line.text)
     server = not line.shell and any(pattern.search(text) for pattern, _ in SERVERS)
-    if server or line.text in BESIDE:
+    if server or line.text in BESIDE or not (line.shell or CLIENT.search(line.text)):
         needed = BESIDE.get(line.text, ())
         yield from shell.stop_servers(*needed)
         for other in needed:
