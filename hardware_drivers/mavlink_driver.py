@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import threading
 import time
 from collections.abc import Callable
 
@@ -15,9 +13,7 @@ from fulmar_core.robots.robot import Robot
 from hardware_drivers.driver import DeviceDriver
 from hardware_drivers.feedback import Feedback, Report
 from hardware_drivers.mavlink_autopilot import ERROR, MANUAL, Autopilot
-from hardware_drivers.mavlink_commands import Commands
-from hardware_drivers.mavlink_link import Address, heartbeat, open_link, wait_for_autopilot
-from hardware_drivers.mavlink_signing import read_key
+from hardware_drivers.mavlink_session import MavlinkSession
 from hardware_drivers.mavlink_telemetry import Telemetry
 from hardware_drivers.placed_reports import PlacedReports
 from hardware_drivers.settings import UNARMED, MavlinkBoat
@@ -52,29 +48,16 @@ class MavlinkDriver(DeviceDriver):
             DeviceError: No autopilot answers, or it does not go to MANUAL.
         """
         self._safe, self._settings = robot.actuators.safe_command, settings
-        self._name = f"autopilot at {settings.port}"
-        self._feedback, self._telemetry = Feedback(self._name, settings.silent_s), Telemetry()
+        self._feedback = Feedback(f"autopilot at {settings.port}", settings.silent_s)
+        self._telemetry = Telemetry()
         self._state = Autopilot(settings.steering_channel, settings.throttle_channel)
         self._reports = PlacedReports(self._feedback, robot.limits)
         self._has_begun = False
-        self._over = threading.Event()
-        key = read_key(settings.signing_key) if settings.signing_key else b""
-        self._link = open_link(settings.port, settings.baud, key, patience_s)
-        self._commands: Commands | None = None
-        self._thread = threading.Thread(target=self._run, name="mavlink reader", daemon=True)
-        self._thread.start()
-        try:
-            self._autopilot: Address = wait_for_autopilot(self._link, settings.port, patience_s)
+        self._session = MavlinkSession(
+            settings, self._feedback, self._take, patience_s=patience_s, beat_s=HEARTBEAT_S
+        )
+        with self._session.connecting(self._release):
             self._prepare()
-            self._feedback.wait(patience_s)
-        except OSError as error:
-            self._end()
-            raise DeviceError(f"{self._name}: the link is gone ({error}).") from error
-        except BaseException:
-            with contextlib.suppress(OSError):
-                self._release()
-            self._end()
-            raise
 
     def begin(self, x: float, y: float, heading: float) -> None:
         """Set the boat's position in `odom`, and arm if allowed; see `DeviceDriver`.
@@ -87,7 +70,7 @@ class MavlinkDriver(DeviceDriver):
             return
         if self._state.mode != MANUAL:
             raise DeviceError(
-                f"{self._name}: it is in mode {self._state.mode_name}, not MANUAL. Nothing is armed."
+                f"{self._session.name}: it is in mode {self._state.mode_name}, not MANUAL. Nothing is armed."
             )
         self._drive(0.0, 0.0)
         self._demand(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0, what="arming", done=lambda: self._state.armed)
@@ -116,7 +99,7 @@ class MavlinkDriver(DeviceDriver):
         except OSError:
             pass  # it is gone; the autopilot stops by its own failsafe
         finally:
-            self._end()
+            self._session.close()
 
     def health(self) -> dict[str, str]:
         """Battery, mode, arming and words of the autopilot; see `DeviceDriver`."""
@@ -129,26 +112,15 @@ class MavlinkDriver(DeviceDriver):
             or ("a failsafe of the autopilot acts" if state.failsafe else "")
             or (f"the autopilot says {said}" if said else "")
         )
-        return {
-            "battery_v": self._telemetry.voltage,
-            "armed": str(state.armed).lower(),
-            "autopilot_mode": state.mode_name,
-            "autopilot_says": state.words(now_s),
-            "refused_commands": self._commands.refused if self._commands else "",
-            "refused_messages": str(self._link.refused),
-            "refused_positions": str(self._reports.refused),
-            "warning": warning,
-        }
+        known = self._session.health(state, refused_positions=self._reports.refused)
+        return {"battery_v": self._telemetry.voltage, **known, "warning": warning}
 
     def _prepare(self) -> None:
         """Ask for telemetry, and set MANUAL where the boat may be armed."""
-        self._commands = commands = Commands(self._link.send, self._autopilot)
-        for name, rate in RATES_HZ.items():
-            kind = getattr(mavlink, f"MAVLINK_MSG_ID_{name}")
-            commands.tell(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, float(kind), 1e6 / rate)
+        self._session.ask_for(RATES_HZ)
         if not self._settings.arm:
             return
-        self._await_heartbeat()
+        self._session.await_heartbeat(self._state)
         self._demand(
             mavlink.MAV_CMD_DO_SET_MODE,
             float(mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED),
@@ -156,12 +128,6 @@ class MavlinkDriver(DeviceDriver):
             what="mode MANUAL",
             done=lambda: self._state.mode == MANUAL,
         )
-
-    def _await_heartbeat(self) -> None:
-        """Wait for a while until a heartbeat says what the autopilot is: nothing else may be set or armed."""
-        end_s = time.monotonic() + OBEYS_S
-        while not self._state.beats and time.monotonic() < end_s:
-            time.sleep(0.02)
 
     def _demand(
         self, number: int, first: float, second: float = 0.0, *, what: str, done: Callable[[], bool]
@@ -171,61 +137,41 @@ class MavlinkDriver(DeviceDriver):
         Raises:
             DeviceError: It does not, with the autopilot's own words.
         """
-        assert self._commands is not None
+        commands = self._session.commands
+        assert commands is not None
         if self._state.stranger:
             raise DeviceError(
-                f"{self._name}: the autopilot is {self._state.stranger}. Nothing is set or armed."
+                f"{self._session.name}: the autopilot is {self._state.stranger}. Nothing is set or armed."
             )
         beats = self._state.beats
-        reason = self._commands.ask(
+        reason = commands.ask(
             number, first, second, done=lambda: self._state.beats > beats and done(), within_s=OBEYS_S
         )
         if reason:
             words = self._state.words(time.monotonic())
             says = f" It says {words}." if words else ""
             raise DeviceError(
-                f"{self._name} refuses {what}: {reason}; it is in mode {self._state.mode_name}.{says}"
+                f"{self._session.name} refuses {what}: {reason}; it is in mode {self._state.mode_name}.{says}"
             )
 
     def _release(self) -> None:
         """Stop and disarm a boat that may be armed, and send nothing to a stranger; raises OSError."""
-        if self._settings.arm and self._commands is not None and not self._state.stranger:
+        commands = self._session.commands
+        if self._settings.arm and commands is not None and not self._state.stranger:
             self._drive(0.0, 0.0)
-            self._commands.tell(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
-
-    def _end(self) -> None:
-        self._over.set()
-        self._thread.join(0.5)
-        self._link.close()
+            commands.tell(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
 
     def _drive(self, left: float, right: float) -> None:
         settings = self._settings
         channels = override_of(settings, left, right)
         pulses = channels[settings.steering_channel - 1], channels[settings.throttle_channel - 1]
         self._state.note_sent(*pulses, time.monotonic())
-        self._link.send(mavlink.MAVLink_rc_channels_override_message(*self._autopilot, *channels))
-
-    def _run(self) -> None:
-        beaten, known = 0.0, False
-        while not self._over.is_set():
-            now = time.monotonic()
-            try:
-                # At once to an autopilot that has just spoken: what was sent before may not have reached it.
-                if now - beaten >= HEARTBEAT_S or known is not (self._link.autopilot is not None):
-                    beaten, known = now, self._link.autopilot is not None
-                    self._link.send(heartbeat())
-                for message in self._link.receive():
-                    self._take(message)
-            except Exception as error:  # noqa: BLE001 - a thread that died in silence would look like a silent boat
-                if not self._over.is_set():
-                    self._feedback.fail(f"the link is gone ({type(error).__name__}: {error})")
-                return
+        session = self._session
+        session.link.send(mavlink.MAVLink_rc_channels_override_message(*session.autopilot, *channels))
 
     def _take(self, message: object) -> None:
         """Take a message of the autopilot."""
         self._state.take(message, time.monotonic())
-        if self._commands is not None:
-            self._commands.take(message)
         report = self._telemetry.take(message, time.time_ns())
         if report is not None:
             self._reports.take(report)

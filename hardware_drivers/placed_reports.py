@@ -20,9 +20,20 @@ class PlacedReports:
         refused: How many positions could not be true.
     """
 
-    def __init__(self, feedback: Feedback, limits: Limits, *, turns_freely: bool = False) -> None:
-        """Put them into `feedback`, within the limits of the robot; `turns_freely` is as in `unbelievable`."""
-        self._feedback, self._limits, self._turns_freely = feedback, limits, turns_freely
+    def __init__(
+        self, feedback: Feedback, limits: Limits, *, turns_freely: bool = False, flies: bool = False
+    ) -> None:
+        """Put them into `feedback`.
+
+        Args:
+            feedback: Of the device.
+            limits: Of the robot.
+            turns_freely: As in `unbelievable`.
+            flies: Whether heights stay those of the device, of which water and ground are a part; else the robot is
+                on the plane of `odom`.
+        """
+        self._feedback, self._limits = feedback, limits
+        self._turns_freely, self._flies = turns_freely, flies
         self._placing = threading.Lock()  # no report is moved by a shift that has just changed
         self._shift = np.zeros(3)  # from where the device's frame begins to where `odom` does [m]
         self._believed: tuple[Report, int] | None = None  # and when, by the steady clock [ns]
@@ -49,8 +60,8 @@ class PlacedReports:
         """Take a place in `odom` for where the device is now [m]; there must be a report."""
         with self._placing:
             assert self._believed is not None and self._believed[0].odometry is not None
-            report = self._believed[0]
-            self._shift = np.array([x, y, 0.0]) - self._believed[0].odometry.position_in_world
+            report, place = self._believed[0], self._believed[0].odometry.position_in_world
+            self._shift = np.array([x, y, place[2] if self._flies else 0.0]) - place
             self._feedback.put(
                 self._moved(report)
             )  # so that nobody reads a report of the old frame from here on

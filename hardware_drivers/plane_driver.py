@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import threading
 import time
 from dataclasses import replace
 from typing import Any
@@ -19,17 +17,15 @@ from hardware_drivers.driver import DeviceDriver
 from hardware_drivers.feedback import Feedback, Report
 from hardware_drivers.flight_set_points import FlightSetPoints
 from hardware_drivers.mavlink_autopilot import BEATLESS_S, ERROR
-from hardware_drivers.mavlink_commands import Commands
-from hardware_drivers.mavlink_link import Address, heartbeat, open_link, wait_for_autopilot
 from hardware_drivers.mavlink_parameters import Parameters
-from hardware_drivers.mavlink_signing import read_key
+from hardware_drivers.mavlink_session import MavlinkSession
 from hardware_drivers.mavlink_telemetry import Telemetry
 from hardware_drivers.placed_reports import PlacedReports
 from hardware_drivers.plane_air import PlaneAir
 from hardware_drivers.plane_autopilot import GUIDED, LOITER, PlaneAutopilot, attitude_target, protection
 from hardware_drivers.plane_settings import MavlinkPlane
 from hardware_drivers.settings import UNARMED
-from hardware_drivers.takeover import OBEYS_S, Doing, Takeover
+from hardware_drivers.takeover import Doing, Takeover
 
 HEARTBEAT_S = 0.5  # twice within the shortest time that ArduPlane takes for their loss
 ANSWERS_S = 2.0  # for each parameter
@@ -55,10 +51,10 @@ class PlaneDriver(DeviceDriver):
             DeviceError: No ArduPlane answers, or its failsafe cannot be confirmed.
         """
         self._robot, self._settings, self._safe = robot, settings, robot.actuators.safe_command
-        self._name = f"autopilot at {settings.port}"
-        self._feedback, self._telemetry = Feedback(self._name, settings.silent_s), Telemetry()
+        self._feedback = Feedback(f"autopilot at {settings.port}", settings.silent_s)
+        self._telemetry = Telemetry()
         self._plane, self._air = PlaneAutopilot(), PlaneAir(robot)
-        self._reports = PlacedReports(self._feedback, robot.limits, turns_freely=True)
+        self._reports = PlacedReports(self._feedback, robot.limits, turns_freely=True, flies=True)
         self._set_points = FlightSetPoints(robot, settings.lead_s)
         self._takeover = Takeover("the autopilot", "GUIDED", proof_s=0.0)
         self._end, self._begun, self._asked_s, self._began_s = (
@@ -69,23 +65,14 @@ class PlaneDriver(DeviceDriver):
         )
         self._state: RigidBodyState | None = None
         self._newest_ms, self._newer_s = -1, time.monotonic()
-        self._over = threading.Event()
-        key = read_key(settings.signing_key) if settings.signing_key else b""
-        self._link = open_link(settings.port, settings.baud, key, patience_s)
-        self._commands: Commands | None = None
         self._parameters: Parameters | None = None
-        self._thread = threading.Thread(target=self._run, name="mavlink reader", daemon=True)
-        self._thread.start()
-        try:
-            self._autopilot: Address = wait_for_autopilot(self._link, settings.port, patience_s)
+        # In silence no heartbeats: without them ArduPlane's failsafe acts.
+        self._session = MavlinkSession(
+            settings, self._feedback, self._take,
+            patience_s=patience_s, beat_s=HEARTBEAT_S, beats=lambda: self._end is not CommandEnd.SILENT,
+        )  # fmt: skip
+        with self._session.connecting():
             self._prepare()
-            self._feedback.wait(patience_s)
-        except OSError as error:
-            self._close_link()
-            raise DeviceError(f"{self._name}: the link is gone ({error}).") from error
-        except BaseException:
-            self._close_link()
-            raise
 
     def take_end(self, end: CommandEnd) -> None:
         """See `TakesEnds`."""
@@ -104,8 +91,8 @@ class PlaneDriver(DeviceDriver):
             words = self._plane.words(time.monotonic())
             says = f" It says {words}." if words else ""
             raise DeviceError(
-                f"{self._name}: it is not armed, in mode {self._plane.mode_name}, and this driver takes over in "
-                f"flight: take off in a mode of its own, then start it.{says}"
+                f"{self._session.name}: it is not armed, in mode {self._plane.mode_name}, and this driver takes over "
+                f"in flight: take off in a mode of its own, then start it.{says}"
             )
         self._begun = True
 
@@ -122,7 +109,8 @@ class PlaneDriver(DeviceDriver):
         elif doing is Doing.FLY:
             assert self._state is not None  # as of the first report
             point = self._set_points.of(self._state, command)
-            self._link.send(attitude_target(point, round(1e3 * (now_s - self._began_s)), self._autopilot))
+            session, since_ms = self._session, round(1e3 * (now_s - self._began_s))
+            session.link.send(attitude_target(point, since_ms, session.autopilot))
             return None
         return self._safe
 
@@ -141,7 +129,7 @@ class PlaneDriver(DeviceDriver):
             return f"the autopilot is {plane.stranger}: what its modes mean is not known"
         if not plane.armed:
             return "the autopilot is not armed: it does not fly"
-        answer = self._commands.refused if self._commands else ""
+        answer = self._session.commands.refused if self._session.commands else ""
         return self._takeover.refusal(
             self._end, plane.mode == GUIDED, now_s, mode=plane.mode_name, answer=answer
         )
@@ -156,47 +144,35 @@ class PlaneDriver(DeviceDriver):
             or ("a failsafe of the autopilot acts" if plane.failsafe else "")
             or (f"the autopilot says {said}" if said else "")
         )
-        return {
-            "battery_v": self._telemetry.voltage,
-            "airspeed_m_s": self._air.airspeed_words,
-            "armed": str(plane.armed).lower(),
-            "autopilot_mode": plane.mode_name,
-            "autopilot_says": plane.words(now_s),
-            "refused_commands": self._commands.refused if self._commands else "",
-            "refused_messages": str(self._link.refused),
-            "refused_positions": str(self._reports.refused),
-            "warning": warning,
-        }
+        measured = {"battery_v": self._telemetry.voltage, "airspeed_m_s": self._air.airspeed_words}
+        known = self._session.health(plane, refused_positions=self._reports.refused)
+        return {**measured, **known, "warning": warning}
 
     def close(self) -> None:
         """Set LOITER where the driver has the craft, and close the link; see `DeviceDriver`."""
         try:
-            if self._begun and self._plane.mode == GUIDED and self._commands is not None:
+            if self._begun and self._plane.mode == GUIDED:
                 self._set_mode(LOITER)
         except OSError:
             pass  # it is gone; the autopilot flies on by its own failsafe
         finally:
-            self._close_link()
+            self._session.close()
 
     def _prepare(self) -> None:
         """Ask for telemetry, and set and check the failsafe where the driver may take over."""
-        self._commands = commands = Commands(self._link.send, self._autopilot)
-        self._parameters = Parameters(self._link.send, self._autopilot, bytewise=False)
-        for name, rate in RATES_HZ.items():
-            kind = getattr(mavlink, f"MAVLINK_MSG_ID_{name}")
-            commands.tell(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, float(kind), 1e6 / rate)
+        session = self._session
+        self._parameters = Parameters(session.link.send, session.autopilot, bytewise=False)
+        session.ask_for(RATES_HZ)
         if not self._settings.arm:
             return
-        end_s = time.monotonic() + OBEYS_S
-        while not self._plane.beats and time.monotonic() < end_s:
-            time.sleep(0.02)
+        session.await_heartbeat(self._plane)
         if self._plane.stranger:
             raise DeviceError(
-                f"{self._name}: the autopilot is {self._plane.stranger}. Nothing is set or taken over."
+                f"{session.name}: the autopilot is {self._plane.stranger}. Nothing is set or taken over."
             )
         problem = self._parameters.protect(protection(self._settings), ANSWERS_S)
         if problem:
-            raise DeviceError(f"{self._name}: {problem}. Nothing is taken over.")
+            raise DeviceError(f"{session.name}: {problem}. Nothing is taken over.")
 
     def _ask(self, mode: int) -> None:
         now_s = time.monotonic()
@@ -205,38 +181,16 @@ class PlaneDriver(DeviceDriver):
             self._set_mode(mode)
 
     def _set_mode(self, mode: int) -> None:
-        assert self._commands is not None
+        commands = self._session.commands
+        assert commands is not None
         custom = float(mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED)
-        self._commands.tell(mavlink.MAV_CMD_DO_SET_MODE, custom, float(mode))
-
-    def _close_link(self) -> None:
-        self._over.set()
-        self._thread.join(0.5)
-        with contextlib.suppress(OSError):
-            self._link.close()
-
-    def _run(self) -> None:
-        beaten_s, known = 0.0, False
-        while not self._over.is_set():
-            now_s, there = time.monotonic(), self._link.autopilot is not None
-            try:
-                # In silence none: without them ArduPlane's failsafe acts. At once to one that has just spoken.
-                due = now_s - beaten_s >= HEARTBEAT_S or known is not there
-                if due and self._end is not CommandEnd.SILENT:
-                    beaten_s, known = now_s, there
-                    self._link.send(heartbeat())
-                for message in self._link.receive():
-                    self._take(message)
-            except OSError as error:
-                self._feedback.fail(f"the link is gone ({type(error).__name__}: {error})")
-                return
+        commands.tell(mavlink.MAV_CMD_DO_SET_MODE, custom, float(mode))
 
     def _take(self, message: Any) -> None:
         """Take a message of the autopilot."""
         self._plane.take(message, time.monotonic())
-        for part in (self._commands, self._parameters):
-            if part is not None:
-                part.take(message)
+        if self._parameters is not None:
+            self._parameters.take(message)
         self._air.take(message)
         report = self._telemetry.take(message, time.time_ns())
         if report is None or report.odometry is None or self._stands_still(message):

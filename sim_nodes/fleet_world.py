@@ -1,8 +1,9 @@
 """Several robots in one MuJoCo world: each is a backend of its own, and the world moves on when all are ready.
 
 In lock step the world waits for every robot that takes part. By the clock it waits for a fraction of a tick, and goes
-on with the last command of a robot that is late. A robot that leaves stays where physics takes it, with its actuators
-in their safe state, and the others go on.
+on with the last command of a robot that is late. The ticks that a robot missed are over: its next step does not do them
+again, and its sample says how many they were, so that all robots have one time. A robot that leaves stays where physics
+takes it, with its actuators in their safe state, and the others go on.
 """
 
 from __future__ import annotations
@@ -90,6 +91,7 @@ class FleetWorld:
         with self._turn:
             place()
             robot.takes_part, robot.left_ticks = True, 0
+            robot.more_ticks, robot.read_ticks = self.ticks - robot.read_ticks, self.ticks
             self._awaited.discard(robot.name)
             mujoco.mj_forward(self._scene.model, self._scene.data)
             for each in [robot] if self._awaited else list(self.robots.values()):
@@ -102,18 +104,24 @@ class FleetWorld:
                 self._awaited.clear()
 
     def advance(self, robot: FleetRobot, take: Callable[[], None], ticks: int) -> None:
-        """Let a robot take a command, and ticks pass for it; returns once they have."""
+        """Let a robot take a command, and ticks pass for it; returns once they have.
+
+        Those that the world did since the robot's last sample count: it came late for them.
+        """
         with self._turn:
             take()
-            robot.left_ticks = ticks
+            before = robot.read_ticks
+            robot.left_ticks = max(0, ticks - (self.ticks - before))
+            if not robot.left_ticks:
+                self._read(robot)
             self._move()
             if self._lockstep:
                 self._turn.wait_for(lambda: robot.left_ticks == 0)
-                return
             while robot.left_ticks:
                 rounds = self._rounds
                 if not self._turn.wait_for(lambda: self._rounds != rounds, self._late_s):  # noqa: B023
                     self._move(late=True)
+            robot.more_ticks = max(0, robot.read_ticks - before - ticks)
 
     def begin_all(self, episodes: Mapping[str, Episode], *, seed: int) -> dict[str, Sample]:
         """Begin an episode of every robot, from one thread; see `Backend.reset`."""
@@ -152,14 +160,18 @@ class FleetWorld:
         for _ in range(count):
             self._tick()
         mujoco.mj_forward(self._scene.model, self._scene.data)
+        self._rounds += 1
+        self.ticks += count
         for robot in ready:
             robot.left_ticks -= count
             if not robot.left_ticks:
-                robot.read()
-        self._rounds += 1
-        self.ticks += count
+                self._read(robot)
         self._on_tick(self.ticks)
         self._turn.notify_all()
+
+    def _read(self, robot: FleetRobot) -> None:
+        robot.read()
+        robot.read_ticks = self.ticks
 
     def _tick(self) -> None:
         begun = [robot for robot in self.robots.values() if robot.commanded]
@@ -180,6 +192,8 @@ class FleetRobot:
         name: Of the robot.
         takes_part: Whether the world waits for it.
         left_ticks: That it waits for.
+        read_ticks: Of the world, when its last sample was read.
+        more_ticks: That passed before that sample beside those it asked for: it was late.
         commanded: Whether a command has come since its episode began; before, it stays where it starts.
         is_driven: Whether its plant applies what its controller commands; asked while it takes part.
     """
@@ -193,6 +207,7 @@ class FleetRobot:
         )
         self._world = OneWorld(member.robot, noisy=noisy)
         self.takes_part, self.left_ticks, self.commanded = False, 0, False
+        self.read_ticks = self.more_ticks = 0
         self._stands = True  # where it is, until it begins
         self._at = self._part.data.qpos.copy()
         self._truth: Truth | None = None
@@ -320,4 +335,9 @@ class FleetRobot:
     def _sample(self, odometry: RigidBodyState) -> Sample:
         assert self._truth is not None
         others = self._sensors.measure(self._truth, self._part.data.time)
-        return Sample({"odometry": Reading(odometry), **others}, self._truth.state, neighbours=self._others)
+        return Sample(
+            {"odometry": Reading(odometry), **others},
+            self._truth.state,
+            more_ticks=self.more_ticks,
+            neighbours=self._others,
+        )

@@ -63,7 +63,7 @@ class OnAir:
             sample = self._backend.step(applied, ticks, begins=begins)
         else:
             sample = self._backend.stand(ticks, begins=begins)
-        seconds = ticks * self.robot.timing.physics_dt
+        seconds = (ticks + sample.more_ticks) * self.robot.timing.physics_dt
         with self._lock:
             self._carried_s += seconds if on else 0.0
             self._open_s += seconds if self._open else 0.0

@@ -16,6 +16,7 @@ from fulmar_ros.plant_node import PlantNode
 from fulmar_ros.plant_settings import PlantSettings
 from fulmar_ros.runtime import run_node
 from sim_nodes.camera.opengl import check_variable
+from sim_nodes.jsbsim_loadable import check_jsbsim
 from sim_nodes.on_air import CanStand, OnAir
 
 BACKENDS = ("mujoco", "mock", JSBSIM, BASILISK)
@@ -40,6 +41,7 @@ def _simulator(robot: Robot, settings: PlantSettings) -> CanStand:
 
         return MockBackend(robot, things=task.things)
     if is_jsbsim(settings.backend):
+        check_jsbsim()
         from sim_nodes.jsbsim_backend import JsbsimBackend
 
         model = jsbsim_model(robot, settings.backend)

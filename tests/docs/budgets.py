@@ -38,7 +38,11 @@ INSTEAD = {
         "fulmar evaluate turtlebot2 go_to_pose --controller classical --through batch --episodes 4"
     ),
     "fulmar identify runs/...": "fulmar identify runs/*excite*",
-    "fulmar new airframe GEOMETRY --out FILE": "fulmar new airframe geometry.yaml --out wing.yaml",
+    "fulmar new airframe GEOMETRY --out FILE": (
+        f"fulmar new airframe {ROOT / 'tests/peers/airship_v7_geometry.yaml'} --out wing.yaml"
+    ),
+    "fulmar new robot NAME --like ROBOT --urdf FILE": "fulmar new robot husky --like turtlebot2 --urdf husky.urdf",
+    "fulmar new task NAME": "fulmar new task dock_gate",
     "fulmar export RUN --out DIR": "fulmar export runs/train/mine --out runs/bundles/exported",
     "fulmar export runs/train/... --out bundles/dock": "fulmar export runs/train/*dock* --out bundles/dock",
     "fulmar train --resume RUN --time-limit 3600": "fulmar train --resume runs/train/mine --time-limit 3 --episodes 4",
@@ -80,6 +84,9 @@ INSTEAD = {
     "fulmar goals circle --robot turtlebot2 --name alpha": (
         f"{CTRL_C} fulmar goals circle --robot turtlebot2 --name alpha"
     ),
+    "fulmar goals fleet_alpha --robot floating_platform --name alpha": (
+        f"{CTRL_C} fulmar goals fleet_alpha --robot floating_platform --name alpha"
+    ),
     "fulmar goals upright_circle --robot spacecraft_16": (
         f"{CTRL_C} fulmar goals upright_circle --robot spacecraft_16"
     ),
@@ -96,10 +103,15 @@ PARTS = [
     (r" \[--parts \S+\] \[--json\]$", ""),
     (r" --platforms \d+", " --platforms 1"),
     (r" --seeds 5", " --seeds 2"),
-    (r" --episodes \d+", " --episodes 4"),
+    (r" --episodes \d{2,}", " --episodes 4"),
     (r"^(fulmar train (?!.*--(?:time-limit|updates)).*)$", r"\1 --updates 1"),
     (r"^(fulmar (?:train|evaluate) (?!.*--episodes).*)$", r"\1 --episodes 4"),
-    (r"^(fulmar run cubesat_wheels (?!.*--duration).*)$", r"\1 --duration 90"),
+    (r"^(fulmar run cubesat_wheels (?!.*--duration).*)$", r"\1 --duration 75"),
+    (r"^(fulmar run cubesat_wheels --scenario gyro_dies --duration) 120", r"\1 75"),  # it dies after 60 s
+    (  # thousands of steps; they begin in trim
+        r"^(.*fulmar run (?:airship_v7|navion|cessna_182) (?!.*--(?:duration|scenario))(?=.*--lockstep).*)$",
+        r"\1 --duration 15",
+    ),
     (r"^(fulmar run (?!.*--(?:lockstep|duration)).*)$", r"\1 --duration 5"),
     (r"^(fulmar run (?!.*--lockstep).* --duration) 120", r"\1 15"),
     (r"^(fulmar run (?!.*--lockstep).* --duration) 30", r"\1 5"),

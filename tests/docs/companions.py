@@ -47,6 +47,7 @@ BESIDE = {
     "fulmar estop turtlebot2": (f"{TURTLEBOT} --estop",),
     "fulmar status turtlebot2 --wait active --timeout 30 && python my_goals.py": (TURTLEBOT,),
     "fulmar teleop turtlebot2": (TURTLEBOT,),
+    "fulmar doctor --for sim": (),  # no robot takes its processor
     "fulmar up mujoco_lqr --estop --only controller": (PLANT,),
     "fulmar status floating_platform --node plant": (PLANT, f"{PLANT[:-5]}controller"),
     BETA: (ALPHA,),
@@ -114,13 +115,21 @@ CODES: dict[str, tuple[int, ...]] = {
     "fulmar run sentry --task go_to_position --controller my_control:KeepOff --lockstep --record bag": (1,),
     # The board measures no position.
     "fulmar run floating_platform --backend hardware --hardware relay_board.yaml --goal 0.5,0": (1,),
+    # Gusts carry it further than it may go.
+    "fulmar run airship_v7 --task fly_hold --controller lqi --scenario light_turbulence --lockstep --seed 3": (
+        1,
+    ),
     # The recorded commands are those of another controller.
     "fulmar bag rerun BAG --controller my_control:Steer": (1,),
     "fulmar bag rerun BAG --controller classical --from odometry": (1,),
-    # Its policy has learned for three seconds.
-    "fulmar run mybot --task go_to_position --policy runs/bundles/mybot --lockstep": (0, 1),
     # The clock of a computer that tests may follow no other one, as that of a robot has to.
     "fulmar doctor --for hardware relay_board.yaml": (0, 1),
+}
+# Whole runs of policies that have learned for three seconds: they may miss their goals.
+LEARNED_BRIEFLY = {
+    "fulmar run mybot --task go_to_position --policy runs/bundles/mybot --lockstep",
+    "fulmar run floating_platform --policy runs/bundles/first --lockstep --seed 7",
+    "fulmar run hexbot --task go_to_pose --policy runs/bundles/hexbot --lockstep --seed 3",
 }
 CLUSTER = "needs a Ray cluster; tests/training has one of two nodes"
 # Lines that no test of one machine can run, and why.
@@ -141,8 +150,9 @@ def prepare(page: str, lines: list[Line], folder: Path) -> None:
         write_sentry(folder)
     if page in ("own-driver", "new_robot"):
         _relay_board(folder)
-    if page == "new_robot":
+    if page in ("new_robot", "commands"):
         (folder / "husky.urdf").write_text(TURTLE, encoding="utf-8")
+    if page == "new_robot":
         (folder / "four.xml").write_text(FOUR, encoding="utf-8")
     if page == "bags":
         write_foreign(folder / "theirs", StoragePlugin.MCAP, commands=True, velocity="/base/velocity")

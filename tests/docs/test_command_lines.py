@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 
 from tests.docs import budgets, companions
 from tests.docs.command_lines import Line, all_lines, lines_of
-from tests.docs.page_run import PARTS_OF_TEST, left_out, pages_of
-from tests.docs.shell import SERVERS
+from tests.docs.page_run import PARTS_OF_TEST, is_fine, left_out, pages_of
+from tests.docs.shell import SERVERS, Outcome
 
 MOST_MARKED = 10
+PLACEHOLDER = re.compile(r"(?<!-s )\b[A-Z]{2,}\b")  # but for the name of a signal
+BRIEFLY = min(companions.LEARNED_BRIEFLY)
 PAGE = """
 <!-- needs hardware: fulmar run a ... -->
 
@@ -73,10 +77,20 @@ def test_every_page_is_run_by_one_of_the_two_tests(lines):
         ("what is left out", companions.EXCLUDED),
         ("what needs an environment", companions.NEEDS),
         ("what ends with another code", companions.CODES),
+        ("what has learned briefly", companions.LEARNED_BRIEFLY),
     ],
 )
 def test_every_row_of_a_table_is_a_line_of_the_docs(name, table, lines):
     assert set(table) - {line.text for line in lines} == set(), name
+
+
+def test_no_line_runs_with_a_placeholder(lines):
+    run = [
+        budgets.shortened(line.text)
+        for line in lines
+        if not line.marker and line.text not in companions.EXCLUDED
+    ]
+    assert [text for text in run if PLACEHOLDER.search(text)] == []
 
 
 def test_every_budget_and_every_kind_of_server_is_used(lines):
@@ -109,3 +123,20 @@ def test_learning_real_time_and_benchmarks_have_smaller_budgets(shown, run):
 def test_a_marked_line_does_not_run(lines):
     marked = [line for line in lines if line.marker]
     assert all(left_out(line) for line in marked)
+
+
+@pytest.mark.parametrize(
+    ("shown", "run", "code", "output", "fine"),
+    [
+        ("fulmar run a", "fulmar run a", 0, "goal met", True),
+        ("fulmar run a", "fulmar run a", 1, "goal missed", False),
+        ("fulmar run a", "fulmar run a --duration 5", 1, "goal missed", True),
+        ("fulmar run a", "fulmar run a --duration 5", 1, "Traceback", False),
+        (BRIEFLY, BRIEFLY, 1, "goal missed", True),
+        (BRIEFLY, BRIEFLY, 1, "Traceback", False),
+    ],
+)
+def test_a_run_cut_short_or_of_a_policy_that_learned_briefly_may_only_miss_its_goal(
+    shown, run, code, output, fine
+):
+    assert is_fine(Outcome(run, code, 1.0, output), shown) is fine

@@ -11,9 +11,13 @@ from geometry_msgs.msg import PoseArray
 from mcap.records import Channel, Message, Schema
 from rclpy.serialization import serialize_message
 
+from fulmar_bags import contents
+from fulmar_bags.bag_reading import BagReading
 from fulmar_bags.mcap_records import read_records
+from fulmar_bags.message_reader import goal_of
 from fulmar_bags.message_types import type_store
 from fulmar_bags.run_record import read_run
+from fulmar_bags.wire_reader import WireReader
 from fulmar_bags.writer import BagWriter
 from fulmar_core.config.errors import BagError
 from fulmar_core.robots.robot_file import load_robot
@@ -94,6 +98,22 @@ def test_of_several_files_an_empty_one_costs_only_itself(reached, tmp_path):
     record = read_run(parts)
     assert 0 < whole - len(record.truth) <= 1000
     assert any("parts_2.mcap" in warning for warning in record.warnings)
+
+
+@pytest.mark.parametrize("info", [{"robot": "floating_platform"}, {}])
+def test_names_of_topics_are_not_compared_anew_for_each_message(info, tmp_path, monkeypatch):
+    compared = []
+    monkeypatch.setattr(contents, "is_of_wire", lambda topic, wire: compared.append(topic))
+    bag = BagWriter(tmp_path / "bag", run_info=info)
+    kind, topic = GOAL_WIRES["goal_pose"].type, "/floating_platform/goal_pose"
+    bag.add_topic(topic, kind, "latched")
+    for log_ns in range(1, 101):
+        message = goal_message(goal_at((2.5, -1.5, 0.0)), "goal_pose", log_ns)
+        bag.write(topic, serialize_message(message), log_ns=log_ns)
+    bag.close()
+    opened = contents.open_bag(tmp_path / "bag", BagReading(topics={"goal_pose": topic}))
+    assert len(WireReader(opened).received(GOAL_WIRES["goal_pose"], goal_of)) == 100
+    assert len(compared) < 10
 
 
 def test_a_goal_point_is_a_goal_too(tmp_path):

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from fulmar_bringup.core_probe import alike, ends_of
 from fulmar_bringup.envelope_check import envelope_note, envelope_problems, other_core
 from fulmar_cli.diagnosis.installation import check_envelopes
 from fulmar_core.config.source_hash import core_sha256, robot_sha256
@@ -22,7 +24,7 @@ from fulmar_evaluation.certify import again
 from fulmar_evaluation.certify.conditions import axes_of
 from fulmar_evaluation.certify.document import plain_axes, write_into_passport
 from fulmar_evaluation.certify.procedure import Run, Sizes
-from policy_server.controllers import shipped_policies, shipped_policy
+from policy_server.controllers import Choice, load_controller, shipped_policies, shipped_policy
 
 PAIRS = {
     "floating_platform": "go_to_pose",
@@ -112,6 +114,31 @@ def test_a_set_of_another_core_is_named_and_refused_only_where_a_set_is_required
     code, _, err = fulmar("bundle", "check", folder, "--require-envelope")
     assert code == 2 and "--again --write" in err
     assert check_envelopes().level == "advice" and "another version" in check_envelopes().found
+
+
+def test_other_sources_that_move_the_robot_alike_leave_a_set_valid(certified, monkeypatch):
+    envelope = read_passport(certified).envelope
+    envelope["hashes"]["core"] = "of other sources"
+    robot, task = load_robot("floating_platform"), load_task("go_to_pose")
+    policy = load_controller(
+        "policy", robot, task, Choice(read_passport(certified).control_hz, str(certified))
+    )
+    write_into_passport(certified, envelope | {"probe": ends_of(policy, robot, task)})
+    assert other_core(certified) == ""
+    heavier = replace(robot, body=replace(robot.body, mass=1.05 * robot.body.mass))
+    write_into_passport(certified, envelope | {"probe": ends_of(policy, heavier, task)})
+    assert "moves the robot otherwise" in other_core(certified)
+
+
+@pytest.mark.parametrize("record", [None, "text", [[0.0, 0.0]], [["a", 0.0, 0.0]] * 8])
+def test_a_record_that_is_none_is_of_no_core(record):
+    assert not alike(record, [[0.0, 0.0, 0.0]] * 8)
+
+
+def test_one_episode_in_which_a_rounding_opened_a_valve_later_does_not_count():
+    before = [[0.0, 0.0, 0.0]] * 8
+    assert alike(before, [[0.01, 0.0, 0.0], *before[1:]])
+    assert not alike(before, [[0.01, 0.0, 0.0]] * 2 + before[2:])
 
 
 def test_a_platform_with_a_payload_is_outside(certified):

@@ -5,8 +5,10 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from fulmar_core.config.errors import ConfigError
@@ -33,7 +35,7 @@ def run(monkeypatch: pytest.MonkeyPatch) -> list[int]:
         return FleetOutcome({"robots": robots, "least_distance_m": near}, failure)
 
     monkeypatch.setattr(fleet_seeds, "run_fleet_and_evaluate", outcome)
-    monkeypatch.setattr(fleet_seeds, "crossed_robots", lambda _plan: ())
+    monkeypatch.setattr(fleet_seeds, "crossed_robots", lambda _records, lockstep: ())
     return seeds
 
 
@@ -69,7 +71,12 @@ def test_a_seed_during_which_a_person_stops_the_evaluation_has_no_result(
 
 def test_results_of_another_fleet_or_way_to_run_do_not_count(run: list[int], tmp_path: Path) -> None:
     evaluate_seeds(CHOICE, [0], tmp_path, lambda _: None)
-    for other in (replace(CHOICE, lockstep=False), replace(CHOICE, keep_apart=False), Choice("fleet")):
+    for other in (
+        replace(CHOICE, lockstep=False),
+        replace(CHOICE, keep_apart=False),
+        replace(CHOICE, duration_s=9.0),
+        Choice("fleet"),
+    ):
         with pytest.raises(ConfigError, match="Give another folder: --results DIR"):
             evaluate_seeds(other, [0], tmp_path, lambda _: None)
     (tmp_path / "seed_000.json").write_text(json.dumps({"about": {}}))
@@ -83,3 +90,34 @@ def test_commands_that_crossed_and_runs_without_a_bag_are_named() -> None:
         "seed 5: 0 of 4 arrived, least distance not recorded; commands of another robot reached beta; "
         "the nodes did not get ready"
     )
+
+
+def record_of(applied: list[list[float]], commanded: list[list[float]], late_s: float = 0.03) -> Any:
+    """A platform's record: commands every 0.1 s, and what its plant applied so much later."""
+    effort = [np.zeros((len(rows), 8)) for rows in (applied, commanded)]
+    for table, rows in zip(effort, (applied, commanded), strict=True):
+        table[:, : len(rows[0])] = rows
+    stamp_s = 0.1 * np.arange(len(applied))
+    wires = [
+        SimpleNamespace(stamp_s=stamp_s[: len(table)], publish_s=stamp_s[: len(table)] + later, effort=table)
+        for table, later in zip(effort, (late_s, 0.0), strict=True)
+    ]
+    return SimpleNamespace(info={"robot": "floating_platform"}, applied=wires[0], commanded=wires[1])
+
+
+@pytest.mark.parametrize("lockstep", [True, False])
+def test_a_plant_that_applies_the_command_of_another_controller_is_named(lockstep: bool) -> None:
+    own, other = [[1.0], [0.5], [0.0]], [[1.0], [0.4], [0.0]]
+    records = {"alpha": record_of(own, own), "beta": record_of(own, other)}
+    assert fleet_seeds.crossed_robots(records, lockstep=lockstep) == ("beta",)
+
+
+def test_by_the_clock_a_plant_may_apply_an_earlier_command_or_rest_and_no_command_to_come() -> None:
+    commanded = [[0.2], [0.4], [0.6], [0.8]]
+    records = {
+        "holds": record_of([[0.2], [0.2], [0.4], [0.8]], commanded),
+        "rests": record_of([[0.2], [0.0], [0.0], [0.0]], commanded),
+        "foresees": record_of([[0.4], [0.4], [0.6], [0.8]], commanded),
+        "of_long_ago": record_of([[0.2]] * 4, commanded, late_s=1.2),
+    }
+    assert fleet_seeds.crossed_robots(records, lockstep=False) == ("foresees", "of_long_ago")

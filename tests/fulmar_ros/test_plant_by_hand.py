@@ -6,9 +6,11 @@ import time
 
 import numpy as np
 import pytest
+from rclpy.lifecycle import TransitionCallbackReturn
 from std_msgs.msg import Bool
 
 from fulmar_core.simulation.backend import Sample
+from fulmar_ros.plant_node import PlantNode
 from tests.fulmar_ros.by_hand import PLATFORM, DrivenPlant, ros
 
 OPEN, SHUT = [1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0], [0.0] * 8
@@ -118,3 +120,18 @@ def test_a_plant_that_is_activated_again_begins_with_the_safe_command(plant):
     plant.node.trigger_activate()
     assert output(plant) == SHUT
     assert np.array_equal(plant.node.guard.command, PLATFORM.actuators.safe_command)
+
+
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [(RuntimeError("no CPU of this kind"), "RuntimeError: no CPU of this kind"), (OSError(), "OSError")],
+)
+def test_a_backend_that_cannot_be_made_is_said_with_its_reason(ros_domain, error, said):
+    def fail(_robot, _settings):
+        raise error
+
+    with ros():
+        node = PlantNode(fail, lambda _code: None, cli_args=["--ros-args", "-p", "autostart:=false"])
+        assert node.trigger_configure() != TransitionCallbackReturn.SUCCESS
+        assert node.health.reason == said
+        node.stop()

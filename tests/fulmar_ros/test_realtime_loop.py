@@ -76,6 +76,20 @@ def test_a_refusal_of_the_device_reaches_the_guard_before_the_next_command():
     assert guard.held == "the autopilot is in mode 4 (HOLD)"
 
 
+def test_steps_that_a_world_did_without_the_robot_pass_on_its_clock_too():
+    seen, clock = [], SimulatedTime()
+    samples = iter([Sample({}, None, more_ticks=2), Sample({}, None)])
+    backend = SimpleNamespace(robot=ROBOT, step=lambda _command: next(samples))
+    guard = ActuatorGuard(ROBOT.actuators, Watchdog(10**9))
+    feedback = SimpleNamespace(grounds=None, see=lambda _command, seconds, _sample: seen.append(seconds))
+    loop = RealtimeLoop(backend, quiet_wires(), guard, clock, rate=50.0, feedback=feedback)
+    begun_ns = clock.now_ns
+    loop.run(Sample({}, None), 4, threading.Event())
+    dt = ROBOT.timing.physics_dt
+    np.testing.assert_allclose(seen, (3.0 * dt, dt))
+    assert (loop.ticks, clock.now_ns - begun_ns) == (4, round(4e9 * dt))
+
+
 def test_an_aircraft_is_brought_down_after_its_last_tick():
     doing = iter(["glides", "glides", "glides", DOWN])
     guard = SimpleNamespace(handed_over=False, doing="", see_refusal=_ignore, fail=_ignore)

@@ -153,8 +153,8 @@ def test_a_closed_connection_is_reported_at_once(bench, driver):
 @pytest.mark.parametrize("kind", ["mavlink"], indirect=True)
 def test_an_autopilot_without_its_host_holds_by_its_own_failsafe(bench, driver):
     drive(driver, (1.0, 1.0), 0.5)
-    driver._driver._over.set()  # as a process that was killed: neither heartbeats nor overrides
-    driver._driver._thread.join()
+    driver._driver._session.over.set()  # as a process that was killed: neither heartbeats nor overrides
+    driver._driver._session._thread.join()
     silent = time.monotonic()
     until(lambda: not bench.command.any())
     assert time.monotonic() - silent < 3.2

@@ -144,6 +144,15 @@ def test_odometry_airspeed_and_height_come_in(bench, driver):
     assert driver.health()["airspeed_m_s"]
 
 
+def test_heights_are_those_above_the_autopilots_origin_wherever_the_craft_is_taken_over(bench, driver):
+    """A craft that is taken over in 40 m, and asked to fly in 1 m, has to descend."""
+    sample = fly(driver, 0.2)
+    height = sample.odometry.position_in_world[2]
+    assert height == pytest.approx(bench.sample.truth.position_in_world[2], abs=0.1)
+    air = sample.readings["air_data"].value
+    assert height == pytest.approx(dict(zip(air.names, air.values, strict=True))["height"], abs=0.1)
+
+
 def test_under_the_e_stop_it_loiters_at_once(bench, driver):
     taken(bench, driver)
     until(lambda: fly(driver, end=CommandEnd.STOPPED) and bench.device.mode == LOITER, timeout_s=0.6)
@@ -171,7 +180,7 @@ def test_in_silence_set_points_and_heartbeats_stop_and_its_failsafe_flies_home(b
 
 def test_a_dead_driver_leaves_the_plane_to_its_failsafe(bench, driver):
     taken(bench, driver)
-    driver._driver._over.set()  # no heartbeat any more, and no farewell
+    driver._driver._session.over.set()  # no heartbeat any more, and no farewell
     until(lambda: bench.device.mode == RTL, timeout_s=3.0)
 
 

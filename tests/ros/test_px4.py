@@ -31,6 +31,7 @@ pytestmark = [pytest.mark.real_time, pytest.mark.timeout(240)]
 
 ROBOT = "modular_freeflyer"
 OPEN = [1.0] + [0.0] * 7
+STARTS_AND_ENDS_S = 60.0  # of a run on a busy machine: PX4's proof of the stream and its rehearsal take 5 s
 
 
 @pytest.fixture
@@ -110,8 +111,20 @@ def test_a_silent_controller_leaves_px4_to_its_failsafe(
     until(lambda: stop.publish() or words in neighbour.said["plant"][1].get(WARNINGS, ""), 5.0)
 
 
-def run(*words: str, env: dict[str, str], cwd: Path) -> dict:
-    done = fulmar("run", *words, "--backend", "hardware", "--emulate", "--arm", "--json", env=env, cwd=cwd)
+def run(*words: str, seconds: float, env: dict[str, str], cwd: Path) -> dict:
+    """The summary of a run of so many seconds in real time, which are fewer than `fulmar` waits for its end."""
+    asked = (
+        "run",
+        *words,
+        "--duration",
+        str(seconds),
+        "--backend",
+        "hardware",
+        "--emulate",
+        "--arm",
+        "--json",
+    )
+    done = fulmar(*asked, env=env, cwd=cwd, timeout_s=seconds + STARTS_AND_ENDS_S)
     assert done.stdout, done.stderr
     summary = json_of(done.stdout)
     assert summary["failure"] is None, (summary["failure"], done.stderr)
@@ -122,13 +135,13 @@ def run(*words: str, env: dict[str, str], cwd: Path) -> dict:
 def test_a_free_flyer_reaches_its_goal_through_px4(ros_domain: RosDomain, tmp_path: Path) -> None:
     """The command of the manual, with MuJoCo behind an emulated PX4."""
     goal = ("--controller", "lqr", "--hardware", "modular_freeflyer_px4", "--goal", "0.5,0.3")
-    assert run(ROBOT, *goal, env=ros_domain.env, cwd=tmp_path)["success"]
+    assert run(ROBOT, *goal, seconds=50.0, env=ros_domain.env, cwd=tmp_path)["success"]
 
 
 @pytest.mark.slow
 def test_sixteen_thrusters_in_space_reach_a_pose_through_px4(ros_domain: RosDomain, tmp_path: Path) -> None:
     goal = ("--controller", "lqr", "--hardware", "spacecraft_16_px4", "--goal", "0.5,0,0.3,0,0,0")
-    assert run("spacecraft_16", *goal, env=ros_domain.env, cwd=tmp_path)["success"]
+    assert run("spacecraft_16", *goal, seconds=50.0, env=ros_domain.env, cwd=tmp_path)["success"]
 
 
 @pytest.mark.slow
@@ -136,8 +149,8 @@ def test_sixteen_thrusters_in_space_reach_a_pose_through_px4(ros_domain: RosDoma
 def test_a_wing_holds_its_height_through_an_autopilot(
     hardware: str, ros_domain: RosDomain, tmp_path: Path
 ) -> None:
-    flight = ("--controller", "lqi", "--hardware", hardware, "--duration", "12")
-    summary = run("volantex_ranger", *flight, env=ros_domain.env, cwd=tmp_path)
+    flight = ("--controller", "lqi", "--hardware", hardware)
+    summary = run("volantex_ranger", *flight, seconds=12.0, env=ros_domain.env, cwd=tmp_path)
     assert summary["task"] == "fly_hold"
     assert summary["final_position_error_m"] < 1.0
 

@@ -148,6 +148,48 @@ def test_by_the_clock_a_robot_that_hangs_holds_no_other_up():
     assert world.ticks >= STEPS
 
 
+def late_pair():
+    """A world by the clock in which `beta` always comes after the world has gone on without it."""
+    known = members({"alpha": "floating_platform", "beta": "floating_platform"})
+    world = FleetWorld(known, lockstep=False, rate=20.0)
+    places = {"alpha": (0.0, 0.0), "beta": (3.0, 0.0)}
+    world.begin_all({name: episode_of(known[name], place, 0.1) for name, place in places.items()}, seed=1)
+    return world
+
+
+def test_by_the_clock_robots_that_never_come_together_tick_the_world_once_a_tick_of_theirs():
+    world, rest = late_pair(), np.zeros(8)
+    paths = {name: [world.robots[name].sample().truth] for name in world.robots}
+    for _ in range(STEPS):
+        for name, path in paths.items():
+            sample = world.robots[name].step(rest)
+            assert sample.more_ticks == 0
+            path.append(sample.truth)
+    assert world.ticks == STEPS
+    for path in paths.values():
+        moved = path[-1].position_in_world - path[0].position_in_world
+        np.testing.assert_allclose(moved, STEPS * world.tick_s * path[-1].velocity_in_world, atol=1e-6)
+
+
+def test_by_the_clock_a_robot_that_missed_ticks_has_the_time_of_the_others_again():
+    world, rest = late_pair(), np.zeros(8)
+    assert world.robots["alpha"].step(rest).more_ticks == 0
+    before = world.robots["beta"].step(rest).truth.position_in_world[0]
+    for _ in range(5):
+        world.robots["alpha"].step(rest)
+    late = world.robots["beta"].step(rest)
+    assert (world.ticks, late.more_ticks) == (6, 4)
+    moved = late.truth.position_in_world[0] - before
+    np.testing.assert_allclose(moved, 5 * world.tick_s * late.truth.velocity_in_world[0], atol=1e-6)
+    assert world.robots["beta"].step(rest).more_ticks == 0
+    assert world.ticks == 7
+    world.robots["beta"].make_safe()
+    for _ in range(3):
+        world.robots["alpha"].step(rest)
+    known = members({"beta": "floating_platform"})["beta"]
+    assert world.robots["beta"].reset(episode_of(known, (3.0, 0.0)), seed=1).more_ticks == world.ticks - 7
+
+
 def test_a_robot_knows_where_the_others_are():
     known = members({"alpha": "floating_platform", "beta": "floating_platform"})
     world, seen = FleetWorld(known, lockstep=True), {}

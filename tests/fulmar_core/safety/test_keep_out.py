@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -54,12 +56,27 @@ class Malicious:
         return (np.broadcast_to(along, (len(place), len(self._push))) > 0.0).astype(float)
 
 
-def flown(name: str, thing: str, *, spins: bool, seconds: float, worlds: int = 8, first_m: float = 1.0):
-    """Least distance of each robot from the volume, with a controller that flies straight at the thing."""
+def flown(
+    name: str,
+    thing: str,
+    *,
+    spins: bool,
+    seconds: float,
+    worlds: int = 8,
+    first_m: float = 1.0,
+    filled: float = 1.0,
+):
+    """Least distance of each robot from the volume, with a controller that flies straight at the thing.
+
+    Its tank begins with a share of the full one's pressure.
+    """
     robot, task = load_robot(name), load_task("go_to_pose_3d", thing)
     controller = Malicious(robot, spins=spins)
+    scenario = load_scenario("nominal")
+    supply = replace(scenario.actuation.supply, tank=filled)
+    scenario = replace(scenario, actuation=replace(scenario.actuation, supply=supply))
     simulation = BatchSimulation(
-        robot, task, load_scenario("nominal"), worlds=worlds, seed=3, control_hz=controller.control_hz
+        robot, task, scenario, worlds=worlds, seed=3, control_hz=controller.control_hz
     )
     volume = task.keep_outs[0]
     starts = (volume.radius + first_m) * even_directions(worlds)
@@ -70,7 +87,7 @@ def flown(name: str, thing: str, *, spins: bool, seconds: float, worlds: int = 8
     loop.begin(goal_in_float64(simulation.goal))
     least = np.full(worlds, np.inf)
     for step in range(round(seconds * controller.control_hz)):
-        done = loop.step(simulation.measured, {}, round(1e9 * step * loop.dt))
+        done = loop.step(simulation.measured, simulation.readings, round(1e9 * step * loop.dt))
         simulation.move(done.command)
         least = np.minimum(least, volume.distance(np.stack(simulation.truth.position, axis=-1)))
     return least

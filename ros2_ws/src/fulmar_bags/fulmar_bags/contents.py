@@ -95,9 +95,10 @@ class Bag:
     @property
     def frames(self) -> Frames:
         """Frames of the messages, with the robot's prefix; the only odometry names it where the run record does not."""
+        if self.name:
+            return Frames(f"{self.name}/")
         spaces = {space for topic in self.topics.values() if (space := _space_of(topic))}
-        name = self.name or (spaces.pop() if len(spaces) == 1 else "")
-        return Frames(f"{name}/") if name else PLAIN
+        return Frames(f"{spaces.pop()}/") if len(spaces) == 1 else PLAIN
 
     def number(self, name: str, default: float) -> float:
         """A number of the run record; `default` where it says nothing, or 0.

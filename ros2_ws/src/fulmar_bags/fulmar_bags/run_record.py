@@ -203,7 +203,11 @@ def read_run(path: Path, robot: str | None = None) -> RunRecord:
         BagError: There is no bag, it is empty, Fulmar did not record it, or it is a fleet's and `robot` is not given.
         ConfigError: The fleet has no such robot.
     """
-    bag = open_bag(Path(path), BagReading(robot=robot))
+    return run_in(open_bag(Path(path), BagReading(robot=robot)))
+
+
+def run_in(bag: Bag) -> RunRecord:
+    """The run of a bag that was read; see `read_run`."""
     check_one_robot(bag)
     if bag.info is None:
         found = ", ".join(list(bag.topics)[:3]) or "none"

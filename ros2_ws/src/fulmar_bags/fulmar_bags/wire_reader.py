@@ -122,9 +122,9 @@ class WireReader:
         read: Callable[[Any, Frames], tuple[Any, str]] = lambda message, _: (message.data, ""),
     ) -> tuple[Received, ...]:
         """Messages of a wire without those that `read` finds a problem with; by default those with plain data."""
-        found, problems = [], Counter[str]()
+        found, problems, frames = [], Counter[str](), self.bag.frames
         for index, (log_ns, message) in enumerate(self.messages(wire)):
-            value, problem = read(message, self.bag.frames)
+            value, problem = read(message, frames)
             if problem:
                 problems[problem] += 1
                 continue

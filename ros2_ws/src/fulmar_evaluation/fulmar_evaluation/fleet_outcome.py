@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from fulmar_bags.run_record import RunRecord, read_run
+from fulmar_bags.contents import Bag, open_bag
+from fulmar_bags.run_record import RunRecord, run_in
 from fulmar_bringup.fleet_executor import FleetExecution, execute_fleet
 from fulmar_bringup.fleet_plan import FleetPlan, formation_of
-from fulmar_core.config.errors import FulmarError
+from fulmar_bringup.run_plan import RunPlan
 from fulmar_core.robots.hull_distance import hull_distance
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.states.rotation import yaw_of
@@ -29,6 +31,7 @@ class FleetOutcome:
 
     summary: dict[str, Any]
     failure: str  # why the run did not come to its planned end, or what came too near; empty if neither
+    records: Mapping[str, RunRecord] = field(default_factory=dict)  # of the robots whose bag could be read
 
     @property
     def exit_code(self) -> int:
@@ -56,11 +59,13 @@ def run_fleet_and_evaluate(plan: FleetPlan) -> FleetOutcome:
 
 def evaluate_fleet(plan: FleetPlan, execution: FleetExecution) -> FleetOutcome:
     """Evaluate a fleet's run that has ended, from its bag."""
-    outcomes = {}
+    bags, records, outcomes = OpenBags(plan), dict[str, RunRecord](), {}
     for one in plan.robots:
-        own = execution.robots[one.robot_name]
-        outcomes[one.robot_name] = evaluate_execution(one, own, plan.robot_in_bag(one))
-    records = dict(records_of(plan))
+
+        def read(_path: Path, one: RunPlan = one) -> RunRecord:
+            return records.setdefault(one.robot_name, bags.record_of(one))
+
+        outcomes[one.robot_name] = evaluate_execution(one, execution.robots[one.robot_name], read)
     for name, outcome in outcomes.items():
         outcome.summary[KEPT_APART] = interventions(records[name]) if name in records else None
     errors = shape_errors(records, {one.robot_name: formation_of(plan, one) for one in plan.robots})
@@ -91,18 +96,27 @@ def evaluate_fleet(plan: FleetPlan, execution: FleetExecution) -> FleetOutcome:
         "bag": plan.record if Path(plan.record).exists() else None,
         "failure": failure or None,
     }
-    return FleetOutcome(summary, failure)
+    return FleetOutcome(summary, failure, records)
 
 
-def records_of(plan: FleetPlan) -> list[tuple[str, RunRecord]]:
-    """Records of the robots, as far as they can be read."""
-    found = []
-    for one in plan.robots:
-        try:
-            found.append((one.robot_name, read_run(Path(one.record), plan.robot_in_bag(one))))
-        except FulmarError:
-            continue  # the robot's own result says why
-    return found
+class OpenBags:
+    """The bags of a fleet's run, each of which is read once."""
+
+    def __init__(self, plan: FleetPlan) -> None:
+        """Read nothing yet."""
+        self._plan, self._bags = plan, dict[str, Bag]()
+
+    def record_of(self, one: RunPlan) -> RunRecord:
+        """Record of a robot.
+
+        Raises:
+            FulmarError: It cannot be read.
+        """
+        bag = self._bags.get(one.record)
+        if bag is None:
+            bag = self._bags[one.record] = open_bag(Path(one.record))
+        robot = self._plan.robot_in_bag(one)
+        return run_in(bag if robot is None else bag.of_robot(robot))
 
 
 def interventions(record: RunRecord) -> int:

@@ -8,23 +8,27 @@ from __future__ import annotations
 import hashlib
 import json
 import shutil
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from fulmar_bags.run_record import RunRecord
 from fulmar_bringup.domains import reserved_domains
-from fulmar_bringup.fleet_plan import FleetChoices, FleetPlan, fleet_plan
+from fulmar_bringup.fleet_plan import FleetChoices, fleet_plan
 from fulmar_core.config.atomic_write import write_whole
 from fulmar_core.config.errors import ConfigError
 from fulmar_core.config.paths import config_path
 from fulmar_core.config.process import environment
-from fulmar_evaluation.fleet_outcome import records_of, run_fleet_and_evaluate
+from fulmar_core.robots.robot_file import load_robot
+from fulmar_evaluation.fleet_outcome import run_fleet_and_evaluate
 
 STOPPED = "stopped by"  # how the reason of an end begins that a person asked for
-APPLIED_AS_COMMANDED = 1e-6  # of a command, in what the plant applied at the same stamp
+APPLIED_AS_COMMANDED = 1e-6  # of a command, in what the plant applied
+HELD_S = 1.0  # at most, that a plant applies a command without a newer one, by the wall clock [s]
+SENT_BY_S = 0.005  # by which the time of sending a command may lie behind its arrival [s]
 
 
 @dataclass(frozen=True)
@@ -36,8 +40,7 @@ class SeedResult:
         robots: Number of robots.
         arrived: Those that met their goals.
         least_m: Least distance between any two hulls, below 0 where they overlapped; None: not recorded [m].
-        crossed: Robots whose plant applied what their own controller had not commanded; None by the clock, where what
-            is applied at a time is the command of an earlier one.
+        crossed: Robots whose plant applied what their own controller had not commanded.
         failure: Why the run failed; empty if it did not.
     """
 
@@ -45,7 +48,7 @@ class SeedResult:
     robots: int
     arrived: int
     least_m: float | None
-    crossed: tuple[str, ...] | None
+    crossed: tuple[str, ...]
     failure: str
 
     @property
@@ -67,17 +70,19 @@ class Choice:
         fleet: Name of its file.
         lockstep: Whether in lock step; else in real time.
         keep_apart: Whether the guards act.
+        duration_s: Length of each run; None: as long as the robot needs that needs longest [s].
     """
 
     fleet: str
     lockstep: bool = True
     keep_apart: bool = True
+    duration_s: float | None = None
 
     @property
     def key(self) -> dict[str, Any]:
         """What a result has to agree on to count: also the text of the fleet's file."""
         text = config_path("systems", self.fleet).read_bytes()
-        ways = {"lockstep": self.lockstep, "keep_apart": self.keep_apart}
+        ways = {"lockstep": self.lockstep, "keep_apart": self.keep_apart, "duration_s": self.duration_s}
         return {"fleet": self.fleet, **ways, "file_sha256": hashlib.sha256(text).hexdigest()}
 
 
@@ -113,8 +118,7 @@ def _read(path: Path, choice: Choice) -> SeedResult | None:
     try:
         found = json.loads(path.read_text(encoding="utf-8"))
         own, result = found["about"], found["result"]
-        crossed = None if result["crossed"] is None else tuple(result["crossed"])
-        read = SeedResult(**(result | {"crossed": crossed}))
+        read = SeedResult(**(result | {"crossed": tuple(result["crossed"])}))
     except (json.JSONDecodeError, KeyError, TypeError) as error:
         raise ConfigError(
             f"{path} is no result of a seed: {error!r}. Delete it, or give --results."
@@ -132,6 +136,7 @@ def _run(choice: Choice, seed: int, folder: Path, path: Path) -> SeedResult:
         seed=seed,
         lockstep=choice.lockstep,
         keep_apart=choice.keep_apart,
+        duration_s=choice.duration_s,
         record=bag,
         command="fulmar evaluate",
     )
@@ -143,7 +148,7 @@ def _run(choice: Choice, seed: int, folder: Path, path: Path) -> SeedResult:
         raise KeyboardInterrupt(outcome.failure)  # no result of this seed: it runs again
     summary = outcome.summary
     arrived = sum(robot["success"] is True and not robot["failure"] for robot in summary["robots"].values())
-    crossed = crossed_robots(plan) if choice.lockstep else None
+    crossed = crossed_robots(outcome.records, lockstep=choice.lockstep)
     found = SeedResult(seed, len(plan.robots), arrived, summary["least_distance_m"], crossed, outcome.failure)
     text = json.dumps({"about": choice.key, "result": vars(found), "summary": summary}, indent=2)
     folder.mkdir(parents=True, exist_ok=True)
@@ -153,19 +158,37 @@ def _run(choice: Choice, seed: int, folder: Path, path: Path) -> SeedResult:
     return found
 
 
-def crossed_robots(plan: FleetPlan) -> tuple[str, ...]:
-    """Names of robots whose plant applied, in lock step, what their own controller had not commanded."""
-    found = []
-    for name, record in records_of(plan):
-        _, mine, theirs = np.intersect1d(
-            record.commanded.stamp_s, record.applied.stamp_s, return_indices=True
-        )
-        if not len(mine):
-            continue  # nothing ran, which is the failure of that run
-        commanded, applied = record.commanded.effort[mine], record.applied.effort[theirs]
-        if not np.allclose(commanded, applied, atol=APPLIED_AS_COMMANDED):
-            found.append(name)
-    return tuple(found)
+def crossed_robots(records: Mapping[str, RunRecord], *, lockstep: bool) -> tuple[str, ...]:
+    """Names of robots whose plant applied what their own controller had not commanded.
+
+    Args:
+        records: Of the robots, by name.
+        lockstep: Whether what was applied at a time is the command of that very time; else it is one of those that
+            were sent since the plant's watchdog would have tripped, or the safe command.
+    """
+    check = _applied_in_step if lockstep else _applied_by_the_clock
+    return tuple(name for name, record in records.items() if not check(record))
+
+
+def _applied_in_step(record: RunRecord) -> bool:
+    _, mine, theirs = np.intersect1d(record.commanded.stamp_s, record.applied.stamp_s, return_indices=True)
+    if not len(mine):
+        return True  # nothing ran, which is the failure of that run
+    commanded, applied = record.commanded.effort[mine], record.applied.effort[theirs]
+    return bool(np.allclose(commanded, applied, atol=APPLIED_AS_COMMANDED))
+
+
+def _applied_by_the_clock(record: RunRecord) -> bool:
+    commanded, applied = record.commanded, record.applied
+    safe = load_robot(str(record.info["robot"])).actuators.safe_command
+    others = ~np.isclose(applied.effort, safe, atol=APPLIED_AS_COMMANDED).all(axis=1)
+    sent_s = np.sort(commanded.publish_s)
+    efforts = commanded.effort[np.argsort(commanded.publish_s, kind="stable")]
+    for time_s, effort in zip(applied.publish_s[others], applied.effort[others], strict=True):
+        first, last = np.searchsorted(sent_s, (time_s - HELD_S, time_s + SENT_BY_S))
+        if not np.isclose(efforts[first:last], effort, atol=APPLIED_AS_COMMANDED).all(axis=1).any():
+            return False
+    return True
 
 
 def summed_up(choice: Choice, results: Sequence[SeedResult]) -> dict[str, Any]:
@@ -175,6 +198,7 @@ def summed_up(choice: Choice, results: Sequence[SeedResult]) -> dict[str, Any]:
         "fleet": choice.fleet,
         "lockstep": choice.lockstep,
         "keep_apart": choice.keep_apart,
+        "duration_s": choice.duration_s,
         "seeds": [vars(result) for result in results],
         "count": len(results),
         "all_arrived": sum(result.all_arrived for result in results),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -50,13 +51,15 @@ def run_and_evaluate(plan: RunPlan) -> RunOutcome:
     return evaluate_execution(plan, execute(plan))
 
 
-def evaluate_execution(plan: RunPlan, execution: Execution, robot: str | None = None) -> RunOutcome:
-    """Evaluate a run that has ended, from its bag; of a fleet's, that of a robot by its name."""
+def evaluate_execution(
+    plan: RunPlan, execution: Execution, read: Callable[[Path], RunRecord] = read_run
+) -> RunOutcome:
+    """Evaluate a run that has ended, from its bag, which is read by `read`."""
     record, failure, ring = Path(plan.record), execution.failure, plan.recording.mode == "ring"
     if ring and not failure and not record.exists():
         return RunOutcome({**summarise(_nothing_recorded(plan)), **_NOT_EVALUATED}, "")
     try:
-        summary = summarise(read_run(record, robot))
+        summary = summarise(read(record))
     except FulmarError as error:
         failure, summary = failure or str(error), summarise(_nothing_recorded(plan))
         summary["bag"] = plan.record if record.exists() else None

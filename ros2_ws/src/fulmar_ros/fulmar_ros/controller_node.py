@@ -18,6 +18,7 @@ from fulmar_core.config.errors import FAILED, FulmarError, TaskError
 from fulmar_core.controllers.controller import Controller, Inputs
 from fulmar_core.estimators.actuator_health.applied import AppliedHistory
 from fulmar_core.estimators.actuator_health.beliefs import DEAD, Beliefs
+from fulmar_core.loop.control_loop import readings_for
 from fulmar_core.loop.controller_settings import ControllerSettings
 from fulmar_core.loop.fallback import Standby
 from fulmar_core.loop.guarded_loop import GuardedLoop
@@ -126,7 +127,7 @@ class ControllerNode(LifecycleNode):
             self._readings = ReadingInputs(
                 self,
                 self.robot,
-                [name for each in switch.known for name in each.controller.readings],
+                readings_for(self.robot, self.task, [each.controller for each in switch.known]),
                 self._go_on,
                 frames=own_frames(self, self.robot),
                 lockstep=self.settings.lockstep,

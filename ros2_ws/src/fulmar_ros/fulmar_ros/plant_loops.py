@@ -270,9 +270,10 @@ class RealtimeLoop:
             sample = self._backend.step(command)
             applied = command if sample.applied is None else sample.applied
             self._wires.publish_applied(applied, begun_ns)
-            _compare(self._feedback, self._guard, self._wires, applied, self._dt, sample)
-            self._clock.advance(self._dt)
-            self.ticks += 1
+            passed = 1 + sample.more_ticks
+            _compare(self._feedback, self._guard, self._wires, applied, passed * self._dt, sample)
+            self._clock.advance(passed * self._dt)
+            self.ticks += passed
             self._ticked_ns = time.monotonic_ns()
             self._wires.publish_sample(sample, self._clock.now_ns)
 

@@ -139,10 +139,11 @@ class PlantNode(LifecycleNode):
             ticks = self.robot.timing.substeps(self.settings.control_rate(self.robot))
             self._pace = Pace(1 if self.settings.lockstep else ticks)
             self._backend = self._make_backend(self.robot, self.settings)
-        except (FulmarError, ValueError, ImportError) as error:
-            self.health.reason = str(error)
+        except Exception as error:  # noqa: BLE001 - rclpy would leave it out, and nobody would know why
+            said = str(error) if isinstance(error, FulmarError | ValueError | ImportError) else ""
+            self.health.reason = said or f"{type(error).__name__}: {error}".removesuffix(": ")
             self._exit_code = BAD_USAGE if isinstance(error, ConfigError) else 0
-            self.get_logger().error(f"not configured: {error}")
+            self.get_logger().error(f"not configured: {self.health.reason}")
             return REFUSED
         self._exit_code = 0
         self.wires = PlantWires(
@@ -369,6 +370,7 @@ class PlantNode(LifecycleNode):
             self.health.mode = "running"
             episode = first_episode(self.robot, self.settings)
             sample = backend.reset(episode, seed=self.settings.seed)
+            self.clock.advance(sample.more_ticks * self.robot.timing.physics_dt)
             if self._link is not None:
                 self._link.begin(self.settings.seed)
             if self._simulated:

@@ -215,4 +215,4 @@ def _worlds(
         stack.callback(backend.close)
         backends.append(backend)
         samples.append(backend.reset(episodes[number], seed=trial.seed, number=number))
-    return SteppedBackends(backends, samples, controller, task.state_type)
+    return SteppedBackends(backends, samples, controller, task)

@@ -59,7 +59,8 @@ def evaluate(
         int | None, option("N", "Processes at once, through ros; one for each core.", min=1)
     ] = None,
     episode_s: Annotated[
-        float | None, option("S", "Length of an episode [s]; the task's own by default.", min=0.01)
+        float | None,
+        option("S", "Length of an episode or of a fleet's run [s]; the task's own by default.", min=0.01),
     ] = None,
     steps: Annotated[int | None, option("N", "The same, as a number of control steps.", min=1)] = None,
     worlds: Annotated[
@@ -97,8 +98,8 @@ def evaluate(
     from fulmar_evaluation.trial_plan import plan_trial, print_figures, trial_figures
 
     if system is not None:
-        asked = FleetSeeds(system, through, episodes or 20, seed, real_time, not no_guard, results)
-        asked.evaluate(robot, as_json=as_json)
+        seeds = FleetSeeds(system, through, episodes or 20, seed, real_time, not no_guard, results, episode_s)
+        seeds.evaluate(robot, as_json=as_json)
         return
     robot, task = both_given(robot, task)
     use_calibration(calibration, robot)

@@ -20,6 +20,7 @@ TAKES = (
     "--system",
     "--through",
     "--episodes",
+    "--episode-s",
     "--seed",
     "--real-time",
     "--no-keep-apart",
@@ -41,7 +42,7 @@ def both_given(robot: str | None, task: str | None) -> tuple[str, str]:
 
 @dataclass(frozen=True)
 class FleetSeeds:
-    """What is asked for: a fleet, how it runs, and how many seeds from which on."""
+    """What is asked for: a fleet, how it runs and for how long [s], and how many seeds from which on."""
 
     fleet: str
     through: str
@@ -50,6 +51,7 @@ class FleetSeeds:
     real_time: bool
     keep_apart: bool
     results: Path | None
+    duration_s: float | None = None
 
     def evaluate(self, robot: str | None, *, as_json: bool) -> None:
         """Run every seed and print them.
@@ -66,7 +68,12 @@ class FleetSeeds:
         from fulmar_evaluation.fleet_seeds import Choice, evaluate_seeds, line_of, summed_up
 
         self._check()
-        choice = Choice(self.fleet, lockstep=not self.real_time, keep_apart=self.keep_apart)
+        choice = Choice(
+            self.fleet,
+            lockstep=not self.real_time,
+            keep_apart=self.keep_apart,
+            duration_s=self.duration_s,
+        )
         folder = self.results or Path(dated_folder("runs", f"{self.fleet}_seeds"))
         seeds = range(self.seed, self.seed + self.episodes)
         say = (lambda _found: None) if as_json else (lambda found: write_line(line_of(found)))
@@ -82,7 +89,8 @@ class FleetSeeds:
         from fulmar_bringup.fleet_plan import FleetChoices, fleet_plan
         from fulmar_cli.installation.extras import check_plan
 
-        for one in fleet_plan(self.fleet, FleetChoices(self.seed, keep_apart=self.keep_apart)).robots:
+        asked = FleetChoices(self.seed, keep_apart=self.keep_apart, duration_s=self.duration_s)
+        for one in fleet_plan(self.fleet, asked).robots:
             check_plan(one)
 
 

@@ -9,6 +9,7 @@ from fulmar_bringup.console import log_line
 from fulmar_cli.installation.installed_as import install_command
 from fulmar_core.config.errors import ConfigError
 from sim_nodes.camera.opengl import check_loadable
+from sim_nodes.jsbsim_loadable import check_jsbsim
 
 if TYPE_CHECKING:
     from fulmar_bringup.run_plan import RunPlan
@@ -58,13 +59,16 @@ def require(*modules: str) -> None:
     """Refuse to begin work that would fail later for lack of a module.
 
     Raises:
-        ConfigError: For all modules that are not installed, or for a MUJOCO_GL that MuJoCo cannot be loaded with.
+        ConfigError: For all modules that are not installed, for a MUJOCO_GL that MuJoCo cannot be loaded with, or for
+            a JSBSim that cannot be loaded.
     """
     missing = [module for module in dict.fromkeys(modules) if find_spec(module) is None]
     if missing:
         raise ConfigError(_advice(missing))
     if "mujoco" in modules:
         check_loadable()
+    if "jsbsim" in modules:
+        check_jsbsim()
 
 
 def check_plan(plan: RunPlan, *, through: str = "ros") -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -17,6 +17,7 @@ from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.sensors.fuel import NAME as FUEL
 from fulmar_core.safety.command_gate import command_problem
 from fulmar_core.safety.envelope.guard import EnvelopeGuard
+from fulmar_core.safety.fuel_reserve import gauges_of
 from fulmar_core.safety.keep_apart import KeepApartGuard, Other
 from fulmar_core.safety.keep_out import KeepOutGuard
 from fulmar_core.states.state import State
@@ -282,6 +283,12 @@ class ControlLoop:
         self._guard_estimate = self._estimator.update(state, applied, passed_s)
         self.estimate = self._guard_estimate if self._controller.estimator is not None else None
         self._estimated_ns = stamp_ns
+
+
+def readings_for(robot: Robot, task: Task, controllers: Iterable[Controller]) -> tuple[str, ...]:
+    """Names of the readings that control steps take: those of the controllers, and of the guard of keep-out volumes."""
+    guards = gauges_of(robot) if task.keep_outs else ()
+    return tuple(dict.fromkeys([name for each in controllers for name in each.readings] + list(guards)))
 
 
 def unknown_inputs(loop: ControlLoop, stamp_ns: int) -> Inputs:

@@ -12,7 +12,7 @@ from fulmar_core.config.errors import ConfigError
 from fulmar_core.controllers.controller import Controller, Readings
 from fulmar_core.dynamics.things import Poses
 from fulmar_core.estimators.readings import readings_of
-from fulmar_core.loop.control_loop import ControlLoop
+from fulmar_core.loop.control_loop import ControlLoop, readings_for
 from fulmar_core.loop.newest_readings import NewestReadings
 from fulmar_core.robots.robot import Robot
 from fulmar_core.simulation.backend import Backend, Sample
@@ -162,7 +162,7 @@ def roll_out_in_backends(
                 backend.reset(drawn[i], seed=seed, number=each)
                 for i, (backend, each) in enumerate(zip(backends, numbers, strict=False))
             ]
-            worlds = SteppedBackends(backends, samples, controller, task.state_type)
+            worlds = SteppedBackends(backends, samples, controller, task)
             runs.append(_roll_out(controller, robot, task, worlds, drawn.goal, further, sight))
     return join(runs)
 
@@ -241,13 +241,14 @@ class SteppedBackends:
     """Simulators that are stepped side by side."""
 
     def __init__(
-        self, backends: list[Backend], samples: list[Sample], controller: Controller, form: type[State]
+        self, backends: list[Backend], samples: list[Sample], controller: Controller, task: Task
     ) -> None:
-        self._backends, self._form, self._ns = backends, form, 0
+        self._backends, self._form, self._ns = backends, task.state_type, 0
         robot = backends[0].robot
         self._substeps = robot.timing.substeps(controller.control_hz)
         self._step_ns = round(1e9 * self._substeps * robot.timing.physics_dt)
-        self._newest = [NewestReadings(robot, controller.readings, in_step=True) for _ in samples]
+        taken = readings_for(robot, task, [controller])
+        self._newest = [NewestReadings(robot, taken, in_step=True) for _ in samples]
         self._take(samples)
 
     def move(self, command: Array) -> None:

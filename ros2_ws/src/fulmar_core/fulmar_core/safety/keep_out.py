@@ -2,7 +2,8 @@
 
 The guard asks at each control step whether the robot, should it accelerate towards a volume for one more step, could
 still stop before it with the weakest push that it has in any direction. Where it could not, the guard's own command
-takes the place of the controller's: it brakes, and leaves slowly.
+takes the place of the controller's: it brakes, and leaves slowly. Once the gauge of the tank says that the gas left is
+what stopping takes, no controller pushes any more: the guard stops the robot, and sends it away where it drifts in.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from fulmar_core.controllers.allocation import allocation_of
 from fulmar_core.controllers.controller import Inputs
 from fulmar_core.robots.actuators.pushing import Pushing
 from fulmar_core.robots.robot import Robot
+from fulmar_core.safety.fuel_reserve import FuelReserve, gauges_of
 from fulmar_core.states.arrays import side_by_side
 from fulmar_core.states.attitude import even_directions, exponential, product, scaled
 from fulmar_core.states.rotation import cross, rotate_inverse
@@ -30,6 +32,9 @@ DIRECTIONS = 200  # of forces that are tried for the weakest
 DRIFTS_S = 60.0  # for which the way of a robot with closed valves is looked at
 STEP_S = 0.25  # of that look
 ENTERED = "in the keep-out volume"  # a part of the words of a robot that is
+OUT_OF_FUEL = (
+    "the gas left is what stopping takes: the guard stops the robot, and no controller pushes any more"
+)
 HAD_HELD, HAD_ENTERED = (
     "the keep-out guard held the robot",
     "the robot was in a keep-out volume",
@@ -40,6 +45,9 @@ class KeepOutGuard:
     """Brakes robots of one kind that near volumes; keeps for each of them whether it does so now.
 
     States are those of bodies in space, shapes (n,).
+
+    Attributes:
+        reserve: Of gas for stopping; None of a robot without a tank or without a gauge.
     """
 
     def __init__(self, robot: Robot, volumes: Sequence[KeepOut], dt: float) -> None:
@@ -63,6 +71,10 @@ class KeepOutGuard:
         known_s = robot.sensors.odometry.delay_s + response.delay_s + response.opening_delay_s
         self._late_s = known_s + dt  # of the answer to what is measured next
         self._middle_s = known_s + 0.5 * dt  # from the measurement to the middle of the command's time
+        self._safe = np.asarray(robot.actuators.safe_command, dtype=float)
+        self.reserve: FuelReserve | None = None
+        if gauges_of(robot):
+            self.reserve = FuelReserve(robot, self._allocation, self._weakest, self._turn, self._late_s)
         self._holds = np.zeros(1, dtype=bool)
 
     def _pushes(self, actuators: Pushing, force: float) -> tuple[float, float]:
@@ -77,6 +89,8 @@ class KeepOutGuard:
     def reset(self) -> None:
         """Brake no robot: a new episode, or a jump."""
         self._holds[:] = False
+        if self.reserve is not None:
+            self.reserve.reset()
 
     def holds(self, state: Any) -> np.ndarray:
         """Which robots the guard brakes now, shape (n,); a robot that it brakes is let go once it leaves.
@@ -102,12 +116,15 @@ class KeepOutGuard:
         place, velocity = _rows(state.position)[:1], _rows(state.velocity)[:1]
         return bool(np.isfinite(drift_enters_s(self._volumes, place, velocity))[0])
 
-    def brake(self, state: Any, alive: np.ndarray | None = None) -> np.ndarray:
+    def brake(
+        self, state: Any, alive: np.ndarray | None = None, leaves: np.ndarray | None = None
+    ) -> np.ndarray:
         """Commands that stop robots before the nearest volume, and let them leave it slowly, shape (n, m).
 
         Args:
             state: As measured, shapes (n,).
             alive: 0 for actuators that are believed dead, else 1, shape (n, m); None: not known.
+            leaves: Which leave it, the others only being stopped, shape (n,); None: all.
         """
         place = _rows(state.position)
         turned = scaled(self._middle_s, state.rate)  # a body that spins pushes the other way a moment later
@@ -116,7 +133,8 @@ class KeepOutGuard:
         for volume in self._volumes[1:]:
             other, its = volume.offset(place)
             away, far = np.where((its < far)[:, None], other, away), np.minimum(its, far)
-        missing = LEAVES_M_S * away - _rows(state.velocity)
+        speed = LEAVES_M_S if leaves is None else LEAVES_M_S * leaves[:, None]
+        missing = speed * away - _rows(state.velocity)
         force = _limited(self._mass / BRAKES_S * rotate_inverse(quat, missing), self._weakest)
         rate = _rows(state.rate)
         # No more than the actuators have beside the force, at any rate: no gyroscopic torque is made up for.
@@ -126,11 +144,19 @@ class KeepOutGuard:
 
     def guarded(self, command: np.ndarray, inputs: Inputs) -> np.ndarray:
         """Commands of a controller, or the guard's own for robots that it brakes, shape (n, m)."""
-        holds = self.holds(inputs.state)
-        if not holds.any():
+        leaves, stops = self.holds(inputs.state), np.zeros(len(command), dtype=bool)
+        if self.reserve is not None:
+            spent = self.reserve.watch(inputs)
+            if spent.any():
+                place, velocity = _rows(inputs.state.position), _rows(inputs.state.velocity)
+                command = np.where(spent[:, None], self._safe, command)
+                leaves = leaves | (spent & np.isfinite(drift_enters_s(self._volumes, place, velocity)))
+                stops = spent & (np.linalg.norm(velocity, axis=-1) > LEAVES_M_S)
+        acts = leaves | stops
+        if not acts.any():
             return command
         alive = None if inputs.estimates is None else inputs.estimates.alive
-        return np.where(holds[:, None], self.brake(inputs.state, alive), command)
+        return np.where(acts[:, None], self.brake(inputs.state, alive, leaves), command)
 
     def words(self, state: Any, names: Sequence[str]) -> str:
         """Why the first robot is held, or that it is where it must not be; empty if neither.
@@ -145,6 +171,8 @@ class KeepOutGuard:
         away, far = found[nearest][0][0], float(found[nearest][1][0])
         if far < 0.0:
             return f"{-far:.2f} m {ENTERED} of '{names[nearest]}': the guard pushes the robot out"
+        if self.reserve is not None and self.reserve.spent[0]:
+            return OUT_OF_FUEL
         if not self._holds[0]:
             return ""
         nears = -float(velocity[0] @ away)

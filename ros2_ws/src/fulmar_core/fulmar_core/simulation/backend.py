@@ -29,6 +29,7 @@ class Sample:
     stamp_ns: int | None = None  # when it was captured; None: just now, by the clock of who asked [ns]
     applied: np.ndarray | None = None  # (n,) commands of the actuators; None: the very command
     refusal: str = ""  # why a device does not carry out commands now; empty while it does
+    more_ticks: int = 0  # physics steps beyond those asked for, in a world that waits for no robot
     # Where the other robots of a fleet are, by name: x, y [m], their rates [m/s], and 1 if driven, else 0, each (5,)
     neighbours: Mapping[str, np.ndarray] = field(default_factory=dict)
 

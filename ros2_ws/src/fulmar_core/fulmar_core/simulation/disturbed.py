@@ -113,7 +113,7 @@ class Disturbed:
         sample = self._backend.step(given, ticks, begins=begins)
         with self._lock:
             sample = self._acting.measured(sample)
-            self._acting.advance(ticks * self.robot.timing.physics_dt)
+            self._acting.advance((ticks + sample.more_ticks) * self.robot.timing.physics_dt)
             over = self._acting.force() is None
         if over and isinstance(self._backend, CanPush):
             self._backend.push(None)

@@ -12,6 +12,7 @@ import numpy as np
 from rich.console import Console
 
 from fulmar_bringup.console import new_table
+from fulmar_bringup.core_probe import ends_of
 from fulmar_bringup.progress import work_bar
 from fulmar_core.config.errors import ConfigError, did_you_mean
 from fulmar_core.loop.policy_bundle import PASSPORT, read_passport
@@ -150,6 +151,7 @@ def run_certification(asked: Certification) -> tuple[dict[str, Any], Result]:
         "controller": identity(asked.trial),
         "dead": asked.dead,
         "hashes": _hashes(asked, known),
+        "probe": ends_of(asked.trial.controller(), asked.trial.robot, asked.trial.task),
         "cpu_s": round(_cpu_s() - began, 2),
     }
     return document, result

@@ -20,7 +20,7 @@ from fulmar_core.config.errors import BagError, ConfigError, FulmarError, RunFai
 from fulmar_core.controllers.controller import Controller, Inputs
 from fulmar_core.controllers.law import Law
 from fulmar_core.estimators.actuator_health.applied import AppliedHistory
-from fulmar_core.loop.control_loop import unknown_inputs
+from fulmar_core.loop.control_loop import readings_for, unknown_inputs
 from fulmar_core.loop.fallback import ControllerSwitch, Standby, warm_up
 from fulmar_core.loop.guarded_loop import GuardedLoop
 from fulmar_core.loop.newest_readings import NewestReadings
@@ -140,7 +140,8 @@ class _Rerun:
             applied=self._history if len(record.applied) else None,
             envelope=envelope,
         )
-        names = [name for each in self._guard.switch.known for name in each.controller.readings]
+        known = [each.controller for each in self._guard.switch.known]
+        names = readings_for(record.robot, record.task, known)
         self._readings = NewestReadings(record.robot, names, in_step=record.settings.lockstep)
         if any(kind.image for kind in self._readings.kinds.values()):
             raise ConfigError(

@@ -6,6 +6,7 @@ its gain. Beyond the linear model, a bank tilts the lift, which then carries les
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -65,8 +66,8 @@ class WingRollout:
         self._hull, self._half_span = robot.hull_span[0], 0.5 * robot.wings.span
         self._gains = self._law.schedule.array(self._heights)[:, :, : self._levels.stop]
         made = [self._model(model) for model in self._models]
-        self._one = [(a, b, c) for a, b, c in made]
-        self._many = [_repeated(*each, self._each) for each in made]
+        self._one = [self._whole(each, self._dt) for each in made]
+        self._many = [self._whole(_repeated(*each, self._each), self._each * self._dt) for each in made]
 
     def _model(self, model: FlightModel) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """One control step of each sample: transposed matrices (k, x, x) and (k, m, x), and what is added (k, 1, x)."""
@@ -110,24 +111,35 @@ class WingRollout:
             found[:, here] = self._flown(which, x[here], level[here], command[here], aim.place[here, 1])
         return WingLimits(*found)
 
+    @staticmethod
+    def _whole(parts: tuple[np.ndarray, np.ndarray, np.ndarray], dt: float) -> tuple[np.ndarray, float]:
+        """What multiplies state, command and one, shape (k, x + m + 1, x), and what a level wing's lift adds [m/s]."""
+        whole, lift = np.concatenate(parts, axis=1), dt * GRAVITY
+        whole[:, -1, CLIMB] -= lift
+        return whole, lift
+
     def _flown(
         self, which: int, x: np.ndarray, level: np.ndarray, command: np.ndarray, height: np.ndarray
     ) -> tuple[np.ndarray, ...]:
         """See `limits`, of craft that share a model."""
-        kinds, gain = len(self._samples.mass), self._gains[which].T
-        state = np.repeat(x[None], kinds, axis=0)
+        kinds, (count, size), answers = len(self._samples.mass), x.shape, level.shape[1]
+        # Of each step its state, its command as a departure from level flight, and a one.
+        steps = np.ones((self._steps + 2, kinds, count, size + answers + 1))
+        steps[0, ..., :size], steps[0, ..., size:-1] = x, command - level
+        self._step(steps[0], steps[1], *self._one[which])
         low, high = self._low - level, self._high - level
-        a, b, added = self._one[which]
-        state = self._bent(state @ a + (command - level) @ b + added, state, self._dt)
-        places = [state]
-        a, b, added = self._many[which]
-        for _ in range(self._steps):
-            seen = state.copy()
-            seen[..., PLACE] = np.clip(seen[..., PLACE], -self._limit, self._limit)
-            answer = np.clip(-seen @ gain, low, high)
-            state = self._bent(state @ a + answer @ b + added, state, self._each * self._dt)
-            places.append(state)
-        track = np.stack(places)
+        gain = np.ascontiguousarray(-self._gains[which].T)
+        seen, wanted = np.empty((kinds, count, size)), np.empty((kinds, count, answers))
+        place, each = seen[..., PLACE], self._many[which]
+        for now, after in itertools.pairwise(steps[1:]):
+            np.copyto(seen, now[..., :size])
+            np.maximum(place, -self._limit, out=place)
+            np.minimum(place, self._limit, out=place)
+            np.matmul(seen.reshape(-1, size), gain, out=wanted.reshape(-1, answers))
+            np.maximum(wanted, low, out=wanted)
+            np.minimum(wanted, high, out=now[..., size:-1])
+            self._step(now, after, *each)
+        track = steps[1:, ..., :size]
         bank = np.abs(track[..., ROLL])
         over = height + track[..., HEIGHT]
         lowest = np.minimum(over + self._hull, over - self._half_span * np.sin(np.minimum(bank, 1.5)))
@@ -137,11 +149,15 @@ class WingRollout:
         most = (part.max(axis=(0, 1)) for part in (over, bank, attack, slip, speed))
         return (lowest.min(axis=(0, 1)), *most)
 
-    def _bent(self, after: np.ndarray, before: np.ndarray, dt: float) -> np.ndarray:
-        """States with the lift that a bank costs."""
-        bank = np.minimum(np.abs(before[..., ROLL]), 0.5 * np.pi)
-        after[..., CLIMB] -= dt * GRAVITY * (1.0 - np.cos(bank))
-        return after
+    @staticmethod
+    def _step(now: np.ndarray, after: np.ndarray, whole: np.ndarray, lift: float) -> None:
+        """Write the state after a step; a bank tilts the lift."""
+        state = after[..., : whole.shape[2]]
+        np.matmul(now, whole, out=state)
+        upright = np.cos(now[..., ROLL])
+        np.maximum(upright, 0.0, out=upright)
+        upright *= lift
+        state[..., CLIMB] += upright
 
 
 def _repeated(
