@@ -6,6 +6,7 @@ import functools
 import hashlib
 import json
 from pathlib import Path
+from typing import Any
 
 from fulmar_core.config import yaml_text
 from fulmar_core.config.paths import config_path
@@ -29,8 +30,15 @@ def robot_sha256(robot: str) -> str:
         ConfigError: There is no such robot.
     """
     values = yaml_text.load(config_path("robots", robot).read_text(encoding="utf-8"))
-    kept = {key: value for key, value in values.items() if key not in LOOKS}
+    kept = _with_text_keys({key: value for key, value in values.items() if key not in LOOKS})
     return hashlib.sha256(json.dumps(kept, sort_keys=True).encode()).hexdigest()
+
+
+def _with_text_keys(value: Any) -> Any:
+    """A value of YAML with keys of text: polynomials of aircraft have numbers among theirs, and JSON sorts one kind."""
+    if isinstance(value, dict):
+        return {str(key): _with_text_keys(each) for key, each in value.items()}
+    return [_with_text_keys(each) for each in value] if isinstance(value, list) else value
 
 
 @functools.cache

@@ -138,6 +138,7 @@ def run_certification(asked: Certification) -> tuple[dict[str, Any], Result]:
 
         episodes = Episodes(asked.trial, asked.dead, further(1))
         known = known_set(episodes, asked.file) if asked.again else None
+        hashes = _hashes(asked, known)
         result = _result(asked, episodes, known)
         if result.score is None:
             return _without_set(asked, episodes, result, began), result
@@ -150,7 +151,7 @@ def run_certification(asked: Certification) -> tuple[dict[str, Any], Result]:
     document |= {
         "controller": identity(asked.trial),
         "dead": asked.dead,
-        "hashes": _hashes(asked, known),
+        "hashes": hashes,
         "probe": ends_of(asked.trial.controller(), asked.trial.robot, asked.trial.task),
         "cpu_s": round(_cpu_s() - began, 2),
     }
