@@ -36,7 +36,7 @@ def ends_of(controller: Controller, robot: Robot, task: Task) -> list[list[float
     run = next(batches(controller, robot, short, nominal, episodes=EPISODES, seed=SEED))
     columns = (run.x, run.y, run.yaw if run.z is None else run.z)
     ends: list[list[float]] = np.round(
-        np.stack([column[:, -1] for column in columns], axis=1), DIGITS
+        np.stack([column[:, -1] for column in columns], axis=1).astype(float), DIGITS
     ).tolist()
     return ends
 
