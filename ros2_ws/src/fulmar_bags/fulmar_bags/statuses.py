@@ -5,12 +5,9 @@ from __future__ import annotations
 import struct
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 from fulmar_bags.message_types import ENCAPSULATION, LITTLE_ENDIAN, PADDING, type_store
-
-if TYPE_CHECKING:  # which checks messages by this module
-    from fulmar_bags.gathered import Topic
 
 _LENGTH = struct.Struct("<I")
 _STAMP_BYTES = 8
@@ -26,7 +23,14 @@ class StatusReport:
     values: dict[str, str]
 
 
-def statuses(topic: Topic, of: str = "") -> Iterator[tuple[int, list[StatusReport]]]:
+class Recorded(Protocol):
+    """Messages of one topic, such as a `Topic`."""
+
+    data: Sequence[bytes]  # in CDR
+    log_ns: Sequence[int]  # when each was received [ns]
+
+
+def statuses(topic: Recorded, of: str = "") -> Iterator[tuple[int, list[StatusReport]]]:
     """Time of recording [ns] and statuses of each message of type DiagnosticArray that can be read.
 
     Args:
