@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections import deque
-from typing import Any
+from typing import Any, ClassVar
 
 MANUAL = 0  # of ArduPilot's rover and boat modes
 MODES = {
@@ -29,10 +29,13 @@ class Autopilot:
     Attributes:
         mode: Number of its mode; None: not known yet.
         armed: Whether the propellers may turn.
-        stranger: What it is, in words, where it is no boat of ArduPilot; empty otherwise.
+        stranger: What it is, in words, where it is none of `KINDS` of ArduPilot; empty otherwise.
         failsafe: Whether it says that a failsafe acts.
         beats: Heartbeats so far.
     """
+
+    KINDS: ClassVar[tuple[int, ...]] = (ROVER, BOAT)  # MAV_TYPE of what may be driven, and its name
+    WANTED: ClassVar[str] = "ArduPilot Rover or boat"
 
     def __init__(self, steering_channel: int, throttle_channel: int) -> None:
         """Begin with nothing known; the channels are those that are overridden, from 1 on."""
@@ -52,14 +55,9 @@ class Autopilot:
         kind = message.get_type()
         if kind == "HEARTBEAT":
             self.mode, self.armed = int(message.custom_mode), bool(message.base_mode & ARMED)
-            known = message.autopilot == ARDUPILOT and message.type in (ROVER, BOAT)
-            self.stranger = (
-                ""
-                if known
-                else (
-                    f"no ArduPilot Rover or boat (MAV_AUTOPILOT {message.autopilot}, MAV_TYPE {message.type})"
-                )
-            )
+            known = message.autopilot == ARDUPILOT and message.type in self.KINDS
+            found = f"(MAV_AUTOPILOT {message.autopilot}, MAV_TYPE {message.type})"
+            self.stranger = "" if known else f"no {self.WANTED} {found}"
             self.failsafe = message.system_status >= CRITICAL
             self._beaten_s = now_s
             self.beats += 1

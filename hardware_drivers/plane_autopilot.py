@@ -7,7 +7,7 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from hardware_drivers.flight_set_points import SetPoint
-from hardware_drivers.mavlink_autopilot import ARDUPILOT, Autopilot
+from hardware_drivers.mavlink_autopilot import Autopilot
 from hardware_drivers.mavlink_link import HOST_SYSTEM, Address
 from hardware_drivers.mavlink_parameters import Wanted
 from hardware_drivers.plane_settings import ACTIONS, MavlinkPlane
@@ -27,17 +27,12 @@ ROLL_AND_PITCH = 0b10111100
 class PlaneAutopilot(Autopilot):
     """State of an ArduPlane; see `Autopilot`, whose channels it has no use for."""
 
+    KINDS = (mavlink.MAV_TYPE_FIXED_WING,)
+    WANTED = "ArduPlane"
+
     def __init__(self) -> None:
         """Begin with nothing known."""
         super().__init__(1, 3)
-
-    def take(self, message: Any, now_s: float) -> None:
-        """Take a message of the autopilot at a time of the steady clock [s]."""
-        super().take(message, now_s)
-        if message.get_type() == "HEARTBEAT":
-            is_plane = message.autopilot == ARDUPILOT and message.type == mavlink.MAV_TYPE_FIXED_WING
-            words = f"no ArduPlane (MAV_AUTOPILOT {message.autopilot}, MAV_TYPE {message.type})"
-            self.stranger = "" if is_plane else words
 
     def beaten_before_s(self, now_s: float) -> float:
         """Age of the newest heartbeat; infinite before the first [s]."""

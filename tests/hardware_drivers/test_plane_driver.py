@@ -95,11 +95,16 @@ def test_a_failsafe_that_gets_no_answer_is_refused(bench, monkeypatch):
         driver_of(bench)
 
 
-def test_a_plane_of_another_kind_is_neither_set_nor_taken_over(bench):
-    bench.device.kind = mavlink.MAV_TYPE_QUADROTOR
-    with pytest.raises(DeviceError, match=r"no ArduPlane \(MAV_AUTOPILOT 3, MAV_TYPE 2\)"):
-        driver_of(bench)
-    assert "PARAM_SET" not in bench.device.received
+def test_a_plane_of_another_kind_is_neither_set_nor_taken_over():
+    device = ArduPlaneEmulator(ROBOT, free_udp_port())
+    device.kind = mavlink.MAV_TYPE_QUADROTOR  # before its first heartbeat
+    bench = WingBench(device)
+    try:
+        with pytest.raises(DeviceError, match=r"no ArduPlane \(MAV_AUTOPILOT 3, MAV_TYPE 2\)"):
+            driver_of(bench)
+    finally:
+        bench.stop()
+    assert "PARAM_SET" not in device.received
 
 
 def test_a_plane_on_the_ground_is_not_taken_over(bench):
