@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import operator
 import os
 import socket
 import threading
 import time
+from concurrent.futures import ProcessPoolExecutor
 
 import pytest
 
@@ -41,6 +43,19 @@ def test_what_a_call_reports_is_received_and_processes_have_one_thread_each():
 def test_a_process_that_is_ended_from_outside_is_an_error_of_the_run():
     with pytest.raises(RunFailed, match="a worker process was ended from outside"):
         run(ProcessPool(1), os._exit, [(3,)])
+
+
+def test_a_pool_that_ends_after_an_error_leaves_other_pools_as_they_are():
+    spawn = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(1, spawn) as other:
+        own = other.submit(os.getpid).result()
+
+        def refuse(_index, _result):
+            raise RunFailed("the first result is enough")
+
+        with pytest.raises(RunFailed, match="the first result"):
+            ProcessPool(1).run(operator.neg, [(1,), (2,)], on_done=refuse, watch=lambda _each: None)
+        assert other.submit(os.getpid).result() == own
 
 
 def test_no_items_begin_no_process():

@@ -29,6 +29,7 @@ from fulmar_bringup.run_plan import RunPlan
 from fulmar_bringup.supervisor import START_TIMEOUT_S, Supervisor, supervisor
 from fulmar_bringup.system_rows import system_rows
 from fulmar_core.config.errors import LockstepError, RunFailed
+from fulmar_core.config.pool import workers_of
 from fulmar_core.config.process import end_with
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.simulation.backend import Sample
@@ -127,7 +128,7 @@ def _shut_down_in_the_end(pool: ProcessPoolExecutor) -> Iterator[None]:
     try:
         yield
     except BaseException:
-        for worker in multiprocessing.active_children():
+        for worker in workers_of(pool):
             if worker.pid is not None:
                 os.kill(worker.pid, signal.SIGINT)
         raise

@@ -9,6 +9,7 @@ import signal
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from multiprocessing.process import BaseProcess
 from typing import Any, Protocol
 
 from fulmar_core.config.errors import RunFailed
@@ -89,13 +90,22 @@ class ProcessPool:
                 on_done(futures[future], error or future.result())
 
 
+def workers_of(pool: ProcessPoolExecutor) -> list[BaseProcess]:
+    """The processes of a pool that run; children of this process that are not its own are left alone.
+
+    `terminate_workers` of Python 3.14 reads the same attribute.
+    """
+    processes = pool._processes or {}
+    return [process for process in list(processes.values()) if process.is_alive()]
+
+
 @contextlib.contextmanager
 def ended_with_us(pool: ProcessPoolExecutor) -> Iterator[ProcessPoolExecutor]:
     """Wait for the workers; after an error or Ctrl-C, end them."""
     try:
         yield pool
     except BaseException:
-        for worker in multiprocessing.active_children():
+        for worker in workers_of(pool):
             worker.terminate()
         raise
     finally:
