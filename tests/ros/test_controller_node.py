@@ -167,7 +167,7 @@ def test_deactivation_ends_with_the_safe_command(stream: Stream, controller: Con
 
 @real_time
 def test_shutdown_from_active_ends_with_the_safe_command(stream: Stream, controller: ControllerNode) -> None:
-    controller.trigger_shutdown()
+    controller.executor.create_task(controller.trigger_shutdown)  # as a service does: between two callbacks
     until(lambda: not stream.neighbour.commands[-1].any())
 
 
