@@ -86,4 +86,6 @@ class DrivenPlant:
 
     def command(self, values: list[float], stamp_ns: int = 0) -> None:
         """Receive a command."""
-        self.node.wires._on_command(VectorWriter(PLATFORM.actuators.names).raw(np.array(values), stamp_ns))
+        self.node.wires.commands._on_command(
+            VectorWriter(PLATFORM.actuators.names).raw(np.array(values), stamp_ns)
+        )

@@ -13,6 +13,5 @@ def quiet_wires():
         lock=nullcontext(),
         publish_sample=lambda *_: None,
         publish_applied=lambda *_: None,
-        take_arrived=lambda: None,
-        steady_ns=time.monotonic_ns(),
+        commands=SimpleNamespace(take_arrived=lambda: None, steady_ns=time.monotonic_ns()),
     )

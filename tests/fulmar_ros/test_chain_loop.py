@@ -44,6 +44,11 @@ class Wires:
         self._silent, self._answers, self._commands = silent, answers, commands
         self._tries = 0
 
+    @property
+    def commands(self) -> Wires:
+        """What is published and what is received are one object here."""
+        return self
+
     def publish_tick(self, sample: object, time_ns: int) -> None:
         self.log.append(("tick", sample, time_ns))
 

@@ -33,6 +33,11 @@ class Wires:
         self.applied: list[tuple[int, bool]] = []
 
     @property
+    def commands(self) -> Wires:
+        """What is published and what is received are one object here."""
+        return self
+
+    @property
     def steady_ns(self) -> int:
         return self._clock.now_ns
 

@@ -22,6 +22,11 @@ class Wires:
     def __init__(self, stamp_ns: int | None) -> None:
         self.lock, self.answered_ns, self._stamp_ns = threading.Condition(), None, stamp_ns
 
+    @property
+    def commands(self) -> Wires:
+        """What is published and what is received are one object here."""
+        return self
+
     def publish_sample(self, sample: object, time_ns: int) -> None:
         self.answered_ns = self._stamp_ns
 

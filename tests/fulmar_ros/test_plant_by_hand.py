@@ -61,19 +61,19 @@ def test_a_command_is_carried_out(plant):
 
 def test_the_first_command_of_a_second_publisher_is_not_carried_out(plant, monkeypatch):
     plant.command(OPEN)
-    monkeypatch.setattr("fulmar_ros.plant_wires.writers_of", lambda *_: ["/a/controller", "/b/controller"])
+    monkeypatch.setattr("fulmar_ros.plant_commands.writers_of", lambda *_: ["/a/controller", "/b/controller"])
     plant.command(OPEN[::-1])
     assert output(plant) == SHUT
 
 
 def test_at_its_end_a_plant_takes_no_command(plant):
-    plant.node.wires.listening = False
+    plant.node.wires.commands.listening = False
     plant.command(OPEN)
     assert output(plant) == SHUT
 
 
 def test_a_torn_command_feeds_no_watchdog(plant):
-    plant.node.wires._on_command(b"\xff" * 90)
+    plant.node.wires.commands._on_command(b"\xff" * 90)
     assert plant.node.guard.watchdog.expired(time.monotonic_ns())
 
 
@@ -86,10 +86,10 @@ def test_a_press_closes_the_valves_at_the_plant(plant):
 
 
 def test_an_answer_to_a_state_of_long_ago_opens_no_valve(plant):
-    wires, now_ns = plant.node.wires, time.monotonic_ns()
+    commands, now_ns = plant.node.wires.commands, time.monotonic_ns()
     timeout_ns = plant.node.guard.watchdog.timeout_ns
-    wires._sent.note(5_000, now_ns - 2 * timeout_ns)
-    wires._sent.note(6_000, now_ns)
+    commands._sent.note(5_000, now_ns - 2 * timeout_ns)
+    commands._sent.note(6_000, now_ns)
     plant.command(OPEN, 5_000)
     assert output(plant) == SHUT
     plant.command(OPEN, 6_000)

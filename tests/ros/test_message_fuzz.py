@@ -159,9 +159,9 @@ def test_a_plant_applies_nothing_but_commands_within_its_limits(
         if isinstance(message, bool):
             wires.estop._on_estop(Bool(data=message), {})
         elif by_hand and isinstance(message, JointState):
-            wires._on_teleop(message)
+            wires.commands._on_teleop(message)
         else:
-            wires._on_command(serialized(message))
+            wires.commands._on_command(serialized(message))
         with wires.lock:
             output = plant.guard.output(10**18)
             command = plant.guard.command

@@ -73,9 +73,9 @@ def cost_of_recording(
             bags = {out / f"cost_{number}": plan} if recorded else {}
             with recorders(bags) as started:
                 time.sleep(min(SETTLE_S, stretch_s))
-                plant.wires.latency_ms = Spread()
+                plant.wires.commands.latency_ms = Spread()
                 time.sleep(stretch_s)
-                measured[recorded].append(with_missing(plant.wires.latency_ms.values(), stretch_s))
+                measured[recorded].append(with_missing(plant.wires.commands.latency_ms.values(), stretch_s))
                 for recorder in started:
                     recorder.stop()
             progress()

@@ -80,7 +80,7 @@ class PlantHealth:
 
     def publish(self) -> None:
         """Publish on change, to a subscriber that has come, and once a second."""
-        self._wires.see_writers()
+        self._wires.commands.see_writers()
         self._wires.estop.look()
         level, message, key = self._status()
         more = self.more()
@@ -204,8 +204,8 @@ class PlantHealth:
             "estop": str(self._wires.estop.held()).lower(),
             "estop_by": self._wires.estop.by,
             "safe_controller": self._doing,
-            "answers": str(self._wires.answers),
-            **self._wires.latency_ms.percentiles("latency_ms"),
+            "answers": str(self._wires.commands.answers),
+            **self._wires.commands.latency_ms.percentiles("latency_ms"),
         }
         if self._realtime is not None:
             values |= {

@@ -52,10 +52,10 @@ class LinkLoop(LockstepLoop):
         for sample, stamp in wires.arrived_readings():
             self._answer(sample, stamp)
         with wires.lock:
-            answers = wires.answers
-            wires.take_arrived()
-            self._commanded = self._commanded or wires.answers > answers
-            command = self._guard.output(wires.steady_ns, self._sample.odometry, plant_ns=now_ns)
+            answers = wires.commands.answers
+            wires.commands.take_arrived()
+            self._commanded = self._commanded or wires.commands.answers > answers
+            command = self._guard.output(wires.commands.steady_ns, self._sample.odometry, plant_ns=now_ns)
         if self._grounded:
             command = self._backend.robot.actuators.safe_command
         if before is None or not np.array_equal(command, before):
@@ -69,11 +69,11 @@ class LinkLoop(LockstepLoop):
             LockstepError: It does not come in time.
         """
         wires, began = self._wires, time.monotonic()
-        before = wires.answered_ns
-        wires.await_answer(stamp)
+        before = wires.commands.answered_ns
+        wires.commands.await_answer(stamp)
         wires.publish_measured(sample, stamp)
         with wires.lock:
-            while not wires.wait_for_answer(stamp, RESEND_S):
+            while not wires.commands.wait_for_answer(stamp, RESEND_S):
                 waited = time.monotonic() - began
                 if self._stop.is_set():
                     return

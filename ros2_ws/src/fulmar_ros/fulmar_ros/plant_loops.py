@@ -98,10 +98,10 @@ class LockstepLoop:
         stamp = self._clock.now_ns
         began = time.monotonic()
         grounded = self._update_bearing()
-        before = self._wires.answered_ns
+        before = self._wires.commands.answered_ns
         self._wires.publish_sample(sample, stamp)
         with self._wires.lock:
-            while not self._wires.wait_for_answer(stamp, RESEND_S):
+            while not self._wires.commands.wait_for_answer(stamp, RESEND_S):
                 waited = time.monotonic() - began
                 if stop.is_set():
                     return None
@@ -121,7 +121,7 @@ class LockstepLoop:
 
     def _why_unanswered(self, before_ns: int | None) -> str:
         """What the plant received in the place of an answer; with the stamp that was answered before."""
-        answered_ns = self._wires.answered_ns
+        answered_ns = self._wires.commands.answered_ns
         if answered_ns is not None and answered_ns != before_ns:
             return f"the last command is stamped t = {answered_ns / 1e9:.2f} s. A command answers an odom by its stamp."
         refused = f" {self._guard.last_rejection}." if self._guard.last_rejection else ""
@@ -159,7 +159,7 @@ class ChainLoop(LockstepLoop):
 
     def _exchange(self, sample: Sample, stop: threading.Event) -> np.ndarray | None:
         stamp, began, wires = self._clock.now_ns, time.monotonic(), self._wires
-        grounded, before = self._update_bearing(), self._wires.answered_ns
+        grounded, before = self._update_bearing(), self._wires.commands.answered_ns
         wires.publish_period(sample, stamp)
         with wires.lock:
             while not wires.wait_for_period(stamp, RESEND_S):
@@ -169,7 +169,7 @@ class ChainLoop(LockstepLoop):
                 if waited > self._answer_timeout_s:
                     raise LockstepError(self._silence(stamp, waited, before))
                 wires.repeat_period()
-            self._commanded = wires.answered_ns == stamp
+            self._commanded = wires.commands.answered_ns == stamp
             command = self._guard.answer(time.monotonic_ns(), sample.odometry, plant_ns=stamp)
         if grounded:
             command = self._backend.robot.actuators.safe_command
@@ -314,7 +314,7 @@ class RealtimeLoop:
 
     def _command(self, sample: Sample) -> np.ndarray:
         with self._wires.lock:
-            self._wires.take_arrived()
+            self._wires.commands.take_arrived()
             self._guard.see_refusal(sample.refusal)
             now_ns = time.monotonic_ns()
             if self._ends is not None:
@@ -338,4 +338,4 @@ def _compare(
     if failed is not None:
         stuck = None if failed.value is None else (failed.part, failed.value)
         with wires.lock:
-            guard.fail(failed.words, wires.steady_ns, stuck)
+            guard.fail(failed.words, wires.commands.steady_ns, stuck)

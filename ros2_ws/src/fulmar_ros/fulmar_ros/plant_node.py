@@ -178,7 +178,7 @@ class PlantNode(LifecycleNode):
                 first=lambda: (first_episode(self.robot, self.settings), self.settings.seed),
             )
             self._backend.moved = lambda: self._feedback.reset()
-            self.wires.cuts, self.health.simulation = self._backend.cuts, self._simulation.values
+            self.wires.commands.cuts, self.health.simulation = self._backend.cuts, self._simulation.values
         identity = identity_of(
             self,
             started_ns=self._started_ns,
@@ -197,7 +197,7 @@ class PlantNode(LifecycleNode):
         self._stop.clear()
         with self.wires.lock:
             self.guard.reset()
-        self.wires.listening = True
+        self.wires.commands.listening = True
         self._make_loops(self._backend)
         self.health.mode = "waiting"
         settle_memory()
@@ -385,7 +385,7 @@ class PlantNode(LifecycleNode):
                 ticks = self._count(self.robot.timing.physics_dt)
                 self._realtime.run(sample, ticks, self._stop, lands=lands)
             self.health.mode = "stopping"
-            self.wires.listening = False  # from here on no command is due
+            self.wires.commands.listening = False  # from here on no command is due
             self._make_safe()
             self.health.mode = "inactive" if self._stop.is_set() else "finished"
         except FulmarError as error:
@@ -433,7 +433,7 @@ class PlantNode(LifecycleNode):
 
     def _make_safe(self) -> None:
         assert self._backend is not None
-        self.wires.expect_no_answers()
+        self.wires.commands.expect_no_answers()
         try:
             self._backend.make_safe()
         finally:

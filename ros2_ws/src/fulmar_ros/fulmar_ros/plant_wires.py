@@ -1,39 +1,30 @@
-"""Publishers, subscriptions and answer times of a plant: one object for every wire on its side."""
+"""Publishers and subscriptions of a plant: one object for every wire on its side."""
 
 from __future__ import annotations
 
-import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
-from geometry_msgs.msg import PoseStamped, TwistStamped
+from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Odometry
 from rclpy.lifecycle import LifecycleNode
 from rclpy.publisher import Publisher
-from rclpy.subscription import Subscription
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
-from std_srvs.srv import Trigger
 
-from fulmar_core.config.process import CONTROL_PRIORITY, take_priority_with_helpers
 from fulmar_core.robots.robot import Robot
 from fulmar_core.robots.topics import (
     ACTUATORS_STATE,
     CLOCK,
-    GIVE_BACK,
     MOCAP,
     NEIGHBOURS,
-    TELEOP,
     TRUTH,
-    VELOCITY_COMMAND,
-    command_wire,
     thing_wire,
 )
 from fulmar_core.safety.actuator_guard import ActuatorGuard
 from fulmar_core.simulation.backend import Sample
-from fulmar_core.simulation.disturbances import COMMANDS
 from fulmar_core.simulation.disturbances import ODOMETRY as ODOMETRY_LINK
 from fulmar_core.states.planar import at_rest
 from fulmar_core.states.state import RigidBodyState
@@ -43,32 +34,34 @@ from fulmar_ros import plant_estop
 from fulmar_ros.convert import (
     OdometryWriter,
     PoseWriter,
-    TwistReader,
-    VectorReader,
     VectorWriter,
     stamp_of,
 )
-from fulmar_ros.deadline import Spread
 from fulmar_ros.frame_wires import ModelWires, odometry_transform
-from fulmar_ros.graph import writers_of
 from fulmar_ros.motion_capture import MakeCapture
 from fulmar_ros.neighbour_messages import neighbours_message
-from fulmar_ros.operator_subscription import destroy_all, subscribe_every
 from fulmar_ros.parameters import own_frames
 from fulmar_ros.plant_clock import SimulatedTime
+from fulmar_ros.plant_commands import PlantCommands
 from fulmar_ros.plant_estop import PlantEstop
-from fulmar_ros.plant_link import PlantLink, SentCommand
+from fulmar_ros.plant_link import PlantLink
 from fulmar_ros.plant_period import PlantPeriod
-from fulmar_ros.qos import FLUSH_S, LAST_WORDS_S, flush, publish_patiently, publisher_qos, subscriber_qos
+from fulmar_ros.qos import FLUSH_S, LAST_WORDS_S, flush, publish_patiently, publisher_qos
 from fulmar_ros.relay import RelayedInputs
 from fulmar_ros.sensor_wires import SensorWires
-from fulmar_ros.sent_states import SentStates
 
 CLOCK_PERIOD_NS = 5_000_000  # /clock at most 200 times a wall-clock second
 
 
 class PlantWires:
-    """Publishers, subscriptions and response times of a plant node."""
+    """Publishers and subscriptions of a plant node.
+
+    Attributes:
+        commands: What moves the plant.
+        lock: Held while its guard is touched.
+        estop: Of this plant.
+        subscribed: The wires that are subscribed; the values say whether a best-effort publisher is refused.
+    """
 
     def __init__(
         self,
@@ -95,7 +88,7 @@ class PlantWires:
         Args:
             node: Owner of the endpoints.
             robot: The robot.
-            guard: Receives the commands; only touched under `self.lock`.
+            guard: Receives the commands; only touched under `lock`.
             simulated: Whether the truth is published.
             clock: Whether the clock is published.
             odometry: Whether the plant publishes odometry; if not, another node does.
@@ -112,22 +105,21 @@ class PlantWires:
             neighbours: Whether is published where the other robots of a fleet are.
         """
         self._link, self._lockstep = link, lockstep
-        self._awaited_ns = -1  # stamp of the odometry over a link that no command has answered yet
         self._mocap = mocap(self._publish_pose) if mocap is not None else None
-        self._prior = lockstep  # whether the threads that commands pass have what priority they need
         self._publish = publish = publish_patiently if lockstep else Publisher.publish
         self._flush_s = FLUSH_S if lockstep else LAST_WORDS_S
-        self.lock = threading.Condition()
-        self.latency_ms = Spread()
-        self.answers = 0  # states that a command has answered
-        self.listening = True  # whether commands of controllers count
-        self.cuts: Callable[[str], bool] = lambda _side: False  # whether messages of `SIDES` are lost
         self._robot, self._guard = robot, guard
-        self._simulated_time = simulated_time
-        self._sent = SentStates(guard.watchdog.timeout_ns)
         # Without them, commands answer odometry of another node, whose stamps are of another clock.
-        self._knows_ages = simulated or odometry
-        self.answered_ns: int | None = None  # stamp of the newest command that was taken
+        self.commands = PlantCommands(
+            node,
+            robot,
+            guard,
+            lockstep=lockstep,
+            knows_ages=simulated or odometry,
+            simulated_time=simulated_time,
+            link=link,
+        )
+        self.lock = self.commands.lock
         self._clock_ns = 0
         self._captured_ns = 0
         self._qos = qos = partial(publisher_qos, lockstep=lockstep, lossless=bool(chain))
@@ -169,35 +161,21 @@ class PlantWires:
         )
         self._node = node
         self._things: dict[str, Publisher] = {}  # each made with its first pose: most robots are alone
-        wire = command_wire(robot)
-        # By the clock the newest command counts. A reliable reader would hold it back for seconds while a lost one is
-        # sent again.
-        commands = subscriber_qos(wire, reliable=lockstep)
-        names = robot.actuators.names
-        by_velocity = wire is VELOCITY_COMMAND
-        self._reader = TwistReader(names, frames) if by_velocity else VectorReader(names)
-        self._commands = node.create_subscription(
-            TwistStamped if by_velocity else JointState, wire.name, self._on_command, commands, raw=True
-        )
         self._relayed = RelayedInputs(node)
         self.estop = PlantEstop(node, guard, self.lock, self._relayed, fleet=fleet)
-        self._operator: list[list[Subscription]] = []
-        # The wires that are subscribed; the values say whether a best-effort publisher is refused.
-        self.subscribed = {wire: lockstep, **dict.fromkeys(plant_estop.wires_of(fleet=fleet), False)}
-        if not lockstep:
-            self._operator.append(subscribe_every(node, JointState, TELEOP, self._on_teleop))
-            self.subscribed[TELEOP] = False
-        self._give_back = node.create_service(Trigger, GIVE_BACK, self._on_give_back)
+        self.subscribed = {
+            **self.commands.subscribed,
+            **dict.fromkeys(plant_estop.wires_of(fleet=fleet), False),
+        }
 
     def destroy(self, node: LifecycleNode) -> None:
         """Destroy every endpoint."""
         self.end_capture()
-        destroy_all(node, ([self._commands], *self._operator))
+        self.commands.destroy(node)
         self.estop.destroy(node)
         self._relayed.destroy(node)
         if self._period is not None:
             node.destroy_subscription(self._period.answers)
-        node.destroy_service(self._give_back)
         for publisher in self._publishers():
             node.destroy_publisher(publisher)
 
@@ -228,12 +206,11 @@ class PlantWires:
                 self._sensors.publish_stamped(sample.readings, time_ns)
                 return  # a device that has nothing else that is new; further back, the clock was set
             time_ns = self._captured_ns = sample.stamp_ns
-        with self.lock:
-            self._sent.note(time_ns, self.steady_ns)
+        self.commands.note_sent(time_ns)
         if self._link is None:
             self.publish_measured(sample, time_ns)
         else:
-            self._link.readings.send((sample, time_ns), self._now_ns)
+            self._link.readings.send((sample, time_ns), self.commands.now_ns)
             self._publish_arrived()
         self.publish_truth(sample, time_ns)
         now = time.monotonic_ns()
@@ -248,7 +225,7 @@ class PlantWires:
 
     def arrived_readings(self) -> list[tuple[Sample, int]]:
         """Samples that the link has carried to the controller by now, with their stamps [ns]."""
-        return [] if self._link is None else self._link.readings.arrived(self._now_ns)
+        return [] if self._link is None else self._link.readings.arrived(self.commands.now_ns)
 
     def publish_measured(self, sample: Sample, time_ns: int) -> None:
         """Publish what a controller receives of a sample: readings, and where things are.
@@ -261,7 +238,7 @@ class PlantWires:
         self._publish_readings(sample, time_ns)
 
     def _publish_readings(self, sample: Sample, time_ns: int) -> None:
-        if self.cuts(ODOMETRY_LINK):
+        if self.commands.cuts(ODOMETRY_LINK):
             return
         self._sensors.publish(sample.readings, time_ns)
         if self._mocap is not None and sample.odometry is not None:
@@ -313,25 +290,15 @@ class PlantWires:
         if self._mocap is not None:
             self._mocap.close()
 
-    def expect_no_answers(self) -> None:
-        """Accept and time no more commands that answer what was sent so far."""
-        with self.lock:
-            self._sent.close()
-
     def flush(self) -> None:
         """Wait for a limited time until every subscriber has the last states."""
         flush(self._publishers(), self._flush_s)
-
-    def wait_for_answer(self, time_ns: int, timeout_s: float) -> bool:
-        """Wait until a command answers the odometry of this stamp; call with `lock` held."""
-        return self.lock.wait_for(lambda: self.answered_ns == time_ns, timeout_s)
 
     def publish_tick(self, sample: Sample, time_ns: int) -> None:
         """Publish the readings of a physics step within a period; see `PlantPeriod`."""
         assert self._period is not None
         self._period.within = True
-        with self.lock:
-            self._sent.note(time_ns, self.steady_ns)
+        self.commands.note_sent(time_ns)
         self._publish_readings(sample, time_ns)
         self._period.within = False
 
@@ -373,82 +340,4 @@ class PlantWires:
                 actuators.names, actuators.safe_command.tolist(), time.monotonic_ns(), plant_ns=time_ns
             )
             return True
-        return self.answered_ns == time_ns
-
-    def _on_command(self, data: bytes) -> None:
-        command = self._reader.read(data)
-        if command is not None:  # what is damaged feeds no watchdog
-            self._take(command.names, command.values, command.stamp_ns)
-
-    def _on_teleop(self, message: JointState) -> None:
-        with self.lock:
-            self._guard.offer_by_hand(
-                message.name, message.effort, time.monotonic_ns(), plant_ns=self._plant_ns
-            )
-
-    def _on_give_back(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        with self.lock:
-            problem = self._guard.give_back(self.steady_ns)
-        response.success, response.message = not problem, problem or "the controller has the robot again"
-        return response
-
-    def see_writers(self) -> None:
-        """Report to the guard which nodes publish commands."""
-        writers = writers_of(self._node, self._commands)
-        with self.lock:
-            self._guard.publishers.see(writers, time.monotonic_ns())
-
-    @property
-    def steady_ns(self) -> int:
-        """Steady clock of watchdog and ages: the plant's own where a link loses commands in lock step [ns]."""
-        by_plant = self._link is not None and self._lockstep and self._simulated_time is not None
-        return self._now_ns if by_plant else time.monotonic_ns()
-
-    @property
-    def _now_ns(self) -> int:
-        """Time on the plant's clock [ns]."""
-        return time.time_ns() if self._simulated_time is None else self._simulated_time.now_ns
-
-    @property
-    def _plant_ns(self) -> int | None:
-        return None if self._simulated_time is None else self._simulated_time.now_ns
-
-    def await_answer(self, time_ns: int) -> None:
-        """Let the first command that answers the odometry of a stamp go over the link, and no repetition [ns]."""
-        with self.lock:
-            self._awaited_ns = time_ns
-
-    def take_arrived(self) -> None:
-        """Take the commands that the link has carried to the plant by now; call with `lock` held."""
-        if self._link is not None:
-            for command in self._link.commands.arrived(self._now_ns):
-                self._offer(command.names, command.values, command.stamp_ns)
-
-    def _take(self, names: Sequence[str], values: Sequence[float], stamp: int) -> None:
-        if not self.listening or self.cuts(COMMANDS):
-            return
-        if not self._prior:
-            take_priority_with_helpers(CONTROL_PRIORITY)
-            self._prior = True
-        self.see_writers()  # before the first command of a second publisher is carried out
-        with self.lock:
-            if self._link is None:
-                if self._offer(names, values, stamp):
-                    self.answered_ns = stamp
-            elif not self._lockstep or stamp == self._awaited_ns:
-                self._link.commands.send(SentCommand(names, values, stamp), self._now_ns)
-                self._awaited_ns, self.answered_ns = -1, stamp
-            self.lock.notify_all()
-
-    def _offer(self, names: Sequence[str], values: Sequence[float], stamp: int) -> bool:
-        """Offer a command that has arrived to the guard; returns whether it was taken."""
-        now = self.steady_ns
-        outdated = self._knows_ages and self._sent.outdated(stamp, now)
-        taken = self._guard.offer(
-            names, values, now, stamp_ns=stamp, outdated=outdated, plant_ns=self._plant_ns
-        )
-        latency_ns = self._sent.answered(stamp, now)
-        if taken and latency_ns is not None:
-            self.latency_ms.add(latency_ns / 1e6)
-            self.answers += 1
-        return taken
+        return self.commands.answered_ns == time_ns
