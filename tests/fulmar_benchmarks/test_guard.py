@@ -61,6 +61,13 @@ def test_every_defect_acts_on_wings_which_stay_above_the_water(defect):
     assert found["runs"] == 2 and found["left"] == 0 and found["worst_m"] < 0.0
 
 
+def test_a_trial_says_how_long_its_runs_are(tmp_path):
+    trials = asked(
+        tmp_path, robots=["kingfisher", "airship_v7"], parts=["defects"], defects=["drift"]
+    ).cells()
+    assert [each.trial.seconds for each in trials] == [60.0, 60.0, 20.0, 20.0]
+
+
 def test_an_adversary_leaves_on_wheels_without_the_guard_and_stays_with_it(tmp_path):
     result = run(
         asked(tmp_path, robots="turtlebot2", controller="classical", parts="defects", defects="adversary")

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from fulmar_benchmarks.guard.defects import ADVERSARY, NONE
-from fulmar_benchmarks.guard.moving_trial import decision_of, drive, field_of
+from fulmar_benchmarks.guard.moving_trial import WING_RUN_S, decision_of, drive, field_of
 from fulmar_benchmarks.guard.trial import BATCH, BELIEFS, MUJOCO, SOUND, Trial, decision_ms, fly
 from fulmar_benchmarks.pairs import policy_hash
 from fulmar_benchmarks.shape import ALONE, Benchmark, Cell, Check, Figures, Found, Progress, known
@@ -75,8 +75,11 @@ class GuardRuns(Benchmark):
 
     def _trials(self, robot: str) -> Iterator[Trial]:
         """Every trial of a robot; wrong beliefs and MuJoCo are of those that float."""
-        asked, afloat = self.choice, floats(load_robot(robot))
+        asked, moved = self.choice, load_robot(robot)
+        afloat = floats(moved)
         base = Trial(robot, NONE, guarded=True, runs=asked.runs, seed=asked.seed, controller=asked.controller)
+        if moved.airframe is not None:
+            base = replace(base, seconds=WING_RUN_S)
         if "defects" in asked.parts:
             for defect in asked.defects:
                 for guarded in (True, False):

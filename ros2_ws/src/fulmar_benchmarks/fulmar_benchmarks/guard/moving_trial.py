@@ -31,7 +31,7 @@ SIDE_M, BOAT_SIDE_M = 2.5, 6.0  # half the area: of wheels, and of boats, which 
 DRAWN = 0.76  # of it, in which starts and goals are drawn [-]
 FARTHEST_M = 5.0  # of goals from starts, as tasks draw them: policies know no farther ones [m]
 WING_DELAY_S = 0.02  # of commands to aircraft, at most [s]
-WING_SHARE = 3.0  # by which runs of aircraft are shorter: what is lost is lost within seconds [-]
+WING_RUN_S = 20.0  # shorter than those of others: what an aircraft loses it loses within seconds [s]
 
 
 @dataclass(frozen=True)
@@ -106,7 +106,7 @@ def drive(trial: Trial, progress: Callable[[float], None] = lambda share: None) 
     worlds = _worlds(trial, field, controller.control_hz)
     loop.reset()
     loop.begin(goal_in_float64(worlds.goal))
-    steps = round(trial.seconds / loop.dt / (1.0 if field.side else WING_SHARE))
+    steps = round(trial.seconds / loop.dt)
     worst, tripped = np.full(trial.runs, -np.inf), np.zeros(trial.runs, dtype=bool)
     for step in range(steps):
         done = loop.step(worlds.measured, worlds.readings, round(1e9 * step * loop.dt))
