@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from fulmar_core.config.errors import ConfigError
+from fulmar_core.robots.robot_file import load_robot
 from fulmar_evaluation import fleet_seeds
 from fulmar_evaluation.fleet_outcome import FleetOutcome
 from fulmar_evaluation.fleet_seeds import Choice, SeedResult, evaluate_seeds, line_of, summed_up
@@ -92,9 +93,15 @@ def test_commands_that_crossed_and_runs_without_a_bag_are_named() -> None:
     )
 
 
-def record_of(applied: list[list[float]], commanded: list[list[float]], late_s: float = 0.03) -> Any:
-    """A platform's record: commands every 0.1 s, and what its plant applied so much later."""
-    effort = [np.zeros((len(rows), 8)) for rows in (applied, commanded)]
+def record_of(
+    applied: list[list[float]],
+    commanded: list[list[float]],
+    late_s: float = 0.03,
+    robot: str = "floating_platform",
+) -> Any:
+    """A robot's record: commands every 0.1 s, and what its plant applied so much later."""
+    count = len(load_robot(robot).actuators.names)
+    effort = [np.zeros((len(rows), count)) for rows in (applied, commanded)]
     for table, rows in zip(effort, (applied, commanded), strict=True):
         table[:, : len(rows[0])] = rows
     stamp_s = 0.1 * np.arange(len(applied))
@@ -102,7 +109,7 @@ def record_of(applied: list[list[float]], commanded: list[list[float]], late_s: 
         SimpleNamespace(stamp_s=stamp_s[: len(table)], publish_s=stamp_s[: len(table)] + later, effort=table)
         for table, later in zip(effort, (late_s, 0.0), strict=True)
     ]
-    return SimpleNamespace(info={"robot": "floating_platform"}, applied=wires[0], commanded=wires[1])
+    return SimpleNamespace(info={"robot": robot}, applied=wires[0], commanded=wires[1])
 
 
 @pytest.mark.parametrize("lockstep", [True, False])
@@ -121,3 +128,16 @@ def test_by_the_clock_a_plant_may_apply_an_earlier_command_or_rest_and_no_comman
         "of_long_ago": record_of([[0.2]] * 4, commanded, late_s=1.2),
     }
     assert fleet_seeds.crossed_robots(records, lockstep=False) == ("foresees", "of_long_ago")
+
+
+def test_a_boat_whose_propellers_go_from_rest_to_a_command_step_by_step_is_not_named() -> None:
+    commanded = [[-0.4, -0.4]] * 4
+    records = {
+        "slews": record_of(
+            [[-0.1, -0.1], [-0.2, -0.2], [-0.3, -0.3], [-0.4, -0.4]], commanded, robot="kingfisher"
+        ),
+        "beyond": record_of([[-0.1, -0.1], [-0.5, -0.4]], commanded, robot="kingfisher"),
+        "backwards": record_of([[0.1, -0.1]], commanded, robot="kingfisher"),
+        "valves": record_of([[0.1], [0.2]], [[0.4], [0.4]]),
+    }
+    assert fleet_seeds.crossed_robots(records, lockstep=False) == ("beyond", "backwards", "valves")

@@ -164,7 +164,8 @@ def crossed_robots(records: Mapping[str, RunRecord], *, lockstep: bool) -> tuple
     Args:
         records: Of the robots, by name.
         lockstep: Whether what was applied at a time is the command of that very time; else it is one of those that
-            were sent since the plant's watchdog would have tripped, or the safe command.
+            were sent since the plant's watchdog would have tripped, the safe command, or what lies between both where
+            actuators slew: after a trip of the watchdog the plant goes there step by step.
     """
     check = _applied_in_step if lockstep else _applied_by_the_clock
     return tuple(name for name, record in records.items() if not check(record))
@@ -180,13 +181,16 @@ def _applied_in_step(record: RunRecord) -> bool:
 
 def _applied_by_the_clock(record: RunRecord) -> bool:
     commanded, applied = record.commanded, record.applied
-    safe = load_robot(str(record.info["robot"])).actuators.safe_command
-    others = ~np.isclose(applied.effort, safe, atol=APPLIED_AS_COMMANDED).all(axis=1)
+    actuators = load_robot(str(record.info["robot"])).actuators
+    others = ~np.isclose(applied.effort, actuators.safe_command, atol=APPLIED_AS_COMMANDED).all(axis=1)
     sent_s = np.sort(commanded.publish_s)
     efforts = commanded.effort[np.argsort(commanded.publish_s, kind="stable")]
+    begins = np.broadcast_to(actuators.safe_command, efforts.shape) if actuators.response.slew else efforts
+    low = np.minimum(begins, efforts) - APPLIED_AS_COMMANDED
+    high = np.maximum(begins, efforts) + APPLIED_AS_COMMANDED
     for time_s, effort in zip(applied.publish_s[others], applied.effort[others], strict=True):
-        first, last = np.searchsorted(sent_s, (time_s - HELD_S, time_s + SENT_BY_S))
-        if not np.isclose(efforts[first:last], effort, atol=APPLIED_AS_COMMANDED).all(axis=1).any():
+        sent = slice(*np.searchsorted(sent_s, (time_s - HELD_S, time_s + SENT_BY_S)))
+        if not ((low[sent] <= effort) & (effort <= high[sent])).all(axis=1).any():
             return False
     return True
 
