@@ -83,6 +83,21 @@ def test_a_decision_by_rollouts_is_timed_beside_its_period():
     assert 0.0 < found["p50"] <= found["p99"] and found["period"] == pytest.approx(100.0)
 
 
+@pytest.mark.parametrize(
+    ("robot", "controller", "period"), [("airship_v7", "policy", 40.0), ("floating_platform", "lqr", 200.0)]
+)
+def test_what_a_decision_takes_of_the_period_is_of_the_rate_of_its_controller(
+    tmp_path, robot, controller, period
+):
+    asked_for = asked(tmp_path, robots=[robot], parts=["decision"], controller=controller)
+    result = run(asked_for)
+    (one,) = result.document["robots"]
+    took, checks = one["decision_ms"], {check.name: check for check in asked_for.checks(result.document)}
+    assert took["period"] == period
+    share = checks[f"{robot}: 99th percentile of a decision, of the period"].measured
+    assert share == pytest.approx(took["p99"] / period, rel=1e-3)
+
+
 def test_robots_without_such_a_guard_and_parts_that_do_not_exist_are_refused(tmp_path):
     with pytest.raises(ConfigError, match="guard 'envelope' is for robots that float"):
         run(asked(tmp_path, robots="cubesat_wheels"))

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from fulmar_benchmarks.guard.moving_defects import DefectiveDriver
-from fulmar_benchmarks.guard.trial import SOUND, THRUST, Trial, loaded, scenario_of
+from fulmar_benchmarks.guard.trial import SOUND, THRUST, Trial, decision_figures, loaded, scenario_of
 from fulmar_benchmarks.guard.wing_defects import DefectivePilot
 from fulmar_core.controllers.controller import Controller
 from fulmar_core.loop.control_loop import ControlLoop
@@ -152,7 +152,7 @@ def decision_of(name: str, controller: str, seed: int, *, count: int = 300) -> d
     """Processor time of a decision for one robot under way, guard and backup.
 
     Returns:
-        `p50` and `p99` of this thread, and the control `period` [ms].
+        As `decision_ms`.
     """
     field = field_of(name)
     trial = Trial(name, "none", guarded=True, runs=1, seed=seed, controller=controller)
@@ -169,5 +169,4 @@ def decision_of(name: str, controller: str, seed: int, *, count: int = 300) -> d
         envelope.guarded(done.command, inputs)
         took.append((time.thread_time_ns() - began_ns) / 1e6)
         worlds.move(done.command)
-    p50, p99 = (float(np.percentile(took, share)) for share in (50, 99))
-    return {"p50": p50, "p99": p99, "period": 1e3 * loop.dt}
+    return decision_figures(took, loop.dt)
