@@ -16,6 +16,8 @@ import yaml
 from fulmar_bringup import processes
 from fulmar_bringup.node_spec import NodeSpec
 from fulmar_bringup.processes import YIELDING, Ended, ProcessGroup, child_environment, command_line
+from fulmar_bringup.run_plan import RunPlan
+from fulmar_bringup.system_rows import system_rows
 from fulmar_core.config.yielding import AUTOGROUP, BEHIND
 
 
@@ -83,9 +85,9 @@ def start(tmp_path, monkeypatch):
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     group = ProcessGroup()
 
-    def start(name, program, *, optional=False):
+    def start(name, program, **more):
         (tmp_path / f"{name}_program.py").write_text(program)
-        group.start(NodeSpec(name, "x", "x", f"{name}_program", "/x", optional=optional))
+        group.start(NodeSpec(name, "x", "x", f"{name}_program", "/x", **more))
         return group
 
     yield start
@@ -227,6 +229,29 @@ def test_a_child_that_sleeps_is_asked_to_stop_and_does(start, tmp_path):
     wait_for(ready.exists)
     assert group.stop("sleeper") == [Ended("sleeper", 5)]
     assert group.ended() is None
+
+
+@pytest.mark.parametrize(
+    ("patience_s", "end"), [(0.1, Ended("writer", -9, forced=True)), (10.0, Ended("writer", 0))]
+)
+def test_a_child_has_the_time_that_its_row_gives_it_to_write_what_it_holds(start, tmp_path, patience_s, end):
+    ready = tmp_path / "ready"
+    group = start(
+        "writer",
+        "import pathlib, signal, sys, time\n"
+        "signal.signal(signal.SIGTERM, lambda *_: (time.sleep(0.5), sys.exit(0)))\n"
+        f"pathlib.Path({str(ready)!r}).touch()\n"
+        "time.sleep(60)\n",
+        patience_s=patience_s,
+    )
+    wait_for(ready.exists)
+    assert group.stop("writer") == [end]
+
+
+def test_a_recorder_has_more_time_to_end_than_what_moves_a_robot():
+    plan = RunPlan("floating_platform", "go_to_pose", "lqr", "mujoco", 50.0)
+    rows = system_rows(plan, record={})
+    assert rows["recorder"].patience_s > rows["plant"].patience_s == rows["controller"].patience_s
 
 
 def test_a_child_that_still_imports_its_modules_ends_without_a_word(start, tmp_path, capfd):

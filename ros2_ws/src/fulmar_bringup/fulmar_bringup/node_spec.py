@@ -35,6 +35,7 @@ class NodeSpec:
     optional: bool = False  # no node waits for it
     loss: str = ENDS  # what its loss means: one of `LOSSES`
     ends_within_s: float = 0.0  # that an orderly end may take; 0: as any node's [s]
+    patience_s: float = 4.0  # from the request to end until it is killed [s]
 
 
 def node_spec(

@@ -23,7 +23,6 @@ from fulmar_core.config.module_path import safe_environment
 from fulmar_core.config.process import LAUNCHER_PID
 from fulmar_ros.middleware import environment_of_any_node, middleware_environment
 
-PATIENCE_S = 4.0  # for an orderly end, before it is no longer asked for
 KILL_S = 2.0  # for a process to be gone after SIGKILL [s]
 GLUE = "fulmar_ros."  # package whose modules have a `main` that runs a node
 YIELDING = "fulmar_ros.yielding_start"
@@ -122,7 +121,8 @@ class ProcessGroup:
         chosen = [(name, self._children[name]) for name in names if name in self._children]
         killed: set[int] = set()
         # Not SIGINT: it ends a node that still imports its modules with a traceback, SIGTERM without a word.
-        for number, patience_s in ((signal.SIGTERM, PATIENCE_S), (signal.SIGKILL, KILL_S)):
+        ending_s = max((self._specs[name].patience_s for name, _ in chosen), default=0.0)
+        for number, patience_s in ((signal.SIGTERM, ending_s), (signal.SIGKILL, KILL_S)):
             alive = [child for _, child in chosen if child.poll() is None]
             for child in alive:
                 # A stopped process only reacts to SIGKILL.

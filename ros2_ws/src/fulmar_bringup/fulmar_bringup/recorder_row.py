@@ -13,6 +13,8 @@ from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.robots.topics import CAMERA_IMAGES, WIRES, own_wires
 from fulmar_core.tasks import load_task
 
+WRITES_WITHIN_S = 20.0  # what it still holds at its end, on a slow disk or a busy computer [s]
+
 
 def recorder_spec(plan: RunPlan, *, directory: str = "", info: str = "", files: str = "") -> NodeSpec:
     """The node that records.
@@ -43,6 +45,7 @@ def recorder_spec(plan: RunPlan, *, directory: str = "", info: str = "", files: 
             if wire.recorded or wire in CAMERA_IMAGES
         ),
         loss=plan.loss_of_helpers,
+        patience_s=WRITES_WITHIN_S,
     )
 
 
