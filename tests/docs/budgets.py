@@ -86,8 +86,8 @@ INSTEAD = {
     "fulmar goals circle --robot turtlebot2 --name alpha": (
         f"{CTRL_C} fulmar goals circle --robot turtlebot2 --name alpha"
     ),
-    "fulmar goals fleet_alpha --robot floating_platform --name alpha": (
-        f"{CTRL_C} fulmar goals fleet_alpha --robot floating_platform --name alpha"
+    "fulmar goals fleet_alpha --robot floating_platform --name alpha --as-path": (
+        f"{CTRL_C} fulmar goals fleet_alpha --robot floating_platform --name alpha --as-path"
     ),
     "fulmar goals upright_circle --robot spacecraft_16": (
         f"{CTRL_C} fulmar goals upright_circle --robot spacecraft_16"
