@@ -110,7 +110,11 @@ PARTS = [
     (r" --platforms \d+", " --platforms 1"),
     (r" --seeds 5", " --seeds 2"),
     (r" --episodes \d{2,}", " --episodes 4"),
-    (r"^(fulmar certify (?!--replay).*)$", r"\1 --episodes 400 --mujoco 8"),
+    (
+        r"^(fulmar certify .*--again.*)$",
+        r"\1 --episodes 2000 --mujoco 8",
+    ),  # a set of 400 just holds with as many
+    (r"^(fulmar certify (?!--replay|.*--episodes).*)$", r"\1 --episodes 400 --mujoco 8"),
     (r"^(fulmar train (?!.*--(?:time-limit|updates)).*)$", r"\1 --updates 1"),
     (r"^(fulmar (?:train|evaluate) (?!.*--episodes).*)$", r"\1 --episodes 4"),
     (r"^(fulmar run cubesat_wheels (?!.*--duration).*)$", r"\1 --duration 75"),

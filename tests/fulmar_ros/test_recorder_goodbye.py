@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from fulmar_bringup.processes import PATIENCE_S
+from fulmar_bringup.recorder_row import WRITES_WITHIN_S
 from fulmar_ros import recorder_node
 from fulmar_ros.recorder_node import LONGEST_GOODBYE_S, RecorderNode
 
@@ -39,4 +39,4 @@ def test_the_bag_is_closed_while_another_node_goes_on_publishing(monkeypatch):
 
 
 def test_who_stops_it_waits_for_longer_than_it_takes():
-    assert LONGEST_GOODBYE_S + 1.0 < PATIENCE_S
+    assert LONGEST_GOODBYE_S + 1.0 < WRITES_WITHIN_S
