@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import threading
 import time
 
@@ -55,6 +57,31 @@ def test_a_publisher_that_another_thread_destroys_while_its_event_comes_ends_not
         node.create_timer(0.01, served.set)
         assert served.wait(8.0)
     assert subscriptions and errors == []
+
+
+SIGNAL_GOES_TO_ANOTHER_THREAD = """
+import signal, sys
+from rclpy.node import Node
+from fulmar_ros import runtime
+
+def block() -> None:
+    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGTERM})
+    print("ready", flush=True)
+
+runtime.settle_memory = block
+sys.exit(runtime.run_node(lambda _exit: Node("quiet")))
+"""
+
+
+def test_a_node_ends_in_order_whichever_thread_the_signal_goes_to(ros_domain: RosDomain) -> None:
+    command = [sys.executable, "-c", SIGNAL_GOES_TO_ANOTHER_THREAD]
+    with subprocess.Popen(command, env=ros_domain.env, stdout=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stdout is not None and process.stdout.readline() == "ready\n"
+            process.terminate()
+            assert process.wait(10.0) == 0
+        finally:
+            process.kill()
 
 
 @pytest.mark.parametrize("ended", [False, True])

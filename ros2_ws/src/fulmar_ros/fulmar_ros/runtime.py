@@ -45,6 +45,7 @@ ENDS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 DESTROYED_S = 20.0  # for a node, or the middleware, to be destroyed; sound ones take less than a second
 STANDARD_ERROR = 2
 SPIN_S = 60.0
+LOOK_S = 0.1  # by which an orderly end may be late whose signal another thread has taken [s]
 RCLPY = os.path.dirname(rclpy.__file__) + os.sep
 EXECUTOR = "FULMAR_EXECUTOR"  # environment variable: default, or events
 
@@ -159,10 +160,22 @@ def _spin(node: Node, exit_codes: queue.SimpleQueue[int]) -> int:
             spun.enter_context(spinning(each, on_error))
         settle_memory()
         take_place()
-        asked = exit_codes.get()
+        asked = next_code(exit_codes)
         _bring_down(node, exit_codes)
         stopped = _stop(node)
     return asked or stopped
+
+
+def next_code(exit_codes: queue.SimpleQueue[int]) -> int:
+    """Wait in the main thread until somebody asks for the end; returns the exit code.
+
+    A signal goes to any thread that next enters the kernel's signal code, as one does that starts a thread. Python's
+    handler waits for the main thread then, which no signal wakes: in a wait without a limit it would never run, and
+    the node would go on until it is killed (CPython 3.11, Modules/signalmodule.c; Linux, kernel/signal.c).
+    """
+    while True:
+        with contextlib.suppress(queue.Empty):
+            return exit_codes.get(timeout=LOOK_S)
 
 
 def settle_memory() -> None:
