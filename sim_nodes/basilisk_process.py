@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from fulmar_core.config.errors import FulmarError
-from fulmar_core.config.other_environment import make_environment
-from fulmar_core.robots.basilisk_robots import ENVIRONMENT, basilisk_python
+from fulmar_core.config.other_environment import PEERS, make_environment
+from fulmar_core.robots.basilisk_robots import basilisk_python
 
 SERVER = Path(__file__).with_name("basilisk_server.py")
 LONGEST_S = 60.0  # until an answer; the import alone takes seconds on a busy computer [s]
@@ -154,4 +154,4 @@ class BasiliskCraft:
                 self.ask(end=True)
 
 
-REMEDY = make_environment(ENVIRONMENT)
+REMEDY = make_environment(PEERS)

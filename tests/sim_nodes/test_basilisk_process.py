@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from fulmar_core.config import other_environment
 from fulmar_core.config.errors import ConfigError
 from fulmar_core.robots import basilisk_robots
 from sim_nodes import basilisk_process
@@ -106,7 +107,7 @@ def test_a_python_that_cannot_be_run_is_one_line_with_what_to_run(tmp_path):
 
 def test_a_missing_environment_is_one_line_with_what_to_run(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(basilisk_robots, "config_directory", lambda: tmp_path / "configs")
+    monkeypatch.setattr(other_environment, "config_directory", lambda: tmp_path / "configs")
     with pytest.raises(ConfigError) as refused:
         basilisk_robots.basilisk_python()
     assert str(refused.value) == (

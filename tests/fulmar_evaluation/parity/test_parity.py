@@ -7,7 +7,7 @@ import math
 
 import pytest
 
-from fulmar_core.robots import basilisk_robots
+from fulmar_core.config import other_environment
 from fulmar_core.robots.basilisk_robots import check_basilisk
 from fulmar_core.robots.robot_file import load_robot
 from fulmar_evaluation.parity.page import lines_of, page_of
@@ -83,7 +83,7 @@ def test_a_mistake_gets_one_line(fulmar, words, said):
 
 def test_a_missing_basilisk_is_named_with_what_to_run(monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(basilisk_robots, "config_directory", lambda: tmp_path / "configs")
+    monkeypatch.setattr(other_environment, "config_directory", lambda: tmp_path / "configs")
     spacecraft = load_robot("spacecraft_16")
     assert "basilisk" not in simulators_of(spacecraft)
     assert missing_of(spacecraft)["basilisk"].endswith("is missing. Run: make peers")

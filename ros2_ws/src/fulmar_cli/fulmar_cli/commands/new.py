@@ -30,8 +30,9 @@ def airframe(
     ],
     out: Annotated[Path, option("FILE", "The robot's file to write (.yaml).")],
     python: Annotated[
-        Path, option("PATH", "A Python that has openaerostruct; `make peers` makes this one.")
-    ] = Path(".venv-peers/bin/python"),
+        Path | None,
+        option("PATH", "A Python that has openaerostruct; that of `make peers` by default."),
+    ] = None,
     force: Annotated[bool, flag("--force", "Replace FILE.")] = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -47,6 +48,7 @@ def airframe(
 
     fulmar check robot my_craft.yaml
     """
+    from fulmar_core.config.other_environment import peers_python
     from fulmar_core.config.strict_yaml import load_config
     from fulmar_evaluation.new_airframe.coefficient_set import coefficient_set
     from fulmar_evaluation.new_airframe.geometry import Geometry
@@ -57,7 +59,7 @@ def airframe(
     if out.exists() and not force:
         raise ConfigError(f"{out} exists already; no file is overwritten. Give --out another, or --force.")
     shape = load_config(Geometry, geometry)
-    terms = coefficient_set(shape, python)
+    terms = coefficient_set(shape, python or peers_python("The vortex lattice is OpenAeroStruct's"))
     source = f"Coefficients by OpenAeroStruct's vortex lattice from {geometry.name}."
     write_robot(shape, terms, out, source, geometry=geometry)
     if as_json:

@@ -6,6 +6,9 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from fulmar_core.config.errors import ConfigError
+from fulmar_core.config.paths import config_directory
+
+PEERS = ".venv-peers"  # of the outside programs that Fulmar is compared with, and of Basilisk
 
 
 def environment_python(environment: str, folders: Iterable[Path], purpose: str) -> Path:
@@ -31,3 +34,12 @@ def environment_python(environment: str, folders: Iterable[Path], purpose: str) 
 def make_environment(environment: str) -> str:
     """The sentence that says how to make an environment, such as `.venv-peers`."""
     return f"Run: make {environment.removeprefix('.venv-')}"
+
+
+def peers_python(purpose: str) -> Path:
+    """The Python of the outside programs, of this checkout or of the folder in which one is.
+
+    Raises:
+        ConfigError: It is missing.
+    """
+    return environment_python(PEERS, (config_directory().parent, Path.cwd()), purpose)

@@ -5,12 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 from fulmar_core.config.errors import ConfigError
-from fulmar_core.config.other_environment import environment_python
-from fulmar_core.config.paths import config_directory
+from fulmar_core.config.other_environment import peers_python
 from fulmar_core.robots.robot import Robot
 
 BASILISK = "basilisk"
-ENVIRONMENT = ".venv-peers"
 
 
 def is_for_basilisk(robot: Robot) -> bool:
@@ -37,5 +35,4 @@ def basilisk_python() -> Path:
     Raises:
         ConfigError: It is missing.
     """
-    folders = (config_directory().parent, Path.cwd())
-    return environment_python(ENVIRONMENT, folders, "Basilisk runs in an environment of its own")
+    return peers_python("Basilisk runs in an environment of its own")
