@@ -123,6 +123,9 @@ CODES: dict[str, tuple[int, ...]] = {
     "fulmar bag rerun BAG --controller classical --from odometry": (1,),
     # The clock of a computer that tests may follow no other one, as that of a robot has to.
     "fulmar doctor --for hardware relay_board.yaml": (0, 1),
+    # Times of a loop, for two seconds, beside other tests.
+    "fulmar benchmark latency": (0, 1),
+    "fulmar benchmark pace": (0, 1),
 }
 # Whole runs of policies that have learned for three seconds: they may miss their goals.
 LEARNED_BRIEFLY = {
