@@ -15,6 +15,7 @@ from importlib import import_module
 from typing import Any
 
 from fulmar_core.config.errors import ConfigError, did_you_mean
+from fulmar_core.config.module_path import own_packages
 
 PLATFORMS = ("egl", "osmesa")
 PACKAGES = {"egl": "libegl1 libgl1-mesa-dri", "osmesa": "libosmesa6"}  # of Debian and Ubuntu
@@ -91,6 +92,7 @@ def problem_of(platform: str) -> str:
     """Why a platform cannot draw, in one line; empty where it can. It draws an image in a process of its own."""
     environment = {**os.environ, VARIABLE: platform, THREADS: "1"}
     environment.pop("PYOPENGL_PLATFORM", None)
+    environment |= own_packages(environment)
     command = [sys.executable, "-m", "sim_nodes.camera.opengl", platform]
     try:
         done = subprocess.run(

@@ -8,7 +8,12 @@ import sys
 
 import pytest
 
-from fulmar_core.config.module_path import is_of_another_python, safe_environment, search_strangers_last
+from fulmar_core.config.module_path import (
+    is_of_another_python,
+    own_packages,
+    safe_environment,
+    search_strangers_last,
+)
 
 SHADOWS = ("random", "yaml", "signal", "numpy", "struct")
 OWN = """
@@ -89,3 +94,9 @@ def test_a_class_in_a_file_that_is_called_like_a_module_of_python_is_refused_als
         "except ConfigError as error: print(error)\n"
     )
     assert run("-c", asks).endswith(f"Rename {folder}/wave.py.\n")
+
+
+def test_children_get_no_folder_of_another_python():
+    theirs, ours = "/opt/ros/lib/python3.99/site-packages", "/home/me/modules"
+    assert own_packages({"PYTHONPATH": os.pathsep.join([theirs, ours])}) == {"PYTHONPATH": ours}
+    assert own_packages({"HOME": "/home/me"}) == {}

@@ -43,6 +43,13 @@ def safe_environment(environment: Mapping[str, str]) -> dict[str, str]:
     return SAFE if given is None else SAFE | {PYTHONPATH: os.pathsep.join(parts)}
 
 
+def own_packages(environment: Mapping[str, str]) -> dict[str, str]:
+    """PYTHONPATH of an environment, where it has one, without folders of another Python's packages."""
+    parts = environment.get(PYTHONPATH, "").split(os.pathsep)
+    kept = os.pathsep.join(part for part in parts if not is_of_another_python(part))
+    return {PYTHONPATH: kept} if PYTHONPATH in environment else {}
+
+
 def is_of_another_python(folder: str) -> bool:
     """Whether a folder holds packages of another version of Python, by its name: lib/python3.12/site-packages."""
     own = "python{}.{}".format(*sys.version_info)
