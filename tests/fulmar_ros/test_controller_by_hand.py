@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import time
+
 import pytest
+from geometry_msgs.msg import PoseStamped
 from rclpy.lifecycle import TransitionCallbackReturn
-from std_msgs.msg import Bool
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Bool, String
+from visualization_msgs.msg import MarkerArray
 
 from fulmar_core.config.errors import BundleError, FulmarError
 from fulmar_core.controllers.lqr import Lqr
@@ -122,3 +127,24 @@ def test_a_press_takes_the_goal_away():
     driven.node._on_estop_released(None)
     assert not driven.see().any()
     assert driven.node.guard.mission.lacking == "goal"
+
+
+def test_what_was_on_its_way_at_a_shutdown_is_left_out_and_a_press_is_received():
+    """The executor delivers it all the same, and an error would end the process with exit code 1."""
+    node = started().node
+    node.trigger_shutdown()
+    for receive, message in (
+        (node._on_odometry, (b"",)),
+        (node._on_applied, (b"",)),
+        (node._on_goal, (PoseStamped(), {})),
+        (node._on_obstacles, (MarkerArray(),)),
+        (node._on_thing, ("block", PoseStamped())),
+        (node._on_estop_released, (String(),)),
+        (node._on_swap, (String(data="lqr"),)),
+        (node._on_bearing, (Bool(data=True),)),
+        (node._on_neighbours, (JointState(),)),
+        (node._publish_idle_status, ()),
+    ):
+        receive(*message)
+    node._on_estop(Bool(data=True))
+    assert node._estop.reason(time.monotonic_ns())

@@ -47,6 +47,7 @@ from fulmar_ros.parameters import name_of, own_frames, read_parameters
 from fulmar_ros.qos import SAFE_REPEATS
 from fulmar_ros.reading_inputs import ReadingInputs
 from fulmar_ros.runtime import RequestExit, settle_memory
+from fulmar_ros.while_configured import while_configured
 
 DONE, REFUSED = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
 
@@ -242,6 +243,7 @@ class ControllerNode(LifecycleNode):
         self._estop.release(time.monotonic_ns())
         self._publish_status()
 
+    @while_configured
     def _on_swap(self, message: String) -> None:
         self._swap.ask(message.data)
         self._publish_status()  # at once: an operator repeats the request until then
@@ -255,19 +257,23 @@ class ControllerNode(LifecycleNode):
         self._beliefs = Beliefs()
         self.wires.publish_metadata(self._guarded.switch.current.metadata)
 
+    @while_configured
     def _on_goal(self, message: GoalMessage, info: dict[str, int]) -> None:
         self._mission_inputs.take_goal(self._guarded, message, info)
         self._publish_status()
         self._go_on()
 
+    @while_configured
     def _on_obstacles(self, message: MarkerArray) -> None:
         if self._mission_inputs.take_obstacles(self._guarded, message):
             self._publish_status()
 
+    @while_configured
     def _on_thing(self, name: str, message: PoseStamped) -> None:
         if self._mission_inputs.take_thing(self._guarded, name, message):
             self._go_on()
 
+    @while_configured
     def _on_applied(self, data: bytes) -> None:
         applied = self._read_applied.read(data)
         names = self._names
@@ -275,6 +281,7 @@ class ControllerNode(LifecycleNode):
             self._applied.add(applied.stamp_ns, np.array(applied.values))
         self._go_on()
 
+    @while_configured
     def _on_bearing(self, message: Bool) -> None:
         self._guarded.take_bearing(bool(message.data))
         self._publish_status()
@@ -285,16 +292,19 @@ class ControllerNode(LifecycleNode):
         """Whether a guard keeps the robot apart from others."""
         return self._guarded.loop.keep_apart is not None
 
+    @while_configured
     def _on_neighbours(self, message: JointState) -> None:
         self._neighbours.take(message)
         self._go_on()
 
+    @while_configured
     def _go_on(self) -> None:
         """Take the odometry that has waited."""
         late, self._late = self._late, None
         if late is not None:
             self._take_odometry(late, again=False)
 
+    @while_configured
     def _on_odometry(self, data: bytes) -> None:
         measurement = self._read_odometry.read(data)
         if measurement is None:
@@ -454,6 +464,7 @@ class ControllerNode(LifecycleNode):
         self._guarded.set(latched_fault=reason)
         self._request_exit(FAILED)
 
+    @while_configured
     def _publish_idle_status(self) -> None:
         """Publish the status where no control step does it."""
         self.wires.relayed.look()
@@ -480,6 +491,7 @@ class ControllerNode(LifecycleNode):
         if contested != self._guarded.flags.contested:
             self._guarded.contest(contested)
 
+    @while_configured
     def _publish_status(self, decision: Decision | None = None) -> None:
         guard = self._guarded
         self._status.publish(
