@@ -72,6 +72,16 @@ def test_at_its_end_a_plant_takes_no_command(plant):
     assert output(plant) == SHUT
 
 
+def test_what_was_on_its_way_at_a_shutdown_moves_nothing_and_ends_nothing(plant):
+    """The executor delivers it all the same, and an error would end the process with exit code 1."""
+    plant.node.trigger_shutdown()
+    plant.command(OPEN)
+    plant.node.wires.estop._on_estop(Bool(data=True), {})
+    plant.node.wires.estop._on_released(None)
+    plant.node.health.publish()
+    assert output(plant) == SHUT
+
+
 def test_a_torn_command_feeds_no_watchdog(plant):
     plant.node.wires.commands._on_command(b"\xff" * 90)
     assert plant.node.guard.watchdog.expired(time.monotonic_ns())

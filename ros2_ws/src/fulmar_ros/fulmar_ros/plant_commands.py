@@ -95,7 +95,8 @@ class PlantCommands:
         self._give_back = node.create_service(Trigger, GIVE_BACK, self._on_give_back)
 
     def destroy(self, node: LifecycleNode) -> None:
-        """Destroy every endpoint."""
+        """Destroy every endpoint; a command that is on its way counts no more."""
+        self.listening = False
         destroy_all(node, ([self._commands], self._by_hand))
         node.destroy_service(self._give_back)
 

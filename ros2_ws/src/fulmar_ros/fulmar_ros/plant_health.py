@@ -48,6 +48,7 @@ class PlantHealth:
         self._identity: dict[str, str] = {}  # as in `node_identity`
         self._said: tuple[object, ...] = ()
         self._said_at = 0.0
+        self._closed = False
         self.more: Callable[[], dict[str, str]] = dict
         self.feedback: ActuatorFeedback | None = None
         self.simulation: Callable[[], dict[str, str]] = dict
@@ -55,13 +56,15 @@ class PlantHealth:
 
     def open(self, node: LifecycleNode, identity: Mapping[str, str]) -> None:
         """Begin to publish, with the values of `node_identity`."""
+        self._closed = False
         self._identity = dict(identity)
         self._health = Health(node, f"{self._robot}: plant")
         self._wire_watch = WireWatch(node, self._wires.subscribed)
         self._timer = node.create_timer(LOOK_S, self.publish)
 
     def close(self, node: LifecycleNode) -> None:
-        """Stop publishing."""
+        """Stop publishing, also what a beat of the timer that is on its way would publish."""
+        self._closed = True
         node.destroy_timer(self._timer)
         for publisher in self._health.publishers:
             node.destroy_publisher(publisher)
@@ -80,6 +83,8 @@ class PlantHealth:
 
     def publish(self) -> None:
         """Publish on change, to a subscriber that has come, and once a second."""
+        if self._closed:
+            return
         self._wires.commands.see_writers()
         self._wires.estop.look()
         level, message, key = self._status()

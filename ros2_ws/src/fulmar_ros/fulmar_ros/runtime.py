@@ -167,7 +167,7 @@ def _spin(node: Node, exit_codes: queue.SimpleQueue[int]) -> int:
 
 
 def next_code(exit_codes: queue.SimpleQueue[int]) -> int:
-    """Wait in the main thread until somebody asks for the end; returns the exit code.
+    """Wait in the main thread for a request to end; returns the exit code.
 
     A signal goes to any thread that next enters the kernel's signal code, as one does that starts a thread. Python's
     handler waits for the main thread then, which no signal wakes: in a wait without a limit it would never run, and
