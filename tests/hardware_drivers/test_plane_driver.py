@@ -107,14 +107,19 @@ def test_a_plane_of_another_kind_is_neither_set_nor_taken_over():
     assert "PARAM_SET" not in device.received
 
 
-def test_a_plane_on_the_ground_is_not_taken_over(bench):
-    bench.device.armed = False
-    driver = driver_of(bench)
-    with pytest.raises(
-        DeviceError, match=r"not armed, in mode 12 .LOITER., and this driver takes over in flight"
-    ):
-        driver.reset(episode_at(), seed=0)
-    driver.close()
+def test_a_plane_on_the_ground_is_not_taken_over():
+    device = ArduPlaneEmulator(ROBOT, free_udp_port())
+    device.armed = False  # before its first heartbeat
+    bench = WingBench(device)
+    try:
+        driver = driver_of(bench)
+        with pytest.raises(
+            DeviceError, match=r"not armed, in mode 12 .LOITER., and this driver takes over in flight"
+        ):
+            driver.reset(episode_at(), seed=0)
+        driver.close()
+    finally:
+        bench.stop()
 
 
 def test_without_arm_the_driver_measures_only(bench):
