@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
-import typer
-
-from fulmar_bringup.console import log_line, print_json, print_result, write_line
 from fulmar_cli.commands.arguments import (
     CalibrationOption,
     JsonOption,
@@ -19,12 +15,9 @@ from fulmar_cli.commands.arguments import (
     invoked_command,
     option,
 )
+from fulmar_cli.commands.train_runs import learn_campaign, learn_once, learn_tasks_in_turn
 from fulmar_cli.installation.extras import require
-from fulmar_core.config.errors import FAILED, ConfigError
-
-if TYPE_CHECKING:
-    from training.jobs import Job
-    from training.request import TrainingRequest
+from fulmar_core.config.errors import ConfigError
 
 
 def train(
@@ -49,6 +42,18 @@ def train(
     episodes: Annotated[int, option("N", "Episodes of the final evaluation in MuJoCo.", min=1)] = 256,
     calibration: CalibrationOption = None,
     resume: Annotated[Path | None, option("RUN", "Resume this run exactly where it stopped.")] = None,
+    continue_with: Annotated[
+        str | None, option("TASK,...", "Tasks that the same network then learns, one after another.")
+    ] = None,
+    rehearse: Annotated[
+        float | None,
+        option(
+            "SHARE",
+            "Share of the worlds in which learned tasks are rehearsed; 0.5 by default.",
+            min=0.0,
+            max=0.9,
+        ),
+    ] = None,
     executor: Annotated[
         str, option("E", "Where a campaign runs: local (one run a core) or ray (a cluster).")
     ] = "local",
@@ -74,7 +79,10 @@ def train(
     fulmar train --resume runs/train/mine --time-limit 300
 
     fulmar train floating_platform go_to_pose --control-hz 50 --updates 20
+
+    fulmar train floating_platform go_to_position --continue-with go_to_pose,track_velocities
     """
+    from training.continual_plan import continual_plan, is_continual
     from training.request import TrainingRequest, job_of
 
     if wandb:
@@ -85,66 +93,14 @@ def train(
         robot, task, seed, seeds, time_limit, updates, stop_at_success, settings, control_hz, out, episodes,
         calibration, resume, "ray" if ray else executor, ray or address, wandb, invoked_command(),
     )  # fmt: skip
+    if continue_with is not None or is_continual(resume):
+        further = [task.strip() for task in (continue_with or "").split(",") if task.strip()]
+        learn_tasks_in_turn(continual_plan(request, further, rehearse), as_json=as_json)
+        return
+    if rehearse is not None:
+        raise ConfigError("--rehearse is for --continue-with TASK,...: give both, or leave it out.")
     job = job_of(request)
     if seeds == 1:
-        _learn_once(job, resumes=resume is not None, as_json=as_json)
+        learn_once(job, resumes=resume is not None, as_json=as_json)
     else:
-        _learn_campaign(job, request, as_json=as_json)
-
-
-def _learn_once(job: Job, *, resumes: bool, as_json: bool) -> None:
-    from training.advice import advice, usual_training
-    from training.evaluator import evaluate_in_mujoco
-    from training.jobs import learn
-    from training.progress import LearningBar
-    from training.run_folder import CHECKPOINT_FILE, NETWORK_FILE, RUN_FILE, START_FILE, learning_in
-
-    enough = job.settings.stop_at_success
-    with learning_in(job.out):
-        if not resumes and (job.out / START_FILE).exists():  # made after the request was checked
-            raise ConfigError(f"{job.out}: another training began there. Give --out another folder.")
-        log_line(
-            "learns for all of its time; to end it once the task is learned: --stop-at-success 0.99"
-            if enough is None
-            else f"ends early after {enough.checks} checks in a row with success {enough.rate:g} or more"
-        )
-        try:
-            record = learn(job, LearningBar(job.out))
-        except KeyboardInterrupt:
-            if (job.out / CHECKPOINT_FILE).is_file():
-                log_line(f"to resume: fulmar train --resume {job.out}")
-            if (job.out / RUN_FILE).is_file() and (job.out / NETWORK_FILE).is_file():
-                log_line(f"to export the best policy so far: fulmar export {job.out} --out DIR")
-            raise
-    parts = [record, record.get("fallback_policy", {"steps": 0, "wall_s": 0.0})]
-    steps, wall_s = (sum(part[key] for part in parts) for key in ("steps", "wall_s"))
-    log_line(f"learned from {steps:,} steps in {wall_s:.0f} s; evaluating in MuJoCo")
-    figures = evaluate_in_mujoco(job.out, episodes=job.episodes)
-    if as_json:
-        usual = usual_training(job.robot, job.task)
-        found = {"run": str(job.out), "steps": steps, "wall_s": wall_s, "mujoco": figures, "usual": usual}
-        print_json(found)
-        return
-    rate, kind = figures["success_rate"], job.settings.algorithm.kind
-    learned = {"robot": job.robot, "task": job.task, "steps": steps, "wall_s": wall_s, "algorithm": kind}
-    write_line(f"success {rate:.3f} of {job.episodes} episodes in MuJoCo; run folder {job.out}")
-    for line in advice(job.out, learned, rate):
-        write_line(line)
-
-
-def _learn_campaign(job: Job, request: TrainingRequest, *, as_json: bool) -> None:
-    if request.executor == "ray":
-        require("ray")
-    from training.campaign import campaign_text, run_campaign
-    from training.progress import JobBars
-    from training.request import executor_of
-
-    jobs = [
-        replace(job, name=f"seed {seed}", seed=seed, out=job.out / f"seed_{seed}")
-        for seed in range(job.seed, job.seed + request.seeds)
-    ]
-    with JobBars([each.name for each in jobs]) as bars:
-        result = run_campaign(jobs, executor_of(request), job.out, bars)
-    print_result(result, lambda result: write_line(campaign_text(result, job.out)), as_json=as_json)
-    if result["failed"]:
-        raise typer.Exit(FAILED)
+        learn_campaign(job, request, as_json=as_json)
