@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -39,7 +39,6 @@ def deployed_network(
     normaliser: VecNormalize,
     command_scale: Iterable[float],
     fallback: FallbackPolicy | None = None,
-    first_layer: Mapping[str, torch.Tensor] | None = None,
 ) -> DeployedNetwork:
     """Copy a learner's present weights and statistics.
 
@@ -48,7 +47,6 @@ def deployed_network(
         normaliser: Holds the running mean and variance of the observations.
         command_scale: Full command of each actuator, in its own unit.
         fallback: Policy that takes over when the robot is uncontrollable.
-        first_layer: Weight and bias of the first layer in place of the learner's.
 
     Returns:
         A network that shares nothing with the learner.
@@ -85,9 +83,8 @@ def deployed_network(
         deviation = np.sqrt(statistics.var + normaliser.epsilon)
         network.scale.copy_(torch.as_tensor(deviation, dtype=torch.float32))
         twins = [layer for layer in network.layers if isinstance(layer, nn.Linear)]
-        states = [layer.state_dict() for layer in trained.linear]
-        for twin, state in zip(twins, [first_layer or states[0], *states[1:]], strict=True):
-            twin.load_state_dict(state)
+        for twin, layer in zip(twins, trained.linear, strict=True):
+            twin.load_state_dict(layer.state_dict())
         if choice is not None:
             network.take_choice(choice)
         if bodies is not None:

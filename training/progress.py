@@ -91,6 +91,26 @@ class LearningBar:
         self._bar.stop()
 
 
+class DistillationBar:
+    """A progress bar for distillations, one after another; nothing where there is no terminal."""
+
+    def __init__(self) -> None:
+        console = Console(stderr=True)
+        self._bar = Progress(
+            TextColumn("learning to keep all tasks"), BarColumn(), TimeRemainingColumn(),
+            console=console, disable=not console.is_terminal,
+        )  # fmt: skip
+        self._task = self._bar.add_task("distillation", total=1.0)
+
+    def __call__(self, share: float) -> None:
+        """Show the share that is done [-]."""
+        if share < 1.0:
+            self._bar.start()
+        self._bar.update(self._task, completed=share)
+        if share >= 1.0:
+            self._bar.stop()
+
+
 class ProgressNotes:
     """Hands the progress of a run on, now and then, to the process that runs several."""
 

@@ -32,30 +32,7 @@ from training.settings import ActionSpace
 from training.worlds import actuator_space, observation_space, shares_space, training_task
 
 
-class UnwrappedVecEnv(VecEnv):
-    """A vector environment that is one object: an attribute of a world is that of the object."""
-
-    def close(self) -> None:
-        """Nothing to release."""
-
-    def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
-        """Attribute of this object, once for every world asked about."""
-        return [getattr(self, attr_name, None) for _ in self._get_indices(indices)]
-
-    def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-        """Set an attribute of this object."""
-        setattr(self, attr_name, value)
-
-    def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> list[Any]:
-        """Call a method of this object, once for every world asked about."""
-        return [getattr(self, method_name)(*args, **kwargs) for _ in self._get_indices(indices)]
-
-    def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
-        """Worlds are never wrapped one by one."""
-        return [False for _ in self._get_indices(indices)]
-
-
-class BatchVecEnv(UnwrappedVecEnv):
+class BatchVecEnv(VecEnv):
     """Worlds that learn together; each begins the next episode by itself when its episode is over.
 
     Actions are on/off for on/off valves, or the wrench that valves are chosen for, or numbers of incremental actions,
@@ -299,6 +276,25 @@ class BatchVecEnv(UnwrappedVecEnv):
     def _observed(self, worlds: np.ndarray) -> np.ndarray:
         observations = np.asarray(self.simulation.observe(worlds))
         return self._shown(self._with_own_terms(observations, worlds), worlds)
+
+    def close(self) -> None:
+        """Nothing to release."""
+
+    def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
+        """Attribute of this object, once for every world asked about."""
+        return [getattr(self, attr_name, None) for _ in self._get_indices(indices)]
+
+    def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
+        """Set an attribute of this object."""
+        setattr(self, attr_name, value)
+
+    def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> list[Any]:
+        """Call a method of this object, once for every world asked about."""
+        return [getattr(self, method_name)(*args, **kwargs) for _ in self._get_indices(indices)]
+
+    def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
+        """Worlds are never wrapped one by one."""
+        return [False for _ in self._get_indices(indices)]
 
 
 def _bodies_of(robot: Robot) -> KnownBodies:

@@ -45,15 +45,6 @@ def train(
     continue_with: Annotated[
         str | None, option("TASK,...", "Tasks that the same network then learns, one after another.")
     ] = None,
-    rehearse: Annotated[
-        float | None,
-        option(
-            "SHARE",
-            "Share of the worlds in which learned tasks are rehearsed; 0.5 by default.",
-            min=0.0,
-            max=0.9,
-        ),
-    ] = None,
     executor: Annotated[
         str, option("E", "Where a campaign runs: local (one run a core) or ray (a cluster).")
     ] = "local",
@@ -95,10 +86,8 @@ def train(
     )  # fmt: skip
     if continue_with is not None or is_continual(resume):
         further = [task.strip() for task in (continue_with or "").split(",") if task.strip()]
-        learn_tasks_in_turn(continual_plan(request, further, rehearse), as_json=as_json)
+        learn_tasks_in_turn(continual_plan(request, further), as_json=as_json)
         return
-    if rehearse is not None:
-        raise ConfigError("--rehearse is for --continue-with TASK,...: give both, or leave it out.")
     job = job_of(request)
     if seeds == 1:
         learn_once(job, resumes=resume is not None, as_json=as_json)

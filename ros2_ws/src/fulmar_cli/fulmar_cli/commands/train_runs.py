@@ -78,41 +78,42 @@ def learn_campaign(job: Job, request: TrainingRequest, *, as_json: bool) -> None
 
 
 def learn_tasks_in_turn(plan: ContinualPlan, *, as_json: bool) -> None:
-    """Train one network at task after task, and print the success at each after every stage."""
+    """Train at task after task, and print the success at each after every stage."""
     from training.continual import learn_tasks
-    from training.progress import LearningBar, Watcher
+    from training.progress import DistillationBar, LearningBar, Watcher
     from training.run_folder import learning_in
 
-    def watch(task: str) -> Watcher:
-        number = plan.tasks.index(task)
-        rehearsed = f", {plan.rehearsed:.0%} of the worlds rehearse what was learned" if number else ""
-        log_line(f"stage {number + 1} of {len(plan.tasks)}: {task}{rehearsed}")
-        return LearningBar(plan.out if number == len(plan.stages) else None)
+    bar = DistillationBar()
 
+    def watch(task: str) -> Watcher:
+        log_line(f"stage {plan.tasks.index(task) + 1} of {len(plan.tasks)}: {task}")
+        return LearningBar()
+
+    log_line(f"run folder: {plan.out}")
     with learning_in(plan.out):
         try:
-            plan = learn_tasks(plan, watch)
+            plan = learn_tasks(plan, watch, bar)
         except KeyboardInterrupt:
-            log_line(
-                f"finished stages stay; to go on with the one that was broken off: fulmar train --resume {plan.out}"
-            )
+            log_line(f"to resume: fulmar train --resume {plan.out}")
             raise
-    print_result(
-        plan.record | {"run": str(plan.out)}, lambda result: write_line(matrix_text(result)), as_json=as_json
-    )
+    result = plan.record | {"run": str(plan.out)}
+    print_result(result, lambda result: write_line(matrix_text(result)), as_json=as_json)
 
 
 def matrix_text(result: dict[str, Any]) -> str:
     """Success in MuJoCo at each task after each stage, as a table, and what to do next."""
     tasks, stages = result["tasks"], result["stages"]
     width = max(map(len, tasks))
-    head = "  ".join(f"{task:>{width}}" for task in tasks)
+    head = "  ".join(tasks)
     lines = [f"success in MuJoCo, {result['episodes']} episodes", f"{'after':{width}}  {head}"]
-    for stage in stages:
-        rates = (stage["mujoco"].get(task) for task in tasks)
-        cells = "  ".join(f"{'' if rate is None else format(rate, '.3f'):>{width}}" for rate in rates)
-        lines.append(f"{stage['task']:{width}}  {cells}")
+    lines += [f"{stage['task']:{width}}  {_cells(stage['mujoco'], tasks)}" for stage in stages]
+    alone = {stage["task"]: stage["training"]["mujoco"] for stage in stages}
+    lines.append(f"{'(alone)':{width}}  {_cells(alone, tasks)}")
     run = result["run"]
     lines.append(f"a bundle of each: fulmar export {run}/{tasks[0]} --out runs/bundles/{tasks[0]}")
     lines.append(f"a further task: fulmar train --resume {run} --continue-with TASK")
     return "\n".join(lines)
+
+
+def _cells(rates: dict[str, float], tasks: list[str]) -> str:
+    return "  ".join(f"{f'{rates[task]:.3f}' if task in rates else '':>{len(task)}}" for task in tasks)
