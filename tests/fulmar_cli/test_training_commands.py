@@ -6,6 +6,7 @@ import contextlib
 import io
 import json
 import sys
+from dataclasses import replace
 
 import pytest
 import typer
@@ -86,9 +87,40 @@ def test_a_seed_that_fails_is_reported_and_the_command_fails(asked, tmp_path):
     assert json.loads(reported)["failed"] == 1
 
 
+def test_one_task_after_another_prints_what_was_kept_and_what_to_do_next(monkeypatch, tmp_path):
+    def learn(plan, watcher_of, advance):
+        rates = {"go_to_pose": 0.75, "track_velocities": 1.0}
+        stages = [
+            {"task": task, "training": {"mujoco": 1.0}, "mujoco": dict(list(rates.items())[: number + 1])}
+            for number, task in enumerate(plan.tasks)
+        ]
+        return replace(plan, stages=tuple(stages))
+
+    monkeypatch.setattr("training.continual.learn_tasks", learn)
+    words = (*PLATFORM, "--continue-with", "track_velocities", "--out", tmp_path / "c", "--episodes", 8)
+    code, reported = call(train, *words)
+    assert code == 0
+    assert "success in MuJoCo, 8 episodes" in reported
+    assert "track_velocities       0.750             1.000" in reported
+    assert "fulmar train --resume" in reported
+    code, reported = call(train, *words, "--json")
+    assert json.loads(reported)["stages"][1]["mujoco"] == {"go_to_pose": 0.75, "track_velocities": 1.0}
+
+
+def test_a_run_of_several_tasks_is_resumed_as_such(monkeypatch, tmp_path):
+    plans = []
+    monkeypatch.setattr("training.continual.learn_tasks", lambda plan, *_: plans.append(plan) or plan)
+    call(train, *PLATFORM, "--continue-with", "track_velocities", "--out", tmp_path / "c", "--updates", 7)
+    plans[0].write()
+    call(train, "--resume", tmp_path / "c")
+    assert (plans[1].tasks, plans[1].updates) == (("go_to_pose", "track_velocities"), 7)
+
+
 @pytest.mark.parametrize(
     ("words", "reported"),
     [
+        ((*PLATFORM, "--continue-with", "go_to_pose"), "'go_to_pose' is learned already"),
+        ((*PLATFORM, "--continue-with", "go_to_positon"), "go_to_position"),
         ((), "ROBOT and TASK are needed, or --resume RUN"),
         (("floating_platform",), "ROBOT and TASK are needed"),
         ((*PLATFORM, "--executor", "slurm"), "--executor slurm: must be local or ray"),
