@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from fulmar_benchmarks.campaign import run
 from fulmar_benchmarks.catalogue import choice
 from fulmar_benchmarks.guard.campaign import GuardRuns
 from fulmar_benchmarks.guard.defects import DEFECTS
-from fulmar_benchmarks.guard.moving_trial import decision_of, drive
+from fulmar_benchmarks.guard.moving_trial import Field, decision_of, drive
 from fulmar_benchmarks.guard.trial import MUJOCO, Trial, decision_ms, fly
 from fulmar_core.config.errors import ConfigError, UnknownNameError
 
@@ -33,6 +34,22 @@ def test_every_defect_acts_in_the_plane(defect):
         Trial("floating_platform", defect, guarded=True, runs=2, seed=1, controller="lqr", seconds=3.0)
     )
     assert found["runs"] == 2 and found["left"] == 0
+
+
+def test_a_run_that_left_its_area_is_no_success_wherever_it_ends(monkeypatch):
+    sound = Trial("floating_platform", "none", False, 2, 1, controller="lqr", seconds=25.0)
+    inside = fly(sound)
+    assert (inside["left"], inside["success"]) == (0, 1.0)
+    monkeypatch.setattr("fulmar_benchmarks.guard.trial.SIDE_M", 0.9 * (2.5 + inside["worst_m"]))
+    beyond = fly(sound)
+    assert beyond["left"] >= 1 and beyond["success"] == 1.0 - beyond["left"] / 2
+
+
+def test_a_drive_that_left_its_area_is_no_success_wherever_it_ends(monkeypatch):
+    sound = Trial("turtlebot2", "none", False, 2, 1, controller="classical", seconds=25.0)
+    assert drive(sound)["success"] == 1.0
+    monkeypatch.setattr(Field, "beyond", lambda self, truth: np.array([0.1, -0.1]))
+    assert drive(sound)["success"] == 0.5
 
 
 def test_mujoco_flies_the_same_trial():

@@ -73,12 +73,12 @@ class Field:
         lost = is_lost(SpatialState.from_rigid(truth.to_rigid()), self.robot)
         return np.asarray(np.where(lost, np.maximum(deep, 1e-3), deep))
 
-    def arrived(self, truth: State, goal: Goal) -> float:
-        """Share that is at its goal at the end: within the task's tolerance; of aircraft across their flight."""
+    def arrived(self, truth: State, goal: Goal) -> np.ndarray:
+        """Which robots are at their goals: within the task's tolerance; of aircraft across their flight."""
         axes = slice(0, 2) if self.side else slice(1, 3)
         place, aim = truth.to_rigid().position_in_world, np.asarray(goal.current)
         off = np.linalg.norm(place[:, axes] - aim[:, axes], axis=1)
-        return float((off < self.task.tolerance.position).mean())
+        return np.asarray(off < self.task.tolerance.position)
 
 
 def field_of(name: str) -> Field:
@@ -122,7 +122,7 @@ def drive(trial: Trial, progress: Callable[[float], None] = lambda share: None) 
         "worst_m": float(worst.max()),
         "trip_share": float(tripped.mean()),
         "backup_share": backup,
-        "success": field.arrived(worlds.truth, worlds.goal),
+        "success": float((field.arrived(worlds.truth, worlds.goal) & (worst <= 0.0)).mean()),
     }
 
 

@@ -108,7 +108,8 @@ def fly(trial: Trial, progress: Callable[[float], None] = lambda share: None) ->
 
     Returns:
         `left`, how many left the area; `worst_m`, the farthest beyond a side; `trip_share` of the runs, `backup_share`
-        of their time, and `success` of the runs.
+        of their time, and `success`, the share that never left and is at its goal at the end: a robot
+        with an area that left it stays stopped.
     """
     robot = identified(load_robot(trial.robot))
     task = load_task("go_to_pose" + robot.state_type.SUFFIX)
@@ -137,7 +138,7 @@ def fly(trial: Trial, progress: Callable[[float], None] = lambda share: None) ->
                 tripped |= envelope.trips > 0
             progress((step + 1) / steps)
     aim = np.asarray(episodes.goal.current)[:, :axes]
-    success = float((np.linalg.norm(place - aim, axis=1) < NEAR_M).mean())
+    arrived = np.linalg.norm(place - aim, axis=1) < NEAR_M
     backup = 0.0 if envelope is None else envelope.steps_in_backup / envelope.steps
     return {
         "runs": trial.runs,
@@ -145,7 +146,7 @@ def fly(trial: Trial, progress: Callable[[float], None] = lambda share: None) ->
         "worst_m": float(worst.max()),
         "trip_share": float(tripped.mean()),
         "backup_share": backup,
-        "success": success,
+        "success": float((arrived & (worst <= 0.0)).mean()),
     }
 
 
