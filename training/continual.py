@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import asdict
 from typing import Any
 
 from fulmar_core.tasks import load_task
 from fulmar_core.worlds.scenario import load_scenario
 from training.continual_plan import ContinualPlan
 from training.distillation import distil
-from training.evaluator import evaluate_in_mujoco
+from training.evaluator import Check, evaluate_in_mujoco, held_out_evaluator
 from training.jobs import Job, run_job
 from training.network import DeployedNetwork, load_network, save_network
 from training.progress import Watcher
@@ -60,7 +61,10 @@ def learn_tasks(
             "cpu_s": round(time.process_time() - cpu_began, 1),
         }
         mujoco = {name: _evaluated(plan, name, network, networks) for name, network in networks.items()}
-        stage = {"task": task, "training": _summary(learned), "distillation": taken, "mujoco": mujoco}
+        stage = {
+            "task": task, "training": _summary(learned), "distillation": taken,
+            "episodes": plan.episodes, "mujoco": mujoco,
+        }  # fmt: skip
         plan = plan.with_stage(stage)
     return plan
 
@@ -104,12 +108,16 @@ def _evaluated(
 ) -> float:
     """Write the run folder of a task's network, and return its success in MuJoCo [-]."""
     record, folder = read_run_record(plan.out / ALONE_FOLDER / task), plan.out / task
+    settings = plan.settings_of(task)
     folder.mkdir(exist_ok=True)
-    write_training_settings(plan.settings_of(task), folder / SETTINGS_FILE)
+    write_training_settings(settings, folder / SETTINGS_FILE)
     save_network(network, folder / NETWORK_FILE)
-    write_run_record(folder, record | {"learned_tasks": list(networks)})
     if len(networks) == 1:  # it is the network that was evaluated already
+        write_run_record(folder, record)
         return float(record["mujoco"]["success_rate"])
+    evaluator = held_out_evaluator(plan.learner, load_task(task), load_scenario(settings.scenario))
+    check = Check(record["wall_s"], record["steps"], *evaluator(network))
+    write_run_record(folder, record | {"best": asdict(check), "learned_tasks": list(networks)})
     return float(evaluate_in_mujoco(folder, episodes=plan.episodes)["success_rate"])
 
 

@@ -107,6 +107,7 @@ def continual_plan(request: TrainingRequest, further: Sequence[str]) -> Continua
         "--seeds": request.seeds > 1,
         "--wandb": request.wandb,
         "--calibration": request.calibration is not None,
+        "--ray": request.executor == "ray" or request.address is not None,
     }
     given = [option for option, is_given in alone.items() if is_given]
     if given:
@@ -132,9 +133,17 @@ def _new(request: TrainingRequest) -> ContinualPlan:
 
 
 def _resumed(request: TrainingRequest, run: Path) -> ContinualPlan:
-    if request.robot or request.task or request.settings or request.out or request.control_hz:
+    if (
+        request.robot
+        or request.task
+        or request.seed != 1
+        or request.settings
+        or request.out
+        or request.control_hz
+    ):
         raise ConfigError(
-            "--resume goes on with what the run began with; leave ROBOT, TASK, --settings, --out and --control-hz out."
+            "--resume goes on with what the run began with; leave ROBOT, TASK, --seed, --settings, --out and "
+            "--control-hz out."
         )
     if (run / START_FILE).is_file():
         raise ConfigError(f"{run}: was trained at one task: begin anew with --continue-with TASK,...")
@@ -149,7 +158,8 @@ def _resumed(request: TrainingRequest, run: Path) -> ContinualPlan:
     if request.updates is not None or request.time_limit_s is not None:
         plan = replace(plan, updates=request.updates, time_limit_s=request.time_limit_s)
     stop = request.stop_at_success if request.stop_at_success is not None else plan.stop_at_success
-    return replace(plan, stop_at_success=stop, command=request.command, git_revision=git_revision())
+    made = {"command": request.command, "git_revision": git_revision()}
+    return replace(plan, stop_at_success=stop, episodes=request.episodes, **made)
 
 
 def _check_settings(plan: ContinualPlan, task: str) -> None:

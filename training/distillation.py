@@ -27,6 +27,7 @@ STEPS = 25  # control steps of a round in each world
 WORLDS = 256  # of each task
 MINIBATCHES = 40  # of a round
 ROWS = 1024  # of each task in a minibatch
+BEYOND = 1.2  # an answer of more than full command counts as so much [-]
 RATE = 2e-3  # learning rate to begin with; it falls to 0
 
 
@@ -60,8 +61,9 @@ class _Taught:
         """Difference of raw outputs from answers."""
         if self.network.plan.decision == "threshold":
             return functional.binary_cross_entropy_with_logits(raw, torch.sigmoid(answers))
-        bounded = torch.tanh if self.network.plan.decision == "squash" else _clamped
-        return functional.mse_loss(bounded(raw), bounded(answers))
+        if self.network.plan.decision == "squash":
+            return functional.mse_loss(torch.tanh(raw), torch.tanh(answers))
+        return functional.mse_loss(raw, torch.clamp(answers, -BEYOND, BEYOND))
 
 
 def distil(
@@ -113,8 +115,3 @@ def distil(
             schedule.step()
         advance((number + 1) / ROUNDS)
     return {each.name: policy.network_of(each.name, each.network) for each in taught}
-
-
-def _clamped(raw: torch.Tensor) -> torch.Tensor:
-    # Slightly beyond the limits a gradient remains, and the answer is the same.
-    return torch.clamp(raw, -1.2, 1.2)

@@ -84,7 +84,7 @@ def export(run: Path, out: Path, other: str | None = None) -> Passport:
         | {"git_revision": record.get("git_revision", ""), "interrupted": record.get("interrupted", False)}
         | {
             key: record[key]
-            for key in ("updates", "cpu_s", "trained_on", "recipe", "fallback_policy")
+            for key in ("updates", "cpu_s", "trained_on", "recipe", "fallback_policy", "learned_tasks")
             if key in record
         }
         | {"curve": _curve(record)}

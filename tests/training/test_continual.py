@@ -150,7 +150,8 @@ def test_each_learned_task_can_be_exported_after_each_stage(small_plan, tmp_path
     assert json.loads((done.out / RECORD_FILE).read_text()) == json.loads(json.dumps(done.record))
     for task in (POSITION, VELOCITY):
         export(done.out / task, tmp_path / task)
-        assert read_passport(tmp_path / task).task == task
+        passport = read_passport(tmp_path / task)
+        assert (passport.task, passport.training["learned_tasks"]) == (task, [POSITION, VELOCITY])
 
 
 class Interrupting(Silent):
@@ -167,7 +168,7 @@ def test_a_broken_off_stage_is_resumed_and_a_further_task_is_added(small_plan, t
         learn(small_plan(VELOCITY), Interrupting)
     run = tmp_path / "run"
     first = (run / POSITION / NETWORK_FILE).read_bytes()
-    resumed = partial(small_plan, robot=None, task=None, updates=None, out=None, resume=run)
+    resumed = partial(small_plan, robot=None, task=None, updates=None, out=None, seed=1, resume=run)
     assert [stage["task"] for stage in resumed().stages] == [POSITION]
     assert resumed().tasks == (POSITION, VELOCITY)
     assert (run / POSITION / NETWORK_FILE).read_bytes() == first
@@ -179,13 +180,14 @@ def test_a_broken_off_stage_is_resumed_and_a_further_task_is_added(small_plan, t
 
 def test_the_plan_of_a_run_is_resumed_with_a_further_task(small_plan, tmp_path):
     begun = small_plan(VELOCITY).with_stage({"task": POSITION})
-    resumed = partial(small_plan, robot=None, task=None, updates=None, out=None, resume=begun.out)
+    resumed = partial(small_plan, robot=None, task=None, updates=None, out=None, seed=1, resume=begun.out)
     plan = resumed("go_to_pose")
     assert plan.tasks == (POSITION, VELOCITY, "go_to_pose")
     assert (plan.stages, plan.updates, plan.seed) == (begun.stages, 2, 3)
     assert resumed(updates=5).updates == 5
-    with pytest.raises(ConfigError, match="leave ROBOT, TASK"):
-        resumed(robot="floating_platform")
+    for more in ({"robot": "floating_platform"}, {"seed": 4}):
+        with pytest.raises(ConfigError, match="leave ROBOT, TASK, --seed"):
+            resumed(**more)
     (begun.out / RECORD_FILE).write_text("{}")
     with pytest.raises(ConfigError, match="is no record of a training task after task"):
         resumed()
@@ -199,6 +201,7 @@ def test_the_plan_of_a_run_is_resumed_with_a_further_task(small_plan, tmp_path):
         (["go_to_pose_3d"], {}, "floating_platform"),
         (["go_to_pose"], {"seeds": 3}, "leave --seeds out"),
         (["go_to_pose"], {"wandb": True}, "leave --wandb out"),
+        (["go_to_pose"], {"executor": "ray", "address": "host:6379"}, "leave --ray out"),
         (["go_to_pose"], {"settings": "recurrent_ppo"}, "learns by ppo, sac or td3, not by recurrent_ppo"),
         (["drift_go_to_pose"], {}, "which is for one task alone"),
     ],
@@ -220,4 +223,4 @@ def test_settings_that_differ_between_tasks_are_refused(small_settings, monkeypa
 
 def test_a_run_of_one_task_is_not_continued(run):
     with pytest.raises(ConfigError, match="was trained at one task: begin anew with --continue-with"):
-        continual_plan(replace(REQUEST, robot=None, task=None, resume=run[0]), ["go_to_pose"])
+        continual_plan(replace(REQUEST, robot=None, task=None, seed=1, resume=run[0]), ["go_to_pose"])
