@@ -104,9 +104,11 @@ def matrix_text(result: dict[str, Any]) -> str:
     """Success in MuJoCo at each task after each stage, as a table, and what to do next."""
     tasks, stages = result["tasks"], result["stages"]
     width = max(map(len, tasks))
-    head = "  ".join(tasks)
-    lines = [f"success in MuJoCo, {result['episodes']} episodes", f"{'after':{width}}  {head}"]
-    lines += [f"{stage['task']:{width}}  {_cells(stage['mujoco'], tasks)}" for stage in stages]
+    head = "  ".join([*tasks, "episodes"])
+    lines = ["success in MuJoCo", f"{'after':{width}}  {head}"]
+    for stage in stages:
+        cells = _cells(stage["mujoco"], tasks)
+        lines.append(f"{stage['task']:{width}}  {cells}  {stage['episodes']:8}")
     alone = {stage["task"]: stage["training"]["mujoco"] for stage in stages}
     lines.append(f"{'(alone)':{width}}  {_cells(alone, tasks)}")
     run = result["run"]
