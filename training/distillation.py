@@ -31,8 +31,8 @@ BEYOND = 1.2  # an answer of more than full command counts as so much [-]
 RATE = 2e-3  # learning rate to begin with; it falls to 0
 
 
-class _Taught:
-    """A task, the network that knows it, and what was met in its worlds."""
+class _TaskSamples:
+    """Observations of a task, and the answers of the network that learned it."""
 
     def __init__(self, name: str, network: DeployedNetwork, worlds: BatchVecEnv) -> None:
         self.name, self.network, self._worlds = name, network, worlds
@@ -42,7 +42,7 @@ class _Taught:
 
     @torch.no_grad()
     def drive(self, driver: DeployedNetwork, steps: int) -> None:
-        """Let a network drive, and note what this task's own network answers."""
+        """Let a network drive, and keep what the network of this task answers."""
         met = []
         for _ in range(steps):
             met.append(normalised(self.network, self._seen))
@@ -53,7 +53,7 @@ class _Taught:
         self._answers = torch.cat((self._answers, self.network.layers(new)))
 
     def draw(self, rows: int, generator: torch.Generator) -> tuple[torch.Tensor, torch.Tensor]:
-        """Normalised observations and answers, of all that was met."""
+        """Draw normalised observations and answers from all rounds so far."""
         index = torch.randint(len(self._rows), (rows,), generator=generator)
         return self._rows[index], self._answers[index]
 
@@ -93,8 +93,10 @@ def distil(
     torch.set_num_threads(1)  # as in `train`
     torch.manual_seed(seed)
     generator = torch.Generator().manual_seed(seed)
-    taught = [
-        _Taught(name, network, BatchVecEnv(robot, tasks[name], scenarios[name], worlds=WORLDS, seed=seed))
+    sampled = [
+        _TaskSamples(
+            name, network, BatchVecEnv(robot, tasks[name], scenarios[name], worlds=WORLDS, seed=seed)
+        )
         for name, network in networks.items()
     ]
     terms = {name: Observer(robot, tasks[name]).names for name in networks}
@@ -102,11 +104,11 @@ def distil(
     optimiser = torch.optim.Adam(policy.parameters(), lr=RATE)
     schedule = torch.optim.lr_scheduler.LinearLR(optimiser, 1.0, 0.0, ROUNDS * MINIBATCHES)
     for number in range(ROUNDS):
-        for each in taught:
+        for each in sampled:
             each.drive(policy.network_of(each.name, each.network) if number else each.network, STEPS)
         for _ in range(MINIBATCHES):
             losses = []
-            for each in taught:
+            for each in sampled:
                 rows, answers = each.draw(ROWS, generator)
                 losses.append(each.loss(policy(policy.features(each.name, rows)), answers))
             optimiser.zero_grad()
@@ -114,4 +116,4 @@ def distil(
             optimiser.step()
             schedule.step()
         advance((number + 1) / ROUNDS)
-    return {each.name: policy.network_of(each.name, each.network) for each in taught}
+    return {each.name: policy.network_of(each.name, each.network) for each in sampled}

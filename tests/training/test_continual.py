@@ -12,6 +12,7 @@ import torch
 
 from fulmar_core.config.errors import ConfigError
 from fulmar_core.loop.policy_bundle import read_passport
+from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.tasks import load_task
 from fulmar_core.tasks.observation import Observer
 from fulmar_core.worlds.scenario import load_scenario
@@ -56,19 +57,22 @@ def terms(robot):
     return {task: Observer(robot, load_task(task)).names for task in (POSITION, VELOCITY)}
 
 
-@pytest.fixture
-def networks(robot, terms):
-    """Networks of two tasks with weights of a seed, which answer more than rounding."""
-    made = {}
+def drawn_networks(robot, terms, decision="threshold"):
+    """Networks of tasks with weights of a seed, whose commands differ from one observation to the next."""
+    made, scale = {}, tuple(map(float, robot.actuators.scale))
     for seed, (task, names) in enumerate(terms.items()):
         torch.manual_seed(seed)
-        plan = NetworkPlan(len(names), (8,), 8, "tanh", "threshold", (1.0,) * 8, 10.0)
-        made[task] = DeployedNetwork(plan)
+        made[task] = DeployedNetwork(NetworkPlan(len(names), (8,), len(scale), "tanh", decision, scale, 10.0))
         made[task].mean.fill_(0.1 * seed)
         made[task].scale.fill_(0.5)
         for value in made[task].layers.state_dict().values():
             value.mul_(3.0)
     return made
+
+
+@pytest.fixture
+def networks(robot, terms):
+    return drawn_networks(robot, terms)
 
 
 def observations(task, rows=64):
@@ -105,11 +109,24 @@ def test_tasks_share_all_layers_after_the_first(terms, networks):
             assert torch.equal(value, theirs.state_dict()[name])
 
 
-def test_one_policy_learns_to_answer_as_the_networks_of_two_tasks_do(robot, networks, monkeypatch):
-    for name, value in {"ROUNDS": 8, "STEPS": 4, "WORLDS": 32, "MINIBATCHES": 40, "ROWS": 256}.items():
-        monkeypatch.setattr(distillation, name, value)
-    nominal, shares = load_scenario("nominal"), []
-    tasks = {name: load_task(name) for name in networks}
+@pytest.mark.parametrize(
+    ("name", "decision"),
+    [
+        ("floating_platform", "threshold"),
+        pytest.param("kingfisher", "clamp", marks=pytest.mark.slow),
+        pytest.param("kingfisher", "squash", marks=pytest.mark.slow),
+    ],
+)
+def test_one_policy_learns_to_answer_as_the_networks_of_two_tasks_do(name, decision, monkeypatch):
+    minibatches = 40 if decision == "threshold" else 150  # signs are learned sooner than values
+    sizes = {"ROUNDS": 8, "STEPS": 4, "WORLDS": 64, "MINIBATCHES": minibatches, "ROWS": 256}
+    for size, value in sizes.items():
+        monkeypatch.setattr(distillation, size, value)
+    robot, nominal, shares = load_robot(name), load_scenario("nominal"), []
+    tasks = {task: load_task(task) for task in (POSITION, VELOCITY)}
+    networks = drawn_networks(
+        robot, {task: Observer(robot, each).names for task, each in tasks.items()}, decision
+    )
     same = partial(
         distil, networks, robot, tasks, dict.fromkeys(networks, nominal),
         hidden=(32, 32), seed=3, advance=shares.append,
@@ -119,8 +136,8 @@ def test_one_policy_learns_to_answer_as_the_networks_of_two_tasks_do(robot, netw
     for task, network in networks.items():
         worlds = BatchVecEnv(robot, tasks[task], nominal, worlds=64, seed=9)
         seen = torch.from_numpy(worlds.reset())
-        agreed = (kept[task](seen)[0] == network(seen)[0]).float().mean()
-        assert agreed > 0.85, task
+        close = (kept[task](seen)[0] - network(seen)[0]).abs() < 0.3
+        assert close.float().mean() > 0.85, task
     again = same()
     assert all(torch.equal(kept[task].layers[0].weight, again[task].layers[0].weight) for task in networks)
 
