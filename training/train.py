@@ -170,34 +170,9 @@ def train(
         finally:
             learner.logger.close()
     assert history.best is not None
-    save_network(history.best[1], out / NETWORK_FILE)
-    record = run_record(
-        robot, task, settings, history,
-        seed=seed, steps=learner.num_timesteps * worlds.hold, command=command, git_revision=git_revision,
-    )  # fmt: skip
-    record |= {"steps_per_s": round(session.steps_per_s), "interrupted": interrupted}
-    write_run_record(out, record)
-    if unsaved is not None:
-        raise unsaved
-    if interrupted:
-        raise KeyboardInterrupt
-    return record
-
-
-def run_record(
-    robot: Robot,
-    task: Task,
-    settings: TrainingSettings,
-    history: RunHistory,
-    *,
-    seed: int,
-    steps: int,
-    command: str,
-    git_revision: str,
-) -> dict[str, Any]:
-    """What `run.json` says of a training with a best network."""
-    assert history.best is not None
-    return {
+    best, network = history.best
+    save_network(network, out / NETWORK_FILE)
+    record = {
         "robot": robot.name,
         "task": task.name,
         "seed": seed,
@@ -205,15 +180,23 @@ def run_record(
         "git_revision": git_revision,
         "control_hz": robot.timing.control_hz,
         "settings": asdict(settings),
-        "steps": steps,
+        "steps": learner.num_timesteps * worlds.hold,
         "updates": history.updates,
         "wall_s": round(history.elapsed_s, 1),
         "cpu_s": round(history.cpu_s, 2),
-        "best": asdict(history.best[0]),
+        "steps_per_s": round(session.steps_per_s),
+        "interrupted": interrupted,
+        "best": asdict(best),
         "curve": [asdict(check) for check in history.checks],
         "versions": {name: version(name) for name in ("torch", "stable-baselines3", "sb3-contrib", "numpy")}
         | {"python": platform.python_version()},
     }
+    write_run_record(out, record)
+    if unsaved is not None:
+        raise unsaved
+    if interrupted:
+        raise KeyboardInterrupt
+    return record
 
 
 def _learn(learner: BaseAlgorithm, session: Session, settings: TrainingSettings) -> bool:
