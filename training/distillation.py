@@ -17,7 +17,7 @@ from fulmar_core.robots.robot import Robot
 from fulmar_core.tasks import Task
 from fulmar_core.tasks.observation import Observer
 from fulmar_core.worlds.scenario import Scenario
-from training.joint_policy import JointPolicy, normalised
+from training.joint_policy import JointPolicy
 from training.network import DeployedNetwork
 from training.vec_env import BatchVecEnv
 
@@ -45,8 +45,9 @@ class _TaskSamples:
         """Let a network drive, and keep what the network of this task answers."""
         met = []
         for _ in range(steps):
-            met.append(normalised(self.network, self._seen))
-            command = driver(torch.from_numpy(np.asarray(self._seen, dtype=np.float32)))[0].numpy()
+            seen = torch.from_numpy(np.asarray(self._seen, dtype=np.float32))
+            met.append(self.network.normalised(seen))
+            command = driver(seen)[0].numpy()
             self._seen = self._worlds.step(command / self._scale)[0]
         new = torch.cat(met)
         self._rows = torch.cat((self._rows, new))

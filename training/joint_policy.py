@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-import numpy as np
 import torch
 from torch import nn
 
@@ -37,10 +36,10 @@ class JointPolicy(nn.Module):
             width = size
         self.layers = nn.Sequential(*layers, nn.Linear(width, outputs))
 
-    def features(self, task: str, normalised: torch.Tensor) -> torch.Tensor:
+    def features(self, task: str, observations: torch.Tensor) -> torch.Tensor:
         """Inputs for normalised observations of a task, shape (rows, inputs)."""
-        rows = torch.zeros(len(normalised), len(self.inputs))
-        rows[:, self._columns[task]] = normalised
+        rows = torch.zeros(len(observations), len(self.inputs))
+        rows[:, self._columns[task]] = observations
         rows[:, self.inputs.index(task)] = 1.0
         return rows
 
@@ -71,9 +70,3 @@ class JointPolicy(nn.Module):
         for twin, state in zip(twins, states, strict=True):
             twin.load_state_dict(state)
         return network
-
-
-def normalised(network: DeployedNetwork, observations: np.ndarray) -> torch.Tensor:
-    """Observations as the layers of a network are given them."""
-    rows = torch.from_numpy(np.asarray(observations, dtype=np.float32))
-    return torch.clamp((rows - network.mean) / network.scale, -network.plan.limit, network.plan.limit)

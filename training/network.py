@@ -137,7 +137,7 @@ class DeployedNetwork(PolicyNetwork):
         if self.plan.body:
             observation = torch.cat((observation, self.body.expand(observation.shape[0], -1)), dim=1)
         seen = self._mirrored(observation, observation, "seen")
-        features = torch.clamp((seen - self.mean) / self.scale, -self.plan.limit, self.plan.limit)
+        features = self.normalised(seen)
         if memory is None:
             raw = self._mirrored(self._incremental(self.layers(features), seen), observation, "done")
             raw = self._handed_over(self._valve_margins(raw, observation), observation)
@@ -145,6 +145,10 @@ class DeployedNetwork(PolicyNetwork):
         memory = self._remember(features, memory)
         raw = self._valve_margins(self.layers(memory[:, : self.plan.memory // 2]), observation)
         return self._decide(raw), raw, memory
+
+    def normalised(self, observation: torch.Tensor) -> torch.Tensor:
+        """Observations as the layers are given them, shape (worlds, n)."""
+        return torch.clamp((observation - self.mean) / self.scale, -self.plan.limit, self.plan.limit)
 
     def _remember(self, features: torch.Tensor, memory: torch.Tensor) -> torch.Tensor:
         """One step of an LSTM: its output and its cell, side by side (Hochreiter and Schmidhuber 1997)."""
