@@ -102,6 +102,14 @@ class DistillationBar:
         )  # fmt: skip
         self._task = self._bar.add_task("distillation", total=1.0)
 
+    def __enter__(self) -> DistillationBar:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._bar.stop()
+
     def __call__(self, share: float) -> None:
         """Show the share that is done [-]."""
         if share < 1.0:

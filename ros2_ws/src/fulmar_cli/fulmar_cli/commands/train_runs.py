@@ -83,14 +83,12 @@ def learn_tasks_in_turn(plan: ContinualPlan, *, as_json: bool) -> None:
     from training.progress import DistillationBar, LearningBar, Watcher
     from training.run_folder import learning_in
 
-    bar = DistillationBar()
-
     def watch(task: str) -> Watcher:
         log_line(f"stage {plan.tasks.index(task) + 1} of {len(plan.tasks)}: {task}")
         return LearningBar()
 
     log_line(f"run folder: {plan.out}")
-    with learning_in(plan.out):
+    with learning_in(plan.out), DistillationBar() as bar:
         try:
             plan = learn_tasks(plan, watch, bar)
         except KeyboardInterrupt:
