@@ -9,7 +9,7 @@ from typing import Any
 
 from fulmar_core.tasks import load_task
 from fulmar_core.worlds.scenario import load_scenario
-from training.continual_plan import ContinualPlan
+from training.continual_plan import ALONE_FOLDER, ContinualPlan
 from training.distillation import distil
 from training.evaluator import Check, evaluate_in_mujoco, held_out_evaluator
 from training.jobs import Job, run_job
@@ -24,8 +24,6 @@ from training.run_folder import (
 )
 from training.settings import write_training_settings
 from training.train import check_seed
-
-ALONE_FOLDER = "alone"
 
 
 def learn_tasks(
@@ -117,6 +115,7 @@ def _evaluated(
         return float(record["mujoco"]["success_rate"])
     evaluator = held_out_evaluator(plan.learner, load_task(task), load_scenario(settings.scenario))
     check = Check(record["wall_s"], record["steps"], *evaluator(network))
+    del record["mujoco"]  # of the network that was trained alone
     write_run_record(folder, record | {"best": asdict(check), "learned_tasks": list(networks)})
     return float(evaluate_in_mujoco(folder, episodes=plan.episodes)["success_rate"])
 

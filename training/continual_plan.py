@@ -16,10 +16,11 @@ from fulmar_core.robots.robot_file import load_robot
 from fulmar_core.safety.geofence import check_starts
 from fulmar_core.tasks import load_task
 from training.request import TrainingRequest, job_of
-from training.run_folder import START_FILE
+from training.run_folder import SETTINGS_FILE, START_FILE
 from training.settings import Ppo, Sac, StopAtSuccess, Td3, TrainingSettings, load_training_settings
 
 RECORD_FILE = "continual.json"
+ALONE_FOLDER = "alone"  # trainings at each task
 # Settings of networks that are more than layers over a task's own observation terms.
 ALONE = ("mirror", "disturbance_inputs", "body_inputs", "fallback_policy", "incremental_actions")
 
@@ -54,12 +55,14 @@ class ContinualPlan:
     stages: tuple[dict[str, Any], ...] = ()
 
     def settings_of(self, task: str) -> TrainingSettings:
-        """Training settings of a task.
+        """Training settings of a task; those that its training began with, once it has begun.
 
         Raises:
             ConfigError: As in `load_training_settings`.
         """
-        found = load_training_settings(load_robot(self.robot), load_task(task), self.settings)
+        begun = self.out / ALONE_FOLDER / task / SETTINGS_FILE
+        name = str(begun) if begun.is_file() else self.settings
+        found = load_training_settings(load_robot(self.robot), load_task(task), name)
         if self.control_hz is not None:
             found = replace(found, control_hz=self.control_hz)
         if self.stop_at_success is not None:

@@ -18,13 +18,15 @@ from fulmar_core.tasks.observation import Observer
 from fulmar_core.worlds.scenario import load_scenario
 from training import distillation
 from training.continual import learn_tasks
-from training.continual_plan import RECORD_FILE, continual_plan
+from training.continual_plan import ALONE_FOLDER, RECORD_FILE, continual_plan
 from training.distillation import distil
 from training.export import export
-from training.joint_policy import JointPolicy, normalised
+from training.joint_policy import JointPolicy
 from training.network import DeployedNetwork, NetworkPlan, load_network
+from training.progress import DistillationBar
 from training.request import TrainingRequest
-from training.run_folder import NETWORK_FILE
+from training.run_folder import NETWORK_FILE, SETTINGS_FILE, read_run_record
+from training.settings import write_training_settings
 from training.vec_env import BatchVecEnv
 
 POSITION, VELOCITY = "go_to_position", "track_velocities"
@@ -75,8 +77,8 @@ def networks(robot, terms):
     return drawn_networks(robot, terms)
 
 
-def observations(task, rows=64):
-    return np.random.default_rng(3).normal(size=(rows, task)).astype(np.float32)
+def observations(terms, rows=64):
+    return np.random.default_rng(3).normal(size=(rows, terms)).astype(np.float32)
 
 
 def test_terms_of_one_name_share_an_input_and_each_task_has_a_label(terms):
@@ -96,7 +98,7 @@ def test_the_network_of_a_task_answers_as_the_policy_does_with_its_label(task, t
     policy = JointPolicy(terms, (16, 16), 8)
     seen = observations(len(terms[task]))
     command, raw = policy.network_of(task, networks[task])(torch.from_numpy(seen))
-    expected = policy(policy.features(task, normalised(networks[task], seen)))
+    expected = policy(policy.features(task, networks[task].normalised(torch.from_numpy(seen))))
     torch.testing.assert_close(raw, expected, rtol=1e-5, atol=1e-5)
     assert torch.equal(command, (raw > 0.0).float())
 
@@ -227,6 +229,38 @@ def test_what_cannot_be_learned_task_after_task_is_refused_in_one_line(further, 
     with pytest.raises(ConfigError, match=words):
         continual_plan(replace(REQUEST, out=tmp_path / "run", **changed), further)
     assert not (tmp_path / "run").exists()
+
+
+def test_a_training_that_has_begun_keeps_its_settings(small_settings, tmp_path):
+    plan = continual_plan(replace(REQUEST, out=tmp_path / "run"), [VELOCITY])
+    begun = plan.out / ALONE_FOLDER / POSITION
+    begun.mkdir(parents=True)
+    write_training_settings(small_settings, begun / SETTINGS_FILE)
+    assert plan.settings_of(POSITION) == small_settings
+    assert plan.settings_of(VELOCITY) != small_settings
+
+
+@pytest.mark.slow
+def test_a_policy_that_was_not_evaluated_claims_no_success_of_another_network(small_plan, monkeypatch):
+    def interrupted(run, episodes):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("training.continual.evaluate_in_mujoco", interrupted)
+    plan = small_plan(VELOCITY)
+    with pytest.raises(KeyboardInterrupt):
+        learn(plan)
+    assert "mujoco" in read_run_record(plan.out / ALONE_FOLDER / POSITION)
+    assert "mujoco" not in read_run_record(plan.out / POSITION)
+
+
+def test_a_distillation_that_is_interrupted_gives_the_terminal_back(monkeypatch):
+    monkeypatch.setenv("FORCE_COLOR", "1")  # as on a terminal
+    bar = DistillationBar()
+    with pytest.raises(KeyboardInterrupt), bar:
+        bar(0.5)
+        assert bar._bar.live.is_started
+        raise KeyboardInterrupt
+    assert not bar._bar.live.is_started
 
 
 def test_settings_that_differ_between_tasks_are_refused(small_settings, monkeypatch):
